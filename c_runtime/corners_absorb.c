@@ -1,0 +1,151 @@
+#include "hystgen_runtime.h"
+
+/* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
+static hystgen_real_t hystgen_activation(const hystgen_corner_t *c, hystgen_real_t r, bool rising)
+{
+    if (rising) {
+        return c->side > 0 ? c->extremum + (r + r) : c->side == 0 ? c->extremum + r : c->extremum;
+    }
+    return c->side < 0 ? c->extremum - (r + r) : c->side == 0 ? c->extremum - r : c->extremum;
+}
+
+static bool hystgen_reached(hystgen_real_t x, hystgen_real_t level, bool rising)
+{
+    return rising ? x >= level : x <= level;
+}
+
+/* What plays k and up contribute when corner c holds play k. Always from the corner's own tail, so that
+   rounding does not pile up from sample to sample. */
+static hystgen_real_t hystgen_held(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k)
+{
+    hystgen_real_t block = c->extremum * (t->slope[c->end] - t->slope[k]);
+    if (c->side > 0) {
+        block = block + (t->lift[c->end] - t->lift[k]);
+    } else if (c->side < 0) {
+        block = block - (t->lift[c->end] - t->lift[k]);
+    }
+    return c->tail + block;
+}
+
+/* Brings tail, base and next up to date after k, depth or the direction have changed. */
+static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
+{
+    if (m->depth > 0) {
+        const hystgen_corner_t *c = &corner[m->depth - 1];
+        m->tail = hystgen_held(t, c, m->k);
+        m->next = hystgen_activation(c, t->threshold[m->k], m->rising);
+    } else { /* every play follows */
+        m->tail = 0;
+        m->next = m->rising ? HYSTGEN_REAL_MAX : -HYSTGEN_REAL_MAX;
+    }
+    m->base = m->rising ? m->tail - t->lift[m->k] : m->tail + t->lift[m->k];
+}
+
+/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
+   block, galloping away from play k because most moves take one play at a time. */
+static void hystgen_corners_advance(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
+{
+    const hystgen_real_t w = m->w;
+    const bool rising = m->rising;
+    unsigned int low = 0;
+    unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
+    unsigned int k = m->k;
+    unsigned int probe = left;
+    while (low < left) {
+        const hystgen_corner_t *c = &corner[probe - 1];
+        if (hystgen_reached(w, hystgen_activation(c, t->threshold[c->end - 1], rising), rising)) {
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
+        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0) {
+        const hystgen_corner_t *c = &corner[left - 1];
+        unsigned int high = c->end - 1u; /* not reached: the block stays */
+        unsigned int stride = 1;
+        probe = k;
+        while (k < high) {
+            if (hystgen_reached(w, hystgen_activation(c, t->threshold[probe], rising), rising)) {
+                k = probe + 1;
+                stride = stride * 2;
+            } else {
+                high = probe;
+            }
+            probe = (k + high) / 2;
+            if (probe > k + stride - 1) {
+                probe = k + stride - 1;
+            }
+        }
+    }
+    m->depth = (uint_least16_t)left;
+    m->k = (uint_least16_t)k;
+    hystgen_corners_settle(t, m, corner);
+}
+
+/* Memory at rest: every play holds w, nothing has moved yet. */
+HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                      hystgen_real_t w)
+{
+    m->w = w;
+    m->k = 1;
+    m->depth = 0;
+    m->rising = true;
+    if (t->n > 0) {
+        corner[0].extremum = w;
+        corner[0].tail = 0;
+        corner[0].end = (uint_least16_t)(t->n + 1);
+        corner[0].side = 0;
+        m->depth = 1;
+    }
+    hystgen_corners_settle(t, m, corner);
+}
+
+/* Memory with a state of its own for each play: one corner a play. */
+HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                       const hystgen_real_t *play)
+{
+    unsigned int j;
+    m->w = play[0];
+    m->k = 1;
+    m->depth = t->n;
+    m->rising = true;
+    for (j = 0; j < t->n; ++j) {
+        hystgen_corner_t *c = &corner[j];
+        c->extremum = play[t->n - j];
+        c->tail = j > 0 ? hystgen_held(t, c - 1, t->n - j + 1u) : 0;
+        c->end = (uint_least16_t)(t->n - j + 1u);
+        c->side = 0;
+    }
+    hystgen_corners_settle(t, m, corner);
+}
+
+/* Moves the input of the plays to w. */
+HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                        hystgen_real_t w)
+{
+    if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
+        if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
+            hystgen_corner_t *c = &corner[m->depth];
+            c->extremum = m->w;
+            c->tail = m->tail;
+            c->end = m->k;
+            c->side = m->rising ? -1 : 1;
+            m->depth = (uint_least16_t)(m->depth + 1u);
+        }
+        m->rising = !m->rising;
+        m->k = 1;
+        hystgen_corners_settle(t, m, corner);
+    }
+    m->w = w;
+    if (hystgen_reached(w, m->next, m->rising)) {
+        hystgen_corners_advance(t, m, corner);
+    }
+}
+
+/* Output of the play sum for the memory as it is. */
+HYSTGEN_API hystgen_real_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
+{
+    return m->base + m->w * t->slope[m->k];
+}

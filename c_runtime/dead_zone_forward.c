@@ -1,0 +1,17 @@
+#include "hystgen_runtime.h"
+
+/* Finds the straight piece that x lies on and follows it. */
+HYSTGEN_API hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_real_t x)
+{
+    unsigned int low = 0;
+    unsigned int high = z->n;
+    while (low < high) {
+        const unsigned int middle = (low + high) / 2;
+        if (x >= z->break_x[middle]) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
+}

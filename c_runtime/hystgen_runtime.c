@@ -1,0 +1,17 @@
+/* The whole run time as one translation unit: this is what the shared-runtime layout compiles. */
+#include "hystgen_runtime.h"
+#ifdef HYSTGEN_REAL_IS_DOUBLE
+#include "tanh_f64.c"
+#include "atanh_f64.c"
+#else
+#include "tanh_f32.c"
+#include "atanh_f32.c"
+#endif
+#include "envelope_forward.c"
+#include "envelope_inverse.c"
+#include "dead_zone_forward.c"
+#include "dead_zone_inverse.c"
+#include "corners_absorb.c"
+#include "corners_solve.c"
+#include "loop_absorb.c"
+#include "loop_solve.c"

@@ -1,0 +1,209 @@
+"""The Python calls behind the command line: load, simulate, identify, emit, verify."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen import tables
+from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, Stage, TanhEnvelope
+from hystgen.params import Parameters, load_parameters
+
+if TYPE_CHECKING:
+    from hystgen.emission.module import Options
+    from hystgen.simulation import Session
+
+
+def cascade_of(parameters: Parameters) -> Cascade:
+    """The mathematical model that a parameter file describes."""
+    part = parameters.model
+    stages: list[Stage] = []
+    for stage in part.memoryless:
+        if stage.kind == "dead_zone":
+            stages.append(DeadZone(stage.thresholds, stage.weights))
+        else:
+            up, down = stage.ascending, stage.descending or stage.ascending
+            stages.append(
+                TanhEnvelope((up.a0, up.a1, up.a2, up.a3), (down.a0, down.a1, down.a2, down.a3))
+            )
+    pi = PI(part.pi.thresholds, part.pi.weights, part.pi.initial_state)
+    return Cascade(pi, tuple(stages), part.output_offset, parameters.input_range)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model as its parameter file gives it: `parameters`, and the mathematics in `cascade`."""
+
+    parameters: Parameters
+
+    @cached_property
+    def cascade(self) -> Cascade:
+        """Stages, play sum, offset and input range."""
+        return cascade_of(self.parameters)
+
+    @property
+    def name(self) -> str:
+        """C identifier that prefixes every emitted symbol."""
+        return self.parameters.name
+
+    def engine(self, engine: str | None = None) -> str:
+        """'corners' or 'loop': the given engine, or the parameter file's, with `auto` decided."""
+        return tables.choose_engine(engine or self.parameters.emit.engine, self.cascade.pi.n)
+
+    def session(
+        self, operator: str = "forward", arithmetic: str | None = None, engine: str | None = None, clamp: bool = False
+    ) -> Session:
+        """An instance of an operator that keeps its memory from record to record."""
+        from hystgen.simulation import Session
+
+        if arithmetic is not None:
+            check_arithmetic(arithmetic)
+            return Session(self.cascade, operator, arithmetic, self.engine(engine), clamp)
+        return Session(self.cascade, operator, clamp=clamp)
+
+    def simulate(
+        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None
+    ) -> NDArray[Any]:
+        """Output (N,) for the drive samples `v` (N,) from the start memory.
+
+        Without `arithmetic` in double precision, unlimited unless `clamp`. With 'float32' or 'float64' the bit
+        reference of the emitted C, which limits the drive to `input_range`.
+        """
+        return self.session("forward", arithmetic, engine, clamp).run(v)[0]
+
+    def inverse(self) -> InverseModel:
+        """The compensator. Raises NotInvertibleError with the reasons and ranges."""
+        self.cascade.inverse()
+        return InverseModel(self)
+
+
+@dataclass(frozen=True)
+class InverseModel:
+    """The compensator of a model: reference in, drive out."""
+
+    forward: Model
+
+    def simulate(
+        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None
+    ) -> NDArray[Any]:
+        """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`."""
+        return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
+
+    def inverse(self) -> Model:
+        """The model that this compensates."""
+        return self.forward
+
+
+def load(path: str | os.PathLike[str]) -> Model:
+    """The model of a parameter file. Raises ParameterError with every problem in the file; warns of a projected memory."""
+    model = Model(load_parameters(path))
+    if model.cascade.pi.projected:
+        warnings.warn(
+            f"{os.fspath(path)}: model.pi.initial_state cannot have come from any input; moved to the nearest "
+            "admissible memory (entry 1 kept)",
+            stacklevel=2,
+        )
+    return model
+
+
+def check_arithmetic(arithmetic: str) -> None:
+    """Raise FormatError for an arithmetic that this version does not compute in."""
+    if arithmetic not in tables.FLOAT_ARITHMETICS:
+        raise tables.FormatError(
+            f"arithmetic {arithmetic} is not available in this version; use {' or '.join(tables.FLOAT_ARITHMETICS)}"
+        )
+
+
+def _model(source: Model | str | os.PathLike[str]) -> Model:
+    return source if isinstance(source, Model) else load(source)
+
+
+def emit_options(
+    model: Model,
+    operator: str | None = None,
+    arithmetic: str | None = None,
+    engine: str | None = None,
+    layout: str = "self-contained",
+) -> Options:
+    """What is to be emitted: the arguments given, else the parameter file's `emit` section."""
+    from hystgen.emission import module
+
+    defaults = model.parameters.emit
+    options = module.Options(
+        operator or defaults.operator, arithmetic or defaults.arithmetic, model.engine(engine), layout
+    )
+    check_arithmetic(options.arithmetic)
+    for value, known, what in (
+        (options.operator, module.OPERATORS, "operator"),
+        (options.engine, tables.ENGINES, "engine"),
+        (options.layout, module.LAYOUTS, "layout"),
+    ):
+        if value not in known:
+            raise ValueError(f"{what} {value!r} is none of {', '.join(known)}")
+    return options
+
+
+def emitted_files(source: Model | str | os.PathLike[str], **options: str | None) -> dict[str, str]:
+    """Names and text of the C files of a model; options as for `emit`. Nothing is written."""
+    from hystgen.emission import module
+
+    model = _model(source)
+    return module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+
+
+def emit(
+    source: Model | str | os.PathLike[str], output: str | os.PathLike[str] = ".", **options: str | None
+) -> list[Path]:
+    """Write the C files of a model (or parameter file) into folder `output` and return their paths.
+
+    Options: `operator` inverse, forward or both; `arithmetic` float32 or float64; `engine` auto, corners or loop;
+    `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
+    Raises ParameterError, NotInvertibleError and FormatError; then nothing is written.
+    """
+    from hystgen.emission import files
+
+    return files.write(Path(output), emitted_files(source, **options))
+
+
+def differences(
+    source: Model | str | os.PathLike[str], output: str | os.PathLike[str] = ".", **options: str | None
+) -> list[str]:
+    """What in folder `output` is missing or differs from what `emit` would write, one sentence a file."""
+    from hystgen.emission import files
+
+    return files.differences(Path(output), emitted_files(source, **options))
+
+
+def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:
+    """Compile a model's C, run it and compare it with the bit reference; see `hystgen.verification.verify_model`."""
+    from hystgen import verification
+
+    return verification.verify_model(_model(source), **options)
+
+
+def identify(records: Any, **options: Any) -> Any:
+    """Fit a model to measured records; see `hystgen.identification.identify`."""
+    from hystgen import identification
+
+    return identification.identify(records, **options)
+
+
+__all__ = [
+    "InverseModel",
+    "Model",
+    "NotInvertibleError",
+    "differences",
+    "emit",
+    "emit_options",
+    "emitted_files",
+    "identify",
+    "load",
+    "replace",
+    "verify",
+]

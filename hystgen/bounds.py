@@ -1,0 +1,91 @@
+"""How far a compiled operator can be from the exact model: rounding-error bounds, derived once for every model.
+
+Forward: rounded thresholds, start memory and stage constants move a play by no more than their own error, because a
+play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
+roundoffs. In the corner list a tail is computed from the corner below, so that up to n such roundings add up.
+
+Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
+residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into
+at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front into that over its smallest
+slope. A clamp or commit gives both the same drive and adds nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hystgen import kernels
+from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
+
+SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computation itself
+
+
+@dataclass(frozen=True)
+class ErrorBounds:
+    """Largest differences from the exact model: `forward` in output units, `inverse` in drive units (inf: no inverse)."""
+
+    forward: float
+    inverse: float
+
+
+def _stage_errors(
+    stage: Stage, low: float, high: float, eps: float, kind: str, ascending: bool
+) -> tuple[float, float, float]:
+    """Error of the stage's value, of its inverse (as an error of the value), and its largest |slope|."""
+    x = max(abs(low), abs(high))
+    y = max(abs(end) for end in stage.image(low, high, ascending))
+    slope = max(abs(s) for s in stage.slope_range(low, high, ascending))
+    if isinstance(stage, TanhEnvelope):
+        a0, a1, a2, a3 = (abs(a) for a in stage.branch(ascending))
+        forward = slope * 3 * eps * (x + a2 / a1) + eps * (a0 * (3 + 2 * kernels.TANH_MAX_ULP[kind]) + 2 * a3)
+        inverse = eps * (4 * (y + a3) + a0 * (0.9 * kernels.ATANH_MAX_ULP[kind] + 4 * (0.45 + a2)))
+        return forward, inverse, slope
+    assert isinstance(stage, DeadZone)
+    return eps * (6 * slope * x + 2 * y), eps * (6 * y + 2 * slope * x), slope
+
+
+def _one(cascade: Cascade, kind: str, engine: str) -> tuple[float, float]:
+    """Forward error, and the residual eta of the inverse in output units, for one arithmetic."""
+    eps = float(np.finfo(kind).eps) / 2
+    pi = cascade.pi
+    total = math.fsum(abs(p) for p in pi.weights)
+    lift = math.fsum(abs(p) * r for p, r in zip(pi.weights, pi.thresholds, strict=True))
+    w = max(*(abs(end) for end in cascade.play_range), *(abs(s) for s in pi.start))
+    offset = abs(cascade.output_offset)
+    drive = max(abs(end) for end in cascade.input_range)
+
+    front = front_inverse = 0.0
+    for ascending in (True, False) if cascade.branches_differ else (True,):
+        error, residual = 0.0, eps * drive
+        for stage, (low, high) in zip(cascade.stages, cascade.stage_ranges(ascending), strict=True):
+            value, back, slope = _stage_errors(stage, low, high, eps, kind, ascending)
+            error = slope * error + value
+            residual = slope * residual + back
+        front, front_inverse = max(front, error), max(front_inverse, residual)
+
+    size = total * w + lift  # nothing that is added up for an output is larger
+    states = front + eps * (4 * w + 5 * pi.thresholds[-1])
+    sums = (pi.n + 3) if engine == "loop" else 6 * (pi.n + 1)
+    forward = total * states + eps * (sums * size + 2 * (size + offset))
+    solving = eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
+    underflow = (8 * pi.n + 16) * float(np.finfo(kind).smallest_subnormal) * (1 + total)
+    return forward + underflow, forward + solving + underflow
+
+
+def error_bounds(cascade: Cascade, arithmetic: str, engine: str) -> ErrorBounds:
+    """Bounds for `arithmetic` 'float32' or 'float64' and `engine` 'corners' or 'loop', against the double model.
+
+    The double model's own rounding is counted too. The inverse bound never exceeds the drive range, which both keep.
+    """
+    forward, residual = _one(cascade, arithmetic, engine)
+    own_forward, own_residual = _one(cascade, "float64", "corners")
+    inverse = math.inf
+    if not cascade.inverse_problems():
+        pi = cascade.pi
+        gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / cascade.front_slopes[0]
+        inverse = SECOND_ORDER * gain * (residual + own_residual)
+        inverse = min(inverse, cascade.input_range[1] - cascade.input_range[0])
+    return ErrorBounds(SECOND_ORDER * (forward + own_forward), inverse)

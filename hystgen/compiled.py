@@ -1,0 +1,60 @@
+"""Numba-compiled twins of plain Python functions, made when they are first needed.
+
+The functions of `reference`, `kernels` and `operators` run as ordinary Python (short signals, no start-up cost) and,
+unchanged, compiled (long signals). Compiled code is cached on disk; its cache key contains the source of every
+function that takes part, so that a change in a helper can never leave a stale caller behind.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import types
+from collections.abc import Callable, Sequence
+from typing import Any
+
+
+def compile_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNamespace:
+    """Compile `functions`, given callees first, so that they call each other's compiled form by name."""
+    import numba
+
+    sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions)
+    mark = hashlib.sha256(sources.encode()).hexdigest()[:12]
+    made: dict[str, Any] = {}
+    for function in functions:
+        assert isinstance(function, types.FunctionType)
+        scope = {**function.__globals__, **made}
+        twin = types.FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+        twin.__qualname__ = f"{function.__qualname__}_{mark}"
+        twin.__module__ = function.__module__
+        made[function.__name__] = numba.njit(cache=True, error_model="numpy")(twin)
+    return types.SimpleNamespace(**made)
+
+
+def _constants(functions: Sequence[Callable[..., Any]]) -> str:
+    """The module constants that the functions read; numba freezes them into the compiled code."""
+    seen: dict[str, str] = {}
+    for function in functions:
+        scope = function.__globals__
+        for name in function.__code__.co_names:
+            if isinstance(scope.get(name), int | float | tuple):
+                seen[name] = repr(scope[name])
+    return repr(sorted(seen.items()))
+
+
+@functools.cache
+def reference() -> types.SimpleNamespace:
+    """The compiled bit reference (`hystgen.reference`)."""
+    from hystgen import kernels
+    from hystgen import reference as plain
+
+    return compile_together([kernels.tanh, kernels.atanh, *plain.COMPILED])
+
+
+@functools.cache
+def operators() -> types.SimpleNamespace:
+    """The compiled recursions of `hystgen.operators`."""
+    from hystgen import operators as plain
+
+    return compile_together(plain.COMPILED)

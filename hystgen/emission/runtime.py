@@ -1,0 +1,127 @@
+"""The hand-written kernels of `c_runtime/`, as text to be carried by emitted files.
+
+A kernel file is a sequence of top-level pieces (functions, tables, types). Only the pieces that a model needs are
+carried, under the model's own prefix.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+VERSION = 1  # of the interface between emitted models and a shared run time
+
+KERNEL_FILES = (
+    "tanh_{bits}.c",
+    "atanh_{bits}.c",
+    "envelope_forward.c",
+    "envelope_inverse.c",
+    "dead_zone_forward.c",
+    "dead_zone_inverse.c",
+    "corners_absorb.c",
+    "corners_solve.c",
+    "loop_absorb.c",
+    "loop_solve.c",
+)
+
+
+def data_folder(name: str) -> Path:
+    """`templates` or `c_runtime`: inside the installed package, or at the top of the checkout."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "_data" / name
+    return installed if installed.is_dir() else package.parent / name
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A top-level piece of C with the comment above it."""
+
+    name: str
+    text: str
+    uses: frozenset[str]
+
+
+def split_pieces(source: str) -> list[Piece]:
+    """The top-level pieces of a kernel file, preprocessor lines left out."""
+    pieces = []
+    lines: list[str] = []
+    depth = 0
+    comment = False
+    for line in source.splitlines():
+        inside, comment = comment, False
+        code = line
+        if inside:
+            _, comment_ends, code = line.partition("*/")
+            comment = not comment_ends
+        code = re.sub(r"/\*.*?\*/", "", code)
+        if "/*" in code:
+            code, comment = code.partition("/*")[0], True
+        if not depth and (line.startswith("#") or (not lines and not line.strip())):
+            continue
+        lines.append(line)
+        depth += code.count("{") - code.count("}")
+        if not depth and re.search(r"[};]\s*$", code):
+            text = "\n".join(lines) + "\n"
+            names = re.findall(r"\bhystgen_\w+", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))
+            own = _defined_name(text)
+            pieces.append(Piece(own, text, frozenset(names) - {own}))
+            lines = []
+    return pieces
+
+
+def _defined_name(text: str) -> str:
+    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    typedef = re.search(r"}\s*(hystgen_\w+);\s*$", code)
+    if typedef and "typedef" in code:
+        return typedef.group(1)
+    declared = re.search(r"(hystgen_\w+)\s*[\[(]", code)
+    assert declared, f"no name in: {text}"
+    return declared.group(1)
+
+
+@functools.cache
+def _read(name: str) -> str:
+    return (data_folder("c_runtime") / name).read_text(encoding="utf-8")
+
+
+def kernel_pieces(bits: str) -> list[Piece]:
+    """Every piece of every kernel file for `bits` 'f32' or 'f64', callees before callers."""
+    return [piece for name in KERNEL_FILES for piece in split_pieces(_read(name.format(bits=bits)))]
+
+
+def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
+    """The pieces that `roots` lead to, in file order. Raises KeyError for a root that no piece defines."""
+    by_name = {piece.name: piece for piece in pieces}
+    wanted: set[str] = set()
+    queue = list(roots)
+    for root in queue:
+        by_name[root]
+    while queue:
+        name = queue.pop()
+        if name in by_name and name not in wanted:
+            wanted.add(name)
+            queue.extend(by_name[name].uses)
+    return [piece for piece in by_name.values() if piece.name in wanted]
+
+
+def render(pieces: Iterable[Piece], prefix: str, real_max: str, static: bool) -> str:
+    """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
+    text = "\n".join(piece.text for piece in pieces)
+    text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REAL_MAX", real_max)
+    return text.replace("hystgen_", prefix + "_")
+
+
+def types(file: str, wanted: Iterable[str], prefix: str) -> str:
+    """Type definitions of a header of the run time, those named in `wanted` (all of them when empty)."""
+    pieces = split_pieces(_read(file))
+    chosen = set(wanted) or {piece.name for piece in pieces}
+    return "\n".join(piece.text for piece in pieces if piece.name in chosen).replace("hystgen_", prefix + "_")
+
+
+def prototypes(prefix: str) -> str:
+    """Prototypes of all kernels."""
+    pieces = split_pieces(_read("hystgen_runtime.h").partition('#include "hystgen_tables.h"')[2])
+    return "".join(piece.text for piece in pieces).replace("hystgen_", prefix + "_")

@@ -1,0 +1,66 @@
+"""The samples that an emitted self-test runs, and their answers from the bit reference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hystgen import reference
+from hystgen.emission.text import literal
+from hystgen.models import Cascade
+
+if TYPE_CHECKING:
+    from hystgen.emission.module import Options
+
+CALLS = {reference.OP_STEP: "s", reference.OP_COMMIT: "c", reference.OP_RESET: "r"}
+
+
+def _fractions(length: int) -> list[float]:
+    """Turning points of a shrinking swing, then a fixed pseudo-random walk, in parts of the range (0 .. 1)."""
+    points = [0.5, 1.0, 0.0]
+    points += [0.5 + 0.5 * (-0.86) ** k for k in range(1, 20)]
+    points += [1.05, 1.0, 1.0, -0.05, 0.5]
+    seed = 12345
+    while len(points) < length // 3:
+        seed = (seed * 1103515245 + 12345) % 2**31
+        points.append((seed >> 12) / 2**19)
+    path = []
+    for a, b in zip(points, points[1:], strict=False):
+        path += [a + (b - a) * part / 3 for part in range(3)]
+    return path
+
+
+def operators(numbers: reference.Tables, options: Options, cascade: Cascade) -> list[dict[str, Any]]:
+    """One entry an operator: its name and its samples as C text."""
+    found = []
+    for name in ("forward", "inverse"):
+        if getattr(options, name):
+            found.append({"name": name, "samples": _samples(numbers, name == "inverse")})
+    return found
+
+
+def _samples(numbers: reference.Tables, inverse: bool) -> list[dict[str, Any]]:
+    real = numbers.threshold.dtype.type
+    first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+    low, high = numbers.limits[first], numbers.limits[first + 1]
+    drive_low, drive_high = numbers.limits[reference.DRIVE_MIN], numbers.limits[reference.DRIVE_MAX]
+    calls, arguments = [], []
+    for i, part in enumerate(_fractions(180)):
+        calls.append(reference.OP_STEP)
+        arguments.append(low + (high - low) * real(part))
+        if inverse and i % 23 == 22:
+            calls.append(reference.OP_COMMIT)
+            arguments.append(drive_low + (drive_high - drive_low) * real(0.3 + i / 1000.0))
+        if i == 120:
+            calls.append(reference.OP_RESET)
+            arguments.append(low + (high - low) * real(0.25))
+    state = reference.new_state(numbers)
+    reference.init(numbers, state)
+    x = np.array(arguments, dtype=real)
+    answers, status = np.zeros_like(x), np.zeros(len(x), dtype=np.int64)
+    reference.run(numbers, state, int(inverse), np.array(calls, dtype=np.int64), x, answers, status)
+    return [
+        {"call": CALLS[c], "argument": literal(a), "answer": literal(y), "status": int(s)}
+        for c, a, y, s in zip(calls, x, answers, status, strict=True)
+    ]

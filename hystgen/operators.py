@@ -1,0 +1,97 @@
+"""The operators of the Prandtl-Ishlinskii literature, sample by sample, as they are defined.
+
+These are the definitions that identification builds its regressors from and that everything faster is tested
+against. Signals are one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note named in
+the README.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen import compiled
+
+Array = NDArray[np.float64]
+
+
+def _play_into(v: Array, r: float, state: float, out: Array) -> float:
+    for k in range(len(v)):
+        low = v[k] - r
+        high = v[k] + r
+        if state > high:
+            state = high
+        if state < low:
+            state = low
+        out[k] = state
+    return state
+
+
+def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) -> None:
+    for k in range(len(v)):
+        state = state + v[k] - previous
+        previous = v[k]
+        if state > r:
+            state = r
+        if state < -r:
+            state = -r
+        out[k] = state
+
+
+COMPILED = [_play_into, _stop_into]
+
+
+def _signal(v: ArrayLike) -> Array:
+    signal = np.ascontiguousarray(v, dtype=np.float64)
+    if signal.ndim != 1:
+        raise ValueError(f"a signal has one dimension, this one has {signal.ndim}")
+    return signal
+
+
+def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
+    """Play operator: `s_k = max(v_k - r, min(v_k + r, s_(k-1)))`, started at `start` (1)(2).
+
+    `v`: N samples; returns N samples in the same unit. Raises ValueError for a negative threshold.
+    """
+    if threshold < 0:
+        raise ValueError("a play threshold is not negative")
+    signal = _signal(v)
+    out = np.empty_like(signal)
+    compiled.operators()._play_into(signal, float(threshold), float(start), out)
+    return out
+
+
+def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
+    """All plays of a model: row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N)."""
+    signal = _signal(v)
+    r = np.asarray(thresholds, dtype=np.float64)
+    states = np.broadcast_to(np.asarray(start, dtype=np.float64), r.shape)
+    out = np.empty((len(r), len(signal)))
+    for i in range(len(r)):
+        compiled.operators()._play_into(signal, float(r[i]), float(states[i]), out[i])
+    return out
+
+
+def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
+    """Stop operator: `e_k = clip(e_(k-1) + v_k - v_(k-1), -r, r)`, `e_0 = clip(v_0 - start, -r, r)` (4)(5), corrected.
+
+    With the play of the same threshold and start it adds up to the input (26).
+    """
+    if threshold < 0:
+        raise ValueError("a stop threshold is not negative")
+    signal = _signal(v)
+    out = np.empty_like(signal)
+    compiled.operators()._stop_into(signal, float(threshold), float(start), 0.0, out)
+    return out
+
+
+def dead_zone(v: ArrayLike, threshold: float) -> NDArray[Any]:
+    """Dead-zone operator (42): what of `v` lies beyond the threshold, on the threshold's own side of zero."""
+    x = np.asarray(v, dtype=np.float64)
+    if threshold > 0:
+        return np.maximum(x - threshold, 0.0)
+    if threshold < 0:
+        return np.minimum(x - threshold, 0.0)
+    return x.copy()

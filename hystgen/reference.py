@@ -1,0 +1,649 @@
+"""The bit reference: the emitted C, operation for operation, in Python.
+
+Every function has its counterpart of the same name in `c_runtime/` or in the step template and computes the same
+operations in the same order in the same arithmetic, so that results are compared for equal bits. The functions
+know nothing of numpy's or numba's types: they run as plain Python on scalars of the arrays they are given, or
+compiled (see `hystgen.compiled`). Real constants come out of arrays because a literal would not have the arithmetic's
+type.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.kernels import AtanhTables, TanhTables, atanh, tanh
+
+Reals = NDArray[Any]
+Counts = NDArray[np.int64]
+
+# arithmetic-independent names for places in the arrays below
+DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
+START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO = 5, 6, 7, 8, 9
+
+CORNERS, LOOP = 0, 1
+TANH, DEAD_ZONE = 0, 1
+
+W, BASE, TAIL, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+
+INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN = 1, 2, 4, 8
+
+OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
+
+
+class Tables(NamedTuple):
+    """The constants of one model in one arithmetic; arrays of the real type unless said otherwise."""
+
+    threshold: Reals  # n + 1
+    weight: Reals  # n + 1
+    slope: Reals  # n + 2
+    lift: Reals  # n + 2
+    inverse_slope: Reals  # n + 2
+    start: Reals  # n + 1 plays, or 1 where all start at the same value
+    limits: Reals  # DRIVE_MIN .. ZERO
+    stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
+    stage_first: Counts  # where the stage's numbers begin in stage_data
+    stage_size: Counts  # break points of a dead zone
+    stage_data: Reals
+    engine: int
+    branches: int  # 1 where an ascending and a descending branch differ
+    tanh: TanhTables
+    atanh: AtanhTables
+
+
+class State(NamedTuple):
+    """One instance: plain arrays."""
+
+    real: Reals
+    count: Counts
+    extremum: Reals
+    tail: Reals
+    end: Counts
+    side: Counts
+    play: Reals
+
+
+def new_state(t: Tables) -> State:
+    """Memory for one instance of the model; `init` gives it its values."""
+    n = len(t.threshold) - 1
+    dtype = t.threshold.dtype
+    return State(
+        real=np.zeros(9, dtype),
+        count=np.zeros(9, np.int64),
+        extremum=np.zeros(max(n, 1), dtype),
+        tail=np.zeros(max(n, 1), dtype),
+        end=np.zeros(max(n, 1), np.int64),
+        side=np.zeros(max(n, 1), np.int64),
+        play=np.zeros(n + 1, dtype),
+    )
+
+
+# ---------------------------------------------------------------- corners_absorb.c
+
+
+def activation(s: State, c: int, r: Any, rising: int) -> Any:
+    """Input at which a play of threshold r, held by corner c, starts to follow."""
+    e = s.extremum[c]
+    side = s.side[c]
+    if rising:
+        if side > 0:
+            return e + (r + r)
+        if side == 0:
+            return e + r
+        return e
+    if side < 0:
+        return e - (r + r)
+    if side == 0:
+        return e - r
+    return e
+
+
+def reached(x: Any, level: Any, rising: int) -> bool:
+    """Whether a move has come as far as `level`."""
+    if rising:
+        return bool(x >= level)
+    return bool(x <= level)
+
+
+def held(t: Tables, s: State, c: int, k: int) -> Any:
+    """What plays k and up contribute when corner c holds play k."""
+    end = s.end[c]
+    block = s.extremum[c] * (t.slope[end] - t.slope[k])
+    if s.side[c] > 0:
+        block = block + (t.lift[end] - t.lift[k])
+    elif s.side[c] < 0:
+        block = block - (t.lift[end] - t.lift[k])
+    return s.tail[c] + block
+
+
+def corners_settle(t: Tables, s: State) -> None:
+    """Bring tail, base and next up to date after k, depth or the direction have changed."""
+    k = s.count[K]
+    rising = s.count[RISING]
+    depth = s.count[DEPTH]
+    if depth > 0:
+        s.real[TAIL] = held(t, s, depth - 1, k)
+        s.real[NEXT] = activation(s, depth - 1, t.threshold[k], rising)
+    else:
+        s.real[TAIL] = t.limits[ZERO]
+        if rising:
+            s.real[NEXT] = t.limits[REAL_MAX]
+        else:
+            s.real[NEXT] = -t.limits[REAL_MAX]
+    if rising:
+        s.real[BASE] = s.real[TAIL] - t.lift[k]
+    else:
+        s.real[BASE] = s.real[TAIL] + t.lift[k]
+
+
+def corners_advance(t: Tables, s: State) -> None:
+    """The move has passed `next`: find the plays that follow now."""
+    w = s.real[W]
+    rising = s.count[RISING]
+    low = 0
+    left = s.count[DEPTH]
+    k = s.count[K]
+    probe = left
+    while low < left:
+        c = probe - 1
+        if reached(w, activation(s, c, t.threshold[s.end[c] - 1], rising), rising):
+            left = c
+            k = s.end[c]
+        else:
+            low = probe
+        probe = (low + left + 1) // 2
+    if left > 0:
+        c = left - 1
+        high = s.end[c] - 1
+        stride = 1
+        probe = k
+        while k < high:
+            if reached(w, activation(s, c, t.threshold[probe], rising), rising):
+                k = probe + 1
+                stride = stride * 2
+            else:
+                high = probe
+            probe = (k + high) // 2
+            if probe > k + stride - 1:
+                probe = k + stride - 1
+    s.count[DEPTH] = left
+    s.count[K] = k
+    corners_settle(t, s)
+
+
+def corners_rest(t: Tables, s: State, w: Any) -> None:
+    """Memory at rest: every play holds w."""
+    n = len(t.threshold) - 1
+    s.real[W] = w
+    s.count[K] = 1
+    s.count[DEPTH] = 0
+    s.count[RISING] = 1
+    if n > 0:
+        s.extremum[0] = w
+        s.tail[0] = t.limits[ZERO]
+        s.end[0] = n + 1
+        s.side[0] = 0
+        s.count[DEPTH] = 1
+    corners_settle(t, s)
+
+
+def corners_start(t: Tables, s: State, play: Reals) -> None:
+    """Memory with a state of its own for each play: one corner a play."""
+    n = len(t.threshold) - 1
+    s.real[W] = play[0]
+    s.count[K] = 1
+    s.count[DEPTH] = n
+    s.count[RISING] = 1
+    for j in range(n):
+        s.extremum[j] = play[n - j]
+        if j > 0:
+            s.tail[j] = held(t, s, j - 1, n - j + 1)
+        else:
+            s.tail[j] = t.limits[ZERO]
+        s.end[j] = n - j + 1
+        s.side[j] = 0
+    corners_settle(t, s)
+
+
+def push_corner(s: State, c: int) -> None:
+    """Write the corner that turning back leaves into slot c."""
+    s.extremum[c] = s.real[W]
+    s.tail[c] = s.real[TAIL]
+    s.end[c] = s.count[K]
+    if s.count[RISING]:
+        s.side[c] = -1
+    else:
+        s.side[c] = 1
+
+
+def corners_absorb(t: Tables, s: State, w: Any) -> None:
+    """Move the input of the plays to w."""
+    rising = s.count[RISING]
+    if (rising and w < s.real[W]) or (not rising and w > s.real[W]):
+        if s.count[K] > 1:
+            push_corner(s, s.count[DEPTH])
+            s.count[DEPTH] += 1
+        s.count[RISING] = 1 - rising
+        s.count[K] = 1
+        corners_settle(t, s)
+    s.real[W] = w
+    if reached(w, s.real[NEXT], s.count[RISING]):
+        corners_advance(t, s)
+
+
+def corners_output(t: Tables, s: State) -> Any:
+    """Output of the play sum for the memory as it is."""
+    return s.real[BASE] + s.real[W] * t.slope[s.count[K]]
+
+
+# ---------------------------------------------------------------- corners_solve.c
+
+
+def level(t: Tables, s: State, c: int, k: int, rising: int) -> Any:
+    """Output at the moment play k of corner c's block starts to follow."""
+    w = activation(s, c, t.threshold[k], rising)
+    tail = held(t, s, c, k + 1)
+    if rising:
+        return (tail - t.lift[k + 1]) + w * t.slope[k + 1]
+    return (tail + t.lift[k + 1]) + w * t.slope[k + 1]
+
+
+def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: Any) -> Any:
+    """Input that gives `output` when plays 0 .. k-1 follow and `left` corners hold the others."""
+    base = t.limits[ZERO]
+    low = 0
+    probe = left
+    while low < left:
+        c = probe - 1
+        if reached(output, level(t, s, c, s.end[c] - 1, rising), rising):
+            left = c
+            k = s.end[c]
+        else:
+            low = probe
+        probe = (low + left + 1) // 2
+    if left > 0:
+        c = left - 1
+        high = s.end[c] - 1
+        stride = 1
+        probe = k
+        while k < high:
+            if reached(output, level(t, s, c, probe, rising), rising):
+                k = probe + 1
+                stride = stride * 2
+            else:
+                high = probe
+            probe = (k + high) // 2
+            if probe > k + stride - 1:
+                probe = k + stride - 1
+        base = held(t, s, c, k)
+    if rising:
+        base = base - t.lift[k]
+    else:
+        base = base + t.lift[k]
+    return (output - base) * t.inverse_slope[k]
+
+
+def corners_solve(t: Tables, s: State, output: Any) -> Any:
+    """Input of the plays that gives `output`; moves nothing."""
+    k = s.count[K]
+    rising = s.count[RISING]
+    depth = s.count[DEPTH]
+    w = (output - s.real[BASE]) * t.inverse_slope[k]
+    if (rising and w >= s.real[W]) or (not rising and w <= s.real[W]):
+        if not reached(w, s.real[NEXT], rising):
+            return w
+        return corners_locate(t, s, depth, k, rising, output)
+    if k > 1:
+        push_corner(s, depth)
+        depth = depth + 1
+    return corners_locate(t, s, depth, 1, 1 - rising, output)
+
+
+# ---------------------------------------------------------------- loop_absorb.c, loop_solve.c
+
+
+def loop_rest(s: State, w: Any) -> None:
+    """Every play holds w."""
+    for i in range(len(s.play)):
+        s.play[i] = w
+
+
+def loop_start(s: State, start: Reals) -> None:
+    """Each play holds its own start value."""
+    for i in range(len(s.play)):
+        s.play[i] = start[i]
+
+
+def loop_absorb(t: Tables, s: State, w: Any) -> None:
+    """play_r[w] = max(w - r, min(w + r, play)), play by play."""
+    for i in range(len(s.play)):
+        low = w - t.threshold[i]
+        high = w + t.threshold[i]
+        upper = s.play[i]
+        if upper > high:
+            upper = high
+        if upper < low:
+            upper = low
+        s.play[i] = upper
+
+
+def loop_output(t: Tables, s: State) -> Any:
+    """p_0 play_0 + p_1 play_1 + ..., in this order."""
+    total = t.limits[ZERO]
+    for i in range(len(s.play)):
+        total = total + t.weight[i] * s.play[i]
+    return total
+
+
+def loop_solve(t: Tables, s: State, output: Any) -> Any:
+    """Input of the plays that gives `output`, letting go of the largest thresholds one by one."""
+    rising = output >= loop_output(t, s)
+    tail = t.limits[ZERO]
+    k = len(s.play)
+    while k > 1:
+        last = k - 1
+        if rising:
+            w = (output - (tail - t.lift[k])) * t.inverse_slope[k]
+            if w >= s.play[last] + t.threshold[last]:
+                return w
+        else:
+            w = (output - (tail + t.lift[k])) * t.inverse_slope[k]
+            if w <= s.play[last] - t.threshold[last]:
+                return w
+        tail = tail + t.weight[last] * s.play[last]
+        k = last
+    return (output - tail) * t.inverse_slope[1]
+
+
+# ---------------------------------------------------------------- envelope_*.c, dead_zone_*.c
+
+
+def envelope_forward(t: Tables, first: int, x: Any) -> Any:
+    """a0 tanh(a1 x + a2) + a3."""
+    d = t.stage_data
+    return d[first] * tanh(d[first + 1] * x + d[first + 2], t.tanh) + d[first + 3]
+
+
+def envelope_inverse(t: Tables, first: int, y: Any) -> tuple[Any, int]:
+    """(atanh((y - a3) / a0) - a2) / a1, and whether the argument had to be limited."""
+    d = t.stage_data
+    argument = (y - d[first + 3]) * d[first + 4]
+    limited = 0
+    if argument > d[first + 6]:
+        argument = d[first + 6]
+        limited = 1
+    elif argument < -d[first + 6]:
+        argument = -d[first + 6]
+        limited = 1
+    return (atanh(argument, t.atanh) - d[first + 2]) * d[first + 5], limited
+
+
+def dead_zone(t: Tables, first: int, n: int, x: Any, inverse: int) -> Any:
+    """Follow the straight piece that x lies on; the tables of the inverse are those of the forward map swapped."""
+    d = t.stage_data
+    breaks = first + n * inverse
+    anchor_in = first + 2 * n + (n + 1) * inverse
+    anchor_out = first + 2 * n + (n + 1) * (1 - inverse)
+    slope = first + 2 * n + 2 * (n + 1) + (n + 1) * inverse
+    low = 0
+    high = n
+    while low < high:
+        middle = (low + high) // 2
+        if x >= d[breaks + middle]:
+            low = middle + 1
+        else:
+            high = middle
+    return d[anchor_out + low] + (x - d[anchor_in + low]) * d[slope + low]
+
+
+def front_forward(t: Tables, v: Any, ascending: int) -> Any:
+    """w = G[v] on one branch, stage by stage from the drive."""
+    w = v
+    for j in range(len(t.stage_kind)):
+        first = t.stage_first[j]
+        if t.stage_kind[j] == DEAD_ZONE:
+            w = dead_zone(t, first, t.stage_size[j], w, 0)
+        elif ascending:
+            w = envelope_forward(t, first, w)
+        else:
+            w = envelope_forward(t, first + 7, w)
+    return w
+
+
+def front_inverse(t: Tables, w: Any, ascending: int) -> tuple[Any, int]:
+    """v = G^-1[w] on one branch, stages in reverse order, and whether an envelope's argument was limited."""
+    v = w
+    limited = 0
+    for j in range(len(t.stage_kind) - 1, -1, -1):
+        first = t.stage_first[j]
+        if t.stage_kind[j] == DEAD_ZONE:
+            v = dead_zone(t, first, t.stage_size[j], v, 1)
+        else:
+            if not ascending:
+                first = first + 7
+            v, one = envelope_inverse(t, first, v)
+            limited = limited | one
+    return v, limited
+
+
+# ---------------------------------------------------------------- the step template
+
+
+def rest(t: Tables, s: State, w: Any) -> None:
+    """All plays at w."""
+    if t.engine == CORNERS:
+        corners_rest(t, s, w)
+    else:
+        loop_rest(s, w)
+
+
+def absorb(t: Tables, s: State, w: Any) -> None:
+    """The plays see w."""
+    if t.engine == CORNERS:
+        corners_absorb(t, s, w)
+    else:
+        loop_absorb(t, s, w)
+
+
+def output(t: Tables, s: State) -> Any:
+    """Output for the memory as it is, offset included."""
+    if t.engine == CORNERS:
+        return corners_output(t, s) + t.limits[OFFSET]
+    return loop_output(t, s) + t.limits[OFFSET]
+
+
+def solve(t: Tables, s: State, u: Any) -> Any:
+    """Input of the plays that gives u, offset included."""
+    if t.engine == CORNERS:
+        return corners_solve(t, s, u - t.limits[OFFSET])
+    return loop_solve(t, s, u - t.limits[OFFSET])
+
+
+def begin(t: Tables, s: State, applied: Any) -> None:
+    """What init and reset have in common once the plays are set."""
+    s.count[ASCENDING] = 1
+    s.count[HAS_PENDING] = 0
+    s.count[REPEAT] = 0
+    s.count[STEPPED] = 0
+    s.count[BITS] = 0
+    s.count[STATUS] = 0
+    s.real[PENDING] = applied
+    s.real[APPLIED] = applied
+    s.real[LEVEL] = output(t, s)
+    s.real[REFERENCE] = s.real[LEVEL]
+    s.real[ANSWER] = s.real[LEVEL]
+
+
+def init(t: Tables, s: State) -> None:
+    """Start memory of the parameter file."""
+    if len(t.start) == 1:
+        rest(t, s, t.start[0])
+    elif t.engine == CORNERS:
+        corners_start(t, s, t.start)
+    else:
+        loop_start(s, t.start)
+    begin(t, s, t.limits[START_APPLIED])
+
+
+def see_drive(t: Tables, s: State, v: Any) -> None:
+    """The actuator sees drive v: its own move picks the branch."""
+    if t.branches:
+        if v > s.real[APPLIED]:
+            s.count[ASCENDING] = 1
+        elif v < s.real[APPLIED]:
+            s.count[ASCENDING] = 0
+    s.real[APPLIED] = v
+    absorb(t, s, front_forward(t, v, s.count[ASCENDING]))
+
+
+def finite(t: Tables, x: Any) -> bool:
+    """Neither NaN nor infinite."""
+    return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])
+
+
+def forward_step(t: Tables, s: State, v: Any) -> Any:
+    """One sample of the forward operator."""
+    if not finite(t, v):
+        s.count[STATUS] |= HELD
+        return s.real[ANSWER]
+    if v < t.limits[DRIVE_MIN]:
+        v = t.limits[DRIVE_MIN]
+        s.count[STATUS] |= INPUT_CLAMPED
+    elif v > t.limits[DRIVE_MAX]:
+        v = t.limits[DRIVE_MAX]
+        s.count[STATUS] |= INPUT_CLAMPED
+    see_drive(t, s, v)
+    s.real[ANSWER] = output(t, s)
+    return s.real[ANSWER]
+
+
+def answer(s: State, v: Any) -> Any:
+    """Leave drive v pending and return it."""
+    s.real[ANSWER] = v
+    s.real[PENDING] = v
+    s.count[HAS_PENDING] = 1
+    s.count[STEPPED] = 1
+    return v
+
+
+def clamp_drive(t: Tables, v: Any) -> Any:
+    """v inside the input range."""
+    if v < t.limits[DRIVE_MIN]:
+        return t.limits[DRIVE_MIN]
+    if v > t.limits[DRIVE_MAX]:
+        return t.limits[DRIVE_MAX]
+    return v
+
+
+def fits(s: State, v: Any, ascending: int) -> bool:
+    """Whether going to v is a move of the branch that v was computed on."""
+    if v == s.real[APPLIED]:
+        return bool(s.count[ASCENDING] == ascending)
+    return bool((v > s.real[APPLIED]) == (ascending != 0))
+
+
+def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
+    """The drive on the branch of its own move: that of u's move first, the other one next, else no move."""
+    up = s.count[ASCENDING]
+    if u > s.real[LEVEL]:
+        up = 1
+    elif u < s.real[LEVEL]:
+        up = 0
+    v, limited = front_inverse(t, w, up)
+    if fits(s, v, up):
+        return v, limited
+    back = v - s.real[APPLIED]
+    if up == s.count[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+        return s.real[APPLIED], limited
+    v, limited = front_inverse(t, w, 1 - up)
+    if fits(s, v, 1 - up):
+        return v, limited
+    return s.real[APPLIED], limited
+
+
+def inverse_step(t: Tables, s: State, u: Any) -> Any:
+    """One sample of the inverse operator."""
+    if s.count[HAS_PENDING]:
+        see_drive(t, s, s.real[PENDING])
+        s.count[HAS_PENDING] = 0
+    if not finite(t, u):
+        s.count[STATUS] |= HELD
+        if s.count[STEPPED]:
+            return answer(s, s.real[ANSWER])
+        return answer(s, clamp_drive(t, s.real[APPLIED]))
+    if s.count[REPEAT] and u == s.real[REFERENCE]:
+        s.count[STATUS] |= s.count[BITS]
+        return answer(s, s.real[ANSWER])
+    bits = 0
+    s.real[REFERENCE] = u
+    s.count[REPEAT] = 1
+    if u < t.limits[OUTPUT_MIN]:
+        u = t.limits[OUTPUT_MIN]
+        bits = bits | INPUT_CLAMPED
+    elif u > t.limits[OUTPUT_MAX]:
+        u = t.limits[OUTPUT_MAX]
+        bits = bits | INPUT_CLAMPED
+    w = solve(t, s, u)
+    if t.branches:
+        v, limited = choose_branch(t, s, u, w)
+    else:
+        v, limited = front_inverse(t, w, 1)
+    s.real[LEVEL] = u
+    if limited:
+        bits = bits | DOMAIN
+    inside = clamp_drive(t, v)
+    if inside != v:
+        bits = bits | OUTPUT_CLAMPED
+    s.count[BITS] = bits
+    s.count[STATUS] |= bits
+    return answer(s, inside)
+
+
+def inverse_commit(t: Tables, s: State, applied: Any) -> None:
+    """What the drive really applied in place of the last answer."""
+    if not finite(t, applied):
+        s.count[STATUS] |= HELD
+        return
+    v = clamp_drive(t, applied)
+    if v != applied:
+        s.count[STATUS] |= INPUT_CLAMPED
+    s.real[PENDING] = v
+    s.count[HAS_PENDING] = 1
+    s.count[REPEAT] = 0
+
+
+def reset(t: Tables, s: State) -> None:
+    """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
+    rest(t, s, t.limits[ZERO])
+    begin(t, s, t.limits[RESET_APPLIED])
+
+
+def run(t: Tables, s: State, inverse: int, op: Counts, x: Reals, answers: Reals, status: Counts) -> None:
+    """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
+    for i in range(len(op)):
+        if op[i] == OP_INIT:
+            init(t, s)
+        elif op[i] == OP_COMMIT:
+            inverse_commit(t, s, x[i])
+        else:
+            if op[i] == OP_RESET:
+                reset(t, s)
+            if inverse:
+                inverse_step(t, s, x[i])
+            else:
+                forward_step(t, s, x[i])
+        answers[i] = s.real[ANSWER] if op[i] == OP_STEP else t.limits[ZERO]
+        status[i] = s.count[STATUS]
+        s.count[STATUS] = 0
+
+
+COMPILED = [
+    activation, reached, held, corners_settle, corners_advance, corners_rest, corners_start, push_corner,
+    corners_absorb, corners_output, level, corners_locate, corners_solve, loop_rest, loop_start, loop_absorb,
+    loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse, rest,
+    absorb, output, solve, begin, init, see_drive, finite, forward_step, answer, clamp_drive, fits, choose_branch,
+    inverse_step, inverse_commit, reset, run,
+]  # fmt: skip  (callees before callers)

@@ -1,0 +1,64 @@
+"""Running a model over sampled signals: in double precision, or as the bit reference of an arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen import compiled, reference, tables
+from hystgen.models import Cascade
+
+
+class Session:
+    """One instance of an operator, run over records that follow one another.
+
+    `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
+    `clamp`; with one it is the bit reference of the emitted C, which clamps. Raises NotInvertibleError and FormatError.
+    """
+
+    def __init__(
+        self,
+        cascade: Cascade,
+        operator: str = "forward",
+        arithmetic: str | None = None,
+        engine: str = "corners",
+        clamp: bool = False,
+    ) -> None:
+        self._inverse = int(operator == "inverse")
+        if self._inverse:
+            cascade.inverse()
+        self.tables = tables.build(cascade, arithmetic or "float64", engine, clamp or arithmetic is not None)
+        self.state = reference.new_state(self.tables)
+        self._code = compiled.reference()
+        self._code.init(self.tables, self.state)
+
+    def visit(self, drives: Iterable[float]) -> None:
+        """Let the actuator see these drive values before what comes next."""
+        for drive in drives:
+            self._code.see_drive(self.tables, self.state, self.tables.threshold.dtype.type(drive))
+        self.state.real[reference.LEVEL] = self._code.output(self.tables, self.state)
+
+    def run(self, x: ArrayLike) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        """Answers (N,) for the input samples (N,), and the status bits of each sample."""
+        samples = np.ascontiguousarray(x, dtype=self.tables.threshold.dtype)
+        return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.int64), samples)
+
+    def operate(self, op: NDArray[np.int64], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+        """A sequence of init, reset, step and commit with their arguments; answers are those of the steps."""
+        answers = np.zeros_like(x)
+        status = np.zeros(len(x), dtype=np.int64)
+        self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)
+        return answers, status
+
+
+def simulate(cascade: Cascade, v: ArrayLike, clamp: bool = False) -> NDArray[np.float64]:
+    """Output (N,) for the drive samples `v` (N,) from the start memory, in double precision."""
+    return Session(cascade, "forward", clamp=clamp).run(v)[0]
+
+
+def simulate_inverse(cascade: Cascade, u: ArrayLike, clamp: bool = False) -> NDArray[np.float64]:
+    """Drive (N,) for the reference samples `u` (N,) from the start memory, in double precision."""
+    return Session(cascade, "inverse", clamp=clamp).run(u)[0]

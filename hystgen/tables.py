@@ -1,0 +1,144 @@
+"""From a model to the numbers that the kernels work with, in one arithmetic.
+
+Everything a compiled operator knows comes from here, once, for the bit reference and for the C text alike.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import kernels, reference
+from hystgen.bounds import error_bounds
+from hystgen.models import Cascade, DeadZone, TanhEnvelope
+from hystgen.reference import Tables
+
+ENGINES = ("corners", "loop")
+FLOAT_ARITHMETICS = ("float32", "float64")
+SMALLEST_CORNERS = 3  # plays from which on the corner list is cheaper than visiting every play
+
+
+class FormatError(ValueError):
+    """A model whose numbers do not fit the arithmetic."""
+
+
+def choose_engine(engine: str, n: int) -> str:
+    """The engine that `auto` stands for with n plays; any other choice is kept."""
+    if engine != "auto":
+        return engine
+    return "corners" if n >= SMALLEST_CORNERS else "loop"
+
+
+def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
+    """The ends of [low, high] in `dtype`, rounded so that they stay inside."""
+    a, b = dtype(low), dtype(high)
+    if float(a) < low:
+        a = np.nextafter(a, dtype(np.inf))
+    if float(b) > high:
+        b = np.nextafter(b, dtype(-np.inf))
+    return a, b
+
+
+def _stage_numbers(stage: DeadZone | TanhEnvelope, low: float, high: float, clamp: bool) -> tuple[int, int, list[float]]:
+    if isinstance(stage, TanhEnvelope):
+        numbers = []
+        for ascending in (True, False):
+            a0, a1, a2, a3 = stage.branch(ascending)
+            numbers += [a0, a1, a2, a3, 1.0 / a0, 1.0 / a1, 1.0]  # the last becomes the largest number below 1
+        return reference.TANH, 0, numbers
+    if clamp or any(s <= 0 for s in stage.piece_slopes):
+        stage = stage.restricted(low, high)
+    slopes = stage.piece_slopes
+    return (
+        reference.DEAD_ZONE,
+        len(stage.breaks),
+        [
+            *stage.breaks,
+            *(float(stage.forward(b)) for b in stage.breaks),
+            *(x for x, _ in stage.anchors),
+            *(y for _, y in stage.anchors),
+            *slopes,
+            *(1.0 / s if s > 0 else 0.0 for s in slopes),
+        ],
+    )
+
+
+def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners", clamp: bool = True) -> Tables:
+    """Tables of `cascade` in 'float32' or 'float64' for engine 'corners' or 'loop'.
+
+    Without `clamp` the drive and output limits are those of the arithmetic. Raises FormatError when a number or an
+    intermediate result of the model does not fit the arithmetic.
+    """
+    dtype = np.dtype(arithmetic).type
+    info = np.finfo(dtype)
+    largest = float(info.max)
+    pi = cascade.pi
+    n = pi.n
+
+    def reals(values: list[float] | tuple[float, ...], what: str) -> NDArray[Any]:
+        if any(abs(x) > largest / 16 for x in values):
+            raise FormatError(f"{what} reach {max(abs(x) for x in values):.3g}, too large for {arithmetic}")
+        return np.array(values, dtype=dtype)
+
+    products = [p * r for p, r in zip(pi.weights, pi.thresholds, strict=True)]
+    slope = [math.fsum(pi.weights[:k]) for k in range(n + 2)]
+    lift = [math.fsum(products[:k]) for k in range(n + 2)]
+    bounded = clamp and all(math.isfinite(end) for end in cascade.input_range)
+
+    kinds, firsts, sizes, numbers = [], [], [], []
+    for j, stage in enumerate(cascade.stages):
+        assert isinstance(stage, DeadZone | TanhEnvelope)
+        low, high = cascade.stage_ranges(True)[j]
+        kind, size, data = _stage_numbers(stage, low, high, bounded)
+        kinds.append(kind)
+        firsts.append(len(numbers))
+        sizes.append(size)
+        numbers += data
+
+    limits = [0.0] * 10
+    if bounded:
+        drive = inward(*cascade.input_range, dtype)
+        outputs = inward(*cascade.output_range, dtype)
+        if not (drive[0] < drive[1] and outputs[0] < outputs[1]):
+            raise FormatError(f"input_range or the output range is narrower than {arithmetic} can tell apart")
+        limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [float(x) for x in (*drive, *outputs)]
+    else:
+        limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
+    limits[reference.OFFSET] = cascade.output_offset
+    if not any(stage.inverse_problems(*ends) for stage, ends in zip(cascade.stages, cascade.stage_ranges(True), strict=True)):
+        # the drive that the start memory stands for: held before any sample, and where the first move starts
+        for place, w in ((reference.START_APPLIED, pi.start[0]), (reference.RESET_APPLIED, 0.0)):
+            limits[place] = float(cascade.front_inverse(w))
+    if cascade.branches_differ and not cascade.inverse_problems():
+        limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).inverse
+    limits[reference.REAL_MAX] = largest
+
+    tables = Tables(
+        threshold=reals(pi.thresholds, "thresholds"),
+        weight=reals(pi.weights, "weights"),
+        slope=reals(slope, "sums of weights"),
+        lift=reals(lift, "sums of weight times threshold"),
+        inverse_slope=reals([1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights"),
+        start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states"),
+        limits=np.array(limits, dtype=dtype),
+        stage_kind=np.array(kinds, dtype=np.int64),
+        stage_first=np.array(firsts, dtype=np.int64),
+        stage_size=np.array(sizes, dtype=np.int64),
+        stage_data=reals(numbers, "numbers of the memoryless stages"),
+        engine=reference.CORNERS if engine == "corners" else reference.LOOP,
+        branches=int(cascade.branches_differ),
+        tanh=kernels.tanh_tables(dtype),
+        atanh=kernels.atanh_tables(dtype),
+    )
+    for kind, first in zip(kinds, firsts, strict=True):
+        if kind == reference.TANH:
+            tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
+    if bounded:
+        w = max(abs(x) for x in (*cascade.play_range, *pi.start))
+        size = w * sum(abs(p) for p in pi.weights) + abs(lift[-1]) + abs(cascade.output_offset)
+        most = 4 * max(size, w, pi.thresholds[-1]) * max(1.0, float(np.max(tables.inverse_slope)))
+        reals([most], "intermediate results")
+    return tables

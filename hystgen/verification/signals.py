@@ -1,0 +1,80 @@
+"""The calls that verification makes: what an ISR may feed a model, and what it never should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import reference
+
+Calls = tuple[str, NDArray[np.int64], NDArray[np.float64]]
+
+
+def _steps(x: NDArray[np.float64]) -> NDArray[np.int64]:
+    return np.full(len(x), reference.OP_STEP, dtype=np.int64)
+
+
+def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
+    """Straight moves between turning points."""
+    return np.interp(np.linspace(0, len(points) - 1, length), np.arange(len(points)), points)
+
+
+def suite(tables: reference.Tables, inverse: bool, length: int = 100_000) -> Iterator[Calls]:
+    """Records of `length` calls: name, operations and arguments; the same ones every time."""
+    first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+    low, high = (float(x) for x in tables.limits[first : first + 2])
+    middle, half = (low + high) / 2, (high - low) / 2
+    real = tables.threshold.dtype.type
+    info = np.finfo(real)
+    rng = np.random.default_rng(20220916)
+    phase = np.linspace(0, 1, length)
+
+    def record(name: str, x: NDArray[np.float64]) -> Calls:
+        return name, _steps(x), x
+
+    sizes = np.repeat(10.0 ** rng.uniform(-6, 0, 50), -(-length // 50))[:length]
+    yield record("sines of many sizes", middle + half * sizes * np.sin(2 * np.pi * 400 * phase))
+    yield record("slow sine", middle + half * np.sin(2 * np.pi * 7 * phase))
+    shrinking = middle + half * np.exp(-5 * phase) * np.sin(2 * np.pi * 300 * phase)
+    yield record("shrinking swing", shrinking)
+    yield record("growing swing", shrinking[::-1].copy())
+    points = rng.uniform(low, high, max(2, length // 25))
+    yield record("nested loops", _through(points, length))
+    walk = np.cumsum(rng.normal(0, 0.02, length))
+    yield record("random walk", middle + half * np.sin(walk))
+    yield record("steps", np.repeat(rng.uniform(low, high, -(-length // 4)), 4)[:length])
+    plateaus = np.repeat(rng.uniform(low, high, -(-length // 100)), 100)[:length]
+    moving = rng.random(length) < 0.2
+    yield record("plateaus", np.where(moving, rng.uniform(low, high, length), plateaus))
+    yield record("beyond the range", middle + 1.5 * half * np.sin(2 * np.pi * 150 * phase) + 0.1 * half * walk)
+    tiny = float(info.smallest_subnormal) * rng.integers(-1000, 1000, length)
+    yield record("denormals", np.where(rng.random(length) < 0.7, tiny, float(info.tiny) * rng.normal(0, 3, length)))
+    least = np.spacing(real(abs(middle)))
+    yield record("last bits", middle + float(least) * np.round(rng.normal(0, 4, length)))
+
+    special = np.array(
+        [np.nan, np.inf, -np.inf, 0.0, -0.0, float(info.max), -float(info.max), float(info.tiny), low, high]
+    )
+    x = _through(points, length)
+    places = rng.random(length) < 0.2
+    x[places] = rng.choice(special, int(places.sum()))
+    yield record("NaN, infinities, extremes", x)
+
+    kinds = [reference.OP_STEP, reference.OP_RESET, reference.OP_INIT]
+    chances = [0.995, 0.004, 0.001]
+    x = middle + 1.1 * half * np.sin(walk * 2)
+    x[places] = rng.choice(special, int(places.sum()))
+    yield "resets", rng.choice(kinds, length, p=chances), x
+    if inverse:
+        drive_low, drive_high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
+        for name, chance in (("commits", 0.3), ("rare commits", 0.01)):
+            op = np.where(rng.random(length) < chance, reference.OP_COMMIT, reference.OP_STEP).astype(np.int64)
+            spread = drive_high - drive_low
+            drives = rng.uniform(drive_low - 0.05 * spread, drive_high + 0.05 * spread, length)
+            odd = rng.random(length) < 0.02
+            drives[odd] = rng.choice(special, int(odd.sum()))
+            smooth = middle + half * np.sin(walk)
+            smooth[odd] = rng.choice(special, int(odd.sum()))
+            yield name, op, np.where(op == reference.OP_COMMIT, drives, smooth)
