@@ -69,7 +69,7 @@ def tanh(x: Real, t: TanhTables) -> Real:
         return x
     if a < t.knot[0]:
         z = x * x
-        p = t.odd[len(t.odd) - 1]
+        p: Real = t.odd[len(t.odd) - 1]
         for n in range(len(t.odd) - 1, 0, -1):
             p = t.odd[n - 1] + z * p
         return x + x * (z * p)
@@ -99,7 +99,7 @@ def atanh(x: Real, t: AtanhTables) -> Real:
     a = -x if x < 0 else x
     if a <= t.bound[0]:
         z = x * x
-        p = t.odd[len(t.odd) - 1]
+        p: Real = t.odd[len(t.odd) - 1]
         for n in range(len(t.odd) - 1, 0, -1):
             p = t.odd[n - 1] + z * p
         return x + x * (z * p)
@@ -122,13 +122,13 @@ def atanh(x: Real, t: AtanhTables) -> Real:
     e = a - t.offset[j - pieces // 2]
 
     degree = len(t.row) // pieces - 1
-    p = t.row[i * (degree + 1) + degree]
-    q = t.row[j * (degree + 1) + degree]
+    lower = t.row[i * (degree + 1) + degree]
+    upper = t.row[j * (degree + 1) + degree]
     for n in range(degree, 1, -1):
-        p = t.row[i * (degree + 1) + n - 1] + d * p
-        q = t.row[j * (degree + 1) + n - 1] + e * q
+        lower = t.row[i * (degree + 1) + n - 1] + d * lower
+        upper = t.row[j * (degree + 1) + n - 1] + e * upper
     start = t.row[j * (degree + 1)] - t.row[i * (degree + 1)]
-    y: Real = t.count[k] * t.half_log2[0] + (start + (e * q - d * p))
+    y: Real = t.count[k] * t.half_log2[0] + (start + (e * upper - d * lower))
     return -y if x < 0 else y
 
 
