@@ -84,7 +84,7 @@ def fit(f: Function, start: mp.mpf, degree: int, low: mp.mpf, high: mp.mpf, bits
 def worst(f: Function, coefficients: list[mp.mpf], low: mp.mpf, high: mp.mpf, points: int = 40) -> mp.mpf:
     """Largest error of the polynomial on [low, high]."""
     grid = [low + (high - low) * i / points for i in range(points + 1)]
-    return max(abs(f(d) - mp.polyval(coefficients[::-1], d)) for d in grid)
+    return max(abs(f(d) - functools.reduce(lambda y, c: c + d * y, reversed(coefficients))) for d in grid)
 
 
 def center(f: Function, low: mp.mpf, high: mp.mpf, shape: Shape) -> mp.mpf:
@@ -124,7 +124,7 @@ def tanh_reach(low: mp.mpf, last: mp.mpf, degree: int, tolerance: mp.mpf) -> mp.
             return mp.tanh(middle + d)
 
         unrounded = fit(f, f(mp.mpf(0)), degree, low - middle, high - middle, mp.mp.prec)
-        return worst(f, unrounded, low - middle, high - middle) <= tolerance
+        return bool(worst(f, unrounded, low - middle, high - middle) <= tolerance)
 
     if good(last):
         return last
@@ -137,7 +137,7 @@ def tanh_reach(low: mp.mpf, last: mp.mpf, degree: int, tolerance: mp.mpf) -> mp.
 
 def tanh_knots(shape: Shape, last: mp.mpf) -> list[mp.mpf]:
     """PIECES starting points, the first just above where tanh is 1/2, such that the pieces err about equally."""
-    tolerance = mp.ldexp(1, -shape.bits - 5)
+    tolerance = mp.mpf(2) ** (-shape.bits - 4.5)
     while True:
         knots = [mp.mpf(141) / 256]
         while len(knots) <= PIECES:

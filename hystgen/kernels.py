@@ -55,7 +55,7 @@ class AtanhTables(NamedTuple):
     offset: Reals  # center - 1, for the upper half of the pieces
     row: Reals  # their coefficients from degree 0, piece after piece
     power: Reals  # 2^0, 2^1, .. up to the significand's bits
-    count: Reals  # 0, 1, .. likewise
+    number: Reals  # 0, 1, .. likewise
 
 
 def tanh(x: Real, t: TanhTables) -> Real:
@@ -128,7 +128,7 @@ def atanh(x: Real, t: AtanhTables) -> Real:
         lower = t.row[i * (degree + 1) + n - 1] + d * lower
         upper = t.row[j * (degree + 1) + n - 1] + e * upper
     start = t.row[j * (degree + 1)] - t.row[i * (degree + 1)]
-    y: Real = t.count[k] * t.half_log2[0] + (start + (e * upper - d * lower))
+    y: Real = t.number[k] * t.half_log2[0] + (start + (e * upper - d * lower))
     return -y if x < 0 else y
 
 
@@ -170,7 +170,7 @@ def _atanh_tables(dtype: npt.DTypeLike, **values: list[float]) -> AtanhTables:
     return AtanhTables(
         one=_array([1.0], dtype),
         power=_array([2.0**k for k in range(bits + 1)], dtype),
-        count=_array([float(k) for k in range(bits + 1)], dtype),
+        number=_array([float(k) for k in range(bits + 1)], dtype),
         **{key: _array(v, dtype) for key, v in values.items()},
     )
 
