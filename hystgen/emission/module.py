@@ -17,7 +17,8 @@ from hystgen.bounds import error_bounds
 from hystgen.emission import cost, runtime, selftest
 from hystgen.emission.text import literal, operand, table
 from hystgen.models import Cascade, NotInvertibleError
-from hystgen.params import Parameters, comment_text, parameters_sha256
+from hystgen.names import comment_text
+from hystgen.params import Parameters, parameters_sha256
 
 LAYOUTS = ("self-contained", "shared-runtime", "single-header")
 OPERATORS = ("inverse", "forward", "both")

@@ -1,0 +1,157 @@
+"""Fitting a PI model to records: thresholds, weights, and how good it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.identification import reduction, thresholds, weights
+from hystgen.identification.reduction import Course
+from hystgen.identification.report import Row
+from hystgen.identification.thresholds import Candidate, rounded
+from hystgen.records import SHORTEST, Record
+
+Array = NDArray[np.float64]
+
+DIGITS = 10
+"""Significant digits of fitted numbers: far below what a record tells, above what depends on the linear algebra."""
+
+MOST_PLAYS = 1000
+
+
+class IdentificationError(ValueError):
+    """Records that no model can be fitted to; `str()` says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A fitted play sum. `reach`: largest threshold that the records support."""
+
+    thresholds: Array
+    weights: Array
+    reach: float
+    floor: weights.Weights
+
+
+def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
+    """The record as it takes part, its start ignored as far as the start memory is unknown.
+
+    Raises IdentificationError for a record without what a fit needs.
+    """
+    if record.y is None:
+        raise IdentificationError(f"{record.name} has no measured column y; name one with --columns")
+    v = np.ascontiguousarray(record.v, dtype=np.float64)
+    y = np.ascontiguousarray(record.y, dtype=np.float64)
+    if len(v) != len(y):
+        raise IdentificationError(f"{record.name} has {len(v)} samples of v and {len(y)} of y")
+    if not (np.isfinite(v).all() and np.isfinite(y).all()):
+        raise IdentificationError(f"{record.name} has samples without a value; drop them first")
+    if len(v) < skip + SHORTEST:
+        raise IdentificationError(f"{record.name} has {len(v)} samples, at least {skip + SHORTEST} are needed")
+    if np.ptp(v[skip:]) == 0.0:
+        raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
+    if np.ptp(y[skip:]) == 0.0:
+        raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
+    first = 0 if history is not None else reduction.settled(v, math.inf)
+    return Course(record.name, v, y, history, max(first, skip), len(v))
+
+
+def resettled(item: Course, largest: float, begin: int) -> Course:
+    """The course from sample `begin` on, no more of its start ignored than a largest threshold makes necessary."""
+    first = 0 if item.history is not None else reduction.settled(item.v[: item.last], largest)
+    return replace(item, first=max(first, begin))
+
+
+def solve(
+    courses: Sequence[Course],
+    wanted: int | tuple[float, ...] | None,
+    floor: float,
+    skip: int,
+    tick: Callable[[int], None] | None = None,
+) -> tuple[Solution, list[Course]]:
+    """Choose thresholds (unless given as a list), fit the weights; also the courses as they were compared.
+
+    Raises IdentificationError.
+    """
+    reach = thresholds.largest([item for item in courses if item.used])
+    if isinstance(wanted, tuple):
+        lists = [Candidate(wanted)]
+    else:
+        lists = thresholds.candidates(reach, sum(item.used for item in courses), wanted)
+    top = max(candidate.thresholds[-1] for candidate in lists)
+    compared = [resettled(item, top, skip) for item in courses]
+    samples = sum(item.used for item in compared)
+    fewest = min(candidate.n for candidate in lists) + 2
+    if samples < fewest:
+        raise IdentificationError(
+            f"{samples} samples can be compared, {fewest - 2} plays need at least {fewest}; record more cycles, "
+            "give --history, or use fewer thresholds"
+        )
+    reduced = reduction.reduce(compared, thresholds.union(lists), tick)
+    chosen = thresholds.choose(reduced, lists)
+    fitted = weights.fit(reduced, thresholds.columns(reduced, chosen), floor)
+    p = np.array([rounded(float(x), DIGITS) for x in fitted.p])
+    r = np.array(chosen.thresholds)
+    if not np.any(p > 0.0):
+        raise IdentificationError(
+            "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign "
+            "of y, else check which column is which"
+        )
+    if wanted is None:
+        # A play without weight is no part of the model
+        kept = (p > 0.0) | (r == 0.0)
+        p, r = p[kept], r[kept]
+    return Solution(r, p, reach, fitted), compared
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Error samples of one course, its free offset taken out."""
+
+    course: Course
+    offset: float
+    error: Array
+
+
+def compare(item: Course, r: Array, p: Array) -> Errors:
+    """Free run of the model along the drive, compared from `first` to `last`, with one free offset."""
+    error = (item.y - reduction.prediction(item.v, item.history, r, p))[item.first : item.last]
+    offset = float(np.mean(error))
+    return Errors(item, offset, error - offset)
+
+
+def row(part: str, model: str, errors: Sequence[Errors], begins: Sequence[int]) -> Row:
+    """The table's row; `begins`: where each course would begin if nothing were ignored."""
+    joined = np.concatenate([e.error for e in errors])
+    return Row(
+        part,
+        model,
+        tuple(e.course.name for e in errors),
+        len(joined),
+        sum(e.course.first - begin for e, begin in zip(errors, begins, strict=True)),
+        float(np.sqrt(np.mean(joined**2))),
+        float(np.max(np.abs(joined))),
+        max(e.course.output_range for e in errors),
+    )
+
+
+def checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[float, ...] | None:
+    """None, a number of plays, or a list of thresholds that begins with 0. Raises ValueError."""
+    if wanted is None:
+        return None
+    if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool):
+        if not 0 <= wanted <= MOST_PLAYS:
+            raise ValueError(f"thresholds is a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
+        return int(wanted)
+    if isinstance(wanted, str | float | bool):
+        raise ValueError("thresholds is a whole number of plays or a list of thresholds")
+    places = tuple(float(r) for r in wanted)
+    if not places or places[0] != 0.0:
+        places = (0.0, *places)
+    if not all(math.isfinite(r) for r in places) or any(b <= a for a, b in zip(places, places[1:], strict=False)):
+        raise ValueError("thresholds are finite, not negative, and rise strictly")
+    return places

@@ -1,0 +1,158 @@
+"""From records to a small triangular system: what a fit needs to know of any number of samples.
+
+The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
+samples at a time and reduced by QR (a sequential TSQR), so that memory does not grow with samples times thresholds.
+The column of ones stands first: what is left below its row is the system with the offset projected out exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import operators
+
+Array = NDArray[np.float64]
+
+CHUNK = 8192
+"""Samples whose plays are held at a time."""
+
+FOLDS = 4
+"""Consecutive blocks of each record for the blocked validation."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
+
+    The drive before `first` runs through the plays all the same. `history` are drive values visited before the record;
+    None when it is not known.
+    """
+
+    name: str
+    v: Array
+    y: Array
+    history: tuple[float, ...] | None
+    first: int
+    last: int
+
+    @property
+    def used(self) -> int:
+        """Number of samples compared."""
+        return max(self.last - self.first, 0)
+
+    @property
+    def drive_range(self) -> tuple[float, float]:
+        """Least and largest drive among the samples compared."""
+        part = self.v[self.first : self.last]
+        return float(part.min()), float(part.max())
+
+    @property
+    def output_range(self) -> float:
+        """Peak-to-peak output of the samples compared."""
+        return float(np.ptp(self.y[self.first : self.last])) if self.used else 0.0
+
+
+def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:
+    """Play states just before the first sample.
+
+    With a history: virgin plays (state 0, as `simulate` starts them) led through it. Without one: at rest at the first
+    drive value, which is wrong by an unknown amount until the memory has been wiped.
+    """
+    if history is None:
+        return np.full(len(thresholds), v[0])
+    if not history:
+        return np.zeros(len(thresholds))
+    return np.ascontiguousarray(operators.plays(history, thresholds, 0.0)[:, -1])
+
+
+def settled(v: Array, reach: float) -> int:
+    """First sample at which the plays no longer depend on an unknown start memory, but for an offset.
+
+    Once the drive has swept `2 reach`, every play up to threshold `reach` is exact (MODEL.md section 2). Once it has
+    visited its own largest and least value, plays that reach further never move again in this record: a constant.
+    Whichever comes first.
+    """
+    extremes = max(int(np.argmax(v)), int(np.argmin(v)))
+    swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
+    return min(extremes, int(np.argmax(swept))) if swept[-1] else extremes
+
+
+def travel(course: Course, threshold: float) -> float:
+    """Peak-to-peak movement of one play over the samples compared."""
+    start = start_states(course.v, course.history, np.array([threshold]))[0]
+    return float(np.ptp(operators.play(course.v[: course.last], threshold, float(start))[course.first :]))
+
+
+def prediction(v: Array, history: Sequence[float] | None, thresholds: Array, weights: Array) -> Array:
+    """Free-run output of a play sum over the drive, without offset; one play at a time."""
+    starts = start_states(v, history, thresholds)
+    total = np.zeros_like(v)
+    for r, p, start in zip(thresholds, weights, starts, strict=True):
+        if p != 0.0:
+            total += p * operators.play(v, float(r), float(start))
+    return total
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Triangular systems of several records over one list of thresholds; columns are the plays, then y.
+
+    `whole`: every record with a free offset of its own. `folds`: the same for each of the consecutive blocks, every
+    block with an offset of its own. `counts`: samples in each fold.
+    """
+
+    thresholds: Array
+    whole: Array
+    folds: tuple[Array, ...]
+    counts: tuple[int, ...]
+
+    @property
+    def samples(self) -> int:
+        """Samples that were reduced."""
+        return sum(self.counts)
+
+
+def reduce(courses: Sequence[Course], thresholds: Array, tick: Callable[[int], None] | None = None) -> Reduced:
+    """Reduce the records; `tick` is told the number of samples done, chunk by chunk."""
+    width = len(thresholds) + 1
+    whole = np.empty((0, width))
+    folds = [np.empty((0, width)) for _ in range(FOLDS)]
+    counts = [0] * FOLDS
+    for course in courses:
+        edges = np.linspace(course.first, course.last, FOLDS + 1).astype(int)
+        blocks = [np.empty((0, width + 1)) for _ in range(FOLDS)]
+        states = start_states(course.v, course.history, thresholds)
+        for start in range(0, course.last, CHUNK):
+            stop = min(start + CHUNK, course.last)
+            moved = operators.plays(course.v[start:stop], thresholds, states)
+            states = np.ascontiguousarray(moved[:, -1])
+            for k in range(FOLDS):
+                a, b = max(start, int(edges[k])), min(stop, int(edges[k + 1]))
+                if a < b:
+                    rows = np.column_stack([np.ones(b - a), moved[:, a - start : b - start].T, course.y[a:b]])
+                    blocks[k] = _triangle(blocks[k], rows)
+                    counts[k] += b - a
+            if tick is not None:
+                tick(stop - start)
+        whole = _triangle(whole, _without_offset(_triangle(*blocks)))
+        folds = [_triangle(fold, _without_offset(block)) for fold, block in zip(folds, blocks, strict=True)]
+    return Reduced(thresholds, whole, tuple(folds), tuple(counts))
+
+
+def _triangle(*parts: Array) -> Array:
+    """The triangular factor of parts stacked on each other: same normal equations, at most as many rows as columns."""
+    stacked = np.concatenate(parts)
+    return np.linalg.qr(stacked, mode="r") if len(stacked) > 1 else stacked
+
+
+def _without_offset(triangle: Array) -> Array:
+    return triangle[1:, 1:]
+
+
+def others(reduced: Reduced, fold: int) -> Array:
+    """The system of all folds but one."""
+    return _triangle(*(part for k, part in enumerate(reduced.folds) if k != fold))

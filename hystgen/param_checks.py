@@ -1,0 +1,462 @@
+"""From plain data to checked parameters: every problem at once, each in one plain sentence and at its place.
+
+First the structure (pydantic's findings, reworded), then how values fit together, for every part whose
+structure is sound.
+"""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from hystgen import param_models as models
+from hystgen.names import name_problem
+from hystgen.param_models import MAX_NUMBER, TAG, Parameters
+from hystgen.problems import Path, Problem, path_text, shown
+from hystgen.yaml_positions import Document
+
+EFFECT_NAMES = (
+    "creep",
+    "rate_dependence",
+    "resonance",
+    "lag",
+    "delay",
+    "slew_limit",
+    "asymmetry",
+    "saturation",
+    "thermal",
+    "drift",
+    "ageing",
+    "sensor_nonlinearity",
+    "noncongruent",
+)
+"""The closed catalogue of effects."""
+
+STAGE_KINDS = ("dead_zone", "tanh")
+
+_PARTS: dict[str, type[BaseModel]] = {
+    "units": models.Units,
+    "model": models.ModelParameters,
+    "pi": models.PIParameters,
+    "density": models.DensityParameters,
+    "table": models.DensityTable,
+    "ascending": models.TanhBranch,
+    "descending": models.TanhBranch,
+    "emit": models.EmitDefaults,
+}
+
+# How a key is written, where it is missing.
+_WRITTEN = {
+    "hystgen": "hystgen: 1",
+    "name": "name: stage_x",
+    "input_range": "input_range: [0.0, 100.0]",
+    "model": "model: {pi: {thresholds: [0, 0.5], weights: [0.7, 0.6]}}",
+    "pi": "pi: {thresholds: [0, 0.5], weights: [0.7, 0.6]}",
+    "thresholds": "thresholds: [0, 0.5, 1.0]",
+    "weights": "weights: [0.7, 0.6, 0.5]",
+    "ascending": "ascending: {a0: 6.0, a1: 0.4, a2: 0.0, a3: 0.0}",
+    "r": "r: [0, 5, 10]",
+    "p": "p: [0.8, 0.2, 0.1]",
+    "p0": "p0: 0.7",
+    "r_max": "r_max: 10",
+}
+
+
+def check(data: Mapping[str, Any], document: Document | None = None) -> tuple[Parameters | None, list[Problem]]:
+    """Parameters of `data` (lists as tuples), or None and every problem.
+
+    `document` gives the positions and what reading has refused already; its poisoned values are not judged again.
+    """
+    checker = _Checker(data, document)
+    parameters = checker.structure()
+    checker.fit()
+    if parameters is None or checker.problems or (document and document.problems):
+        return None, checker.problems
+    found = checker.discretisation
+    if found is not None:
+        pi = parameters.model.pi.model_copy(update={"thresholds": found.thresholds, "weights": found.weights})
+        pi._density_error = found.error
+        parameters = parameters.model_copy(update={"model": parameters.model.model_copy(update={"pi": pi})})
+    return parameters, []
+
+
+class _Checker:
+    def __init__(self, data: Mapping[str, Any], document: Document | None) -> None:
+        self.data = data
+        self.document = document
+        self.problems: list[Problem] = []
+        self.discretisation: Any = None
+        self._bad: set[Path] = set()
+        self._above_bad: set[Path] = set()
+        for path in document.poisoned if document else ():
+            self._mark(path)
+
+    # Bookkeeping ------------------------------------------------------------------------------------------
+
+    def add(self, path: Path, message: str, at_key: bool = False) -> None:
+        """Note a problem of the value (or key) at `path`; where there is none, at what should hold it."""
+        self._mark(path)
+        line = column = None
+        if self.document:
+            places = self.document.keys if at_key else self.document.values
+            held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
+            line, column = places.get(held) or self.document.values[held]
+        self.problems.append(Problem(path_text(path), message, line, column))
+
+    def _mark(self, path: Path) -> None:
+        self._bad.add(path)
+        self._above_bad.update(path[:n] for n in range(len(path)))
+
+    def sound(self, path: Path) -> bool:
+        """Whether no problem is known at `path`, below it or in what holds it."""
+        return path not in self._above_bad and not self.judged(path)
+
+    def judged(self, path: Path) -> bool:
+        """Whether a problem is known at `path` or in what holds it."""
+        return any(path[:n] in self._bad for n in range(len(path) + 1))
+
+    def at(self, path: Path) -> Any:
+        """Value in the data, None where there is none."""
+        value: Any = self.data
+        for part in path:
+            if isinstance(part, int):
+                value = value[part] if isinstance(value, tuple) and part < len(value) else None
+            else:
+                value = value.get(part) if isinstance(value, Mapping) else None
+        return value
+
+    def get(self, *path: str | int) -> Any:
+        """Value in the data if its structure is sound, else None."""
+        return self.at(path) if self.sound(path) else None
+
+    # Structure --------------------------------------------------------------------------------------------
+
+    def structure(self) -> Parameters | None:
+        """The parameters, or None and pydantic's findings among the problems."""
+        parameters = None
+        try:
+            parameters = Parameters.model_validate(self.data)
+        except ValidationError as error:
+            for found in error.errors(include_url=False):
+                path = self._path(found["loc"])
+                if not self.judged(path):
+                    self._structural(path, found["type"], found.get("ctx", {}), found["msg"])
+        self._empty_values()
+        return parameters
+
+    def _path(self, location: Sequence[str | int]) -> Path:
+        """Pydantic's location as a path in the data: without union members, and without 0 for a lone stage."""
+        path: list[str | int] = []
+        value: Any = self.data
+        for part in location:
+            if isinstance(part, int):
+                if isinstance(value, Mapping):
+                    continue
+                value = value[part] if isinstance(value, tuple) and part < len(value) else None
+            elif part.startswith(TAG):
+                continue
+            else:
+                value = value.get(part) if isinstance(value, Mapping) else None
+            path.append(part)
+        return tuple(path)
+
+    def _structural(self, path: Path, kind: str, context: Mapping[str, Any], said: str) -> None:
+        value = self.at(path)
+        key = next((part for part in reversed(path) if isinstance(part, str)), "")
+        if kind == "missing" and isinstance(path[-1], int):
+            self.add(path[:-1], "must be two numbers; write [lowest, highest]")
+        elif kind == "missing":
+            written = "kind: dead_zone` or `kind: tanh" if key == "kind" else _WRITTEN.get(key, f"{key}: 0.0")
+            self.add(path, f"is missing; add `{written}`")
+        elif kind == "extra_forbidden":
+            known = self._keys(path[:-1])
+            near = _nearest(key, known)
+            self.add(path, f"unknown key; {near or 'known here are ' + ', '.join(known)}", at_key=True)
+        elif value is None:
+            self.add(path, _NO_VALUE)
+        elif kind.startswith("union_tag"):
+            self._stage(path, value)
+        else:
+            self.add(path, _reworded(kind, key, value, context, said))
+
+    def _stage(self, path: Path, value: Any) -> None:
+        """A memoryless stage that is neither of the two kinds."""
+        kinds = " or ".join(f"kind: {kind}" for kind in STAGE_KINDS)
+        if not isinstance(value, Mapping):
+            self.add(path, f"must be a stage, not {shown(value)}; write a mapping with {kinds}")
+        elif "kind" not in value:
+            self.add((*path, "kind"), f"is missing; add `{kinds.replace(' or ', '` or `')}`")
+        elif value["kind"] is not None and not self.judged((*path, "kind")):
+            self.add((*path, "kind"), _choice(value["kind"], STAGE_KINDS))
+
+    def _keys(self, path: Path) -> list[str]:
+        """The keys of the mapping at `path`."""
+        key = next((part for part in reversed(path) if isinstance(part, str)), "")
+        part = _PARTS.get(key, Parameters)
+        if key == "memoryless":
+            part = models.TanhParameters if self.at((*path, "kind")) == "tanh" else models.DeadZoneParameters
+        return list(part.model_fields)
+
+    def _empty_values(self) -> None:
+        """Keys without a value, which pydantic lets pass where None is the default."""
+        todo: list[tuple[Path, Any]] = [((), self.data)]
+        while todo:
+            path, value = todo.pop()
+            if value is None and not self.judged(path):
+                self.add(path, _NO_VALUE)
+            elif isinstance(value, Mapping):
+                todo += [((*path, key), entry) for key, entry in value.items()]
+            elif isinstance(value, tuple):
+                todo += [((*path, i), entry) for i, entry in enumerate(value) if not isinstance(entry, float)]
+
+    # How values fit together ------------------------------------------------------------------------------
+
+    def fit(self) -> None:
+        """Everything that pydantic does not judge, on the parts whose structure is sound."""
+        name = self.get("name")
+        if name is not None and (problem := name_problem(name)):
+            self.add(("name",), problem)
+        for path, lines in ((("description",), True), (("units", "input"), False), (("units", "output"), False)):
+            self._text(path, lines)
+        ends = self.get("input_range")
+        if ends is not None and not ends[0] < ends[1]:
+            self.add(("input_range",), f"{shown(ends[0])} is not below {shown(ends[1])}; write [lowest, highest]")
+        if isinstance(self.at(("model", "pi")), Mapping):
+            self._pi(("model", "pi"))
+        stages = self.at(("model", "memoryless"))
+        if isinstance(stages, tuple):
+            for i in range(len(stages)):
+                self._memoryless(("model", "memoryless", i))
+        elif isinstance(stages, Mapping):
+            self._memoryless(("model", "memoryless"))
+        if isinstance(effects := self.at(("model", "effects")), tuple):
+            for i, effect in enumerate(effects):
+                self._effect(("model", "effects", i), effect)
+
+    def _text(self, path: Path, lines: bool) -> None:
+        text = self.get(*path) or ""
+        odd = next((c for c in text if not (c.isprintable() or (c == "\n" and lines))), None)
+        if odd == "\n":
+            self.add(path, "must be a single line; remove the line break")
+        elif odd is not None:
+            self.add(path, f"holds the unprintable character U+{ord(odd):04X}; remove it")
+
+    def _pi(self, path: Path) -> None:
+        pi = self.at(path)
+        listed = [key for key in ("thresholds", "weights") if key in pi]
+        if "density" in pi:
+            if listed:
+                what = " and ".join(listed)
+                self.add((*path, "density"), f"stands beside {what}; remove one or the other", at_key=True)
+            else:
+                self._density((*path, "density"))
+            return
+        if not listed:
+            self.add(path, "needs thresholds and weights, or a density; add them")
+            return
+        for key in ("thresholds", "weights"):
+            if key not in pi:
+                self.add((*path, key), f"is missing; add `{_WRITTEN[key]}`")
+        thresholds, weights = self.get(*path, "thresholds"), self.get(*path, "weights")
+        if thresholds:
+            if thresholds[0] != 0:
+                self.add((*path, "thresholds", 0), f"must be 0, not {shown(thresholds[0])}; start with r_0 = 0")
+            self._rising((*path, "thresholds"), thresholds)
+            self._state(path, len(thresholds))
+        if weights:
+            self._same_length(path, "weights", "thresholds")
+            if not any(weights):
+                self.add((*path, "weights"), "are all 0; at least one must be positive")
+
+    def _state(self, path: Path, count: int) -> None:
+        state = self.get(*path, "initial_state")
+        if isinstance(state, tuple) and len(state) != count:
+            what = f"has {_entries(len(state))} for {count} thresholds (r_0 included)"
+            self.add((*path, "initial_state"), f"{what}; write one number, or one a threshold")
+
+    def _same_length(self, path: Path, key: str, reference: str) -> None:
+        first, second = self.at((*path, key)), self.get(*path, reference)
+        if second is not None and len(first) != len(second):
+            what = f"has {_entries(len(first))} for {len(second)} in {reference}"
+            self.add((*path, key), f"{what}; give as many as {reference}")
+
+    def _rising(self, path: Path, values: Sequence[float]) -> None:
+        for i, (low, high) in enumerate(itertools.pairwise(values), 1):
+            if not low < high:
+                what = f"{shown(high)} is not above the {shown(low)} before it"
+                self.add((*path, i), f"{what}; sort the list and remove repeated values")
+
+    def _density(self, path: Path) -> None:
+        given = self.at(path)
+        if not isinstance(given, Mapping):
+            return
+        source = [key for key in ("formula", "table") if key in given]
+        size = [key for key in ("n", "tolerance") if key in given]
+        for one, other, found in (("formula", "table", source), ("n", "tolerance", size)):
+            if len(found) != 1:
+                what = f"has both {one} and {other}" if found else f"needs {one} or {other}"
+                self.add(path, f"{what}; give one of the two")
+        if source == ["formula"] and "r_max" not in given:
+            self.add((*path, "r_max"), f"is missing; add `{_WRITTEN['r_max']}`")
+        if source == ["table"] and "r_max" in given:
+            self.add((*path, "r_max"), "is not used with a table, which ends at its last r; remove it", at_key=True)
+        table = (*path, "table")
+        if r := self.get(*table, "r"):
+            self._rising((*table, "r"), r)
+        if self.get(*table, "p"):
+            self._same_length(table, "p", "r")
+        formula = self._formula((*path, "formula"))
+        if not self.sound(path):
+            return
+        from hystgen import density as densities  # imports mpmath
+
+        try:
+            if formula:
+                density = densities.from_formula(formula, given["r_max"])
+            else:
+                density = densities.from_table(**given["table"])
+            if "n" in given:
+                found = density.discretise(given["p0"], given["n"])
+            else:
+                found = density.discretise_to(given["p0"], given["tolerance"])
+        except densities.DensityError as error:
+            self.add((*path, error.part), str(error))
+            return
+        if not any(found.weights):
+            self.add(path, "is 0 everywhere, and so is p0; at least one must be positive")
+        elif max(found.weights) > MAX_NUMBER:
+            what = f"makes weights up to {max(found.weights):.3g}, more than {MAX_NUMBER:g}"
+            self.add(path, f"{what}; choose other units")
+        self._state(path[:-1], len(found.thresholds))
+        self.discretisation = found
+
+    def _formula(self, path: Path) -> Any:
+        text = self.get(*path)
+        if text is None:
+            return None
+        from hystgen import density as densities
+
+        try:
+            return densities.parse_formula(text)
+        except densities.DensityError as error:
+            self.add(path, str(error))
+            return None
+
+    def _memoryless(self, path: Path) -> None:
+        kind = self.get(*path, "kind")
+        if kind == "dead_zone":
+            thresholds, weights = self.get(*path, "thresholds"), self.get(*path, "weights")
+            if thresholds:
+                self._rising((*path, "thresholds"), thresholds)
+                if 0 not in thresholds:
+                    self.add((*path, "thresholds"), "do not contain 0; add 0 and the weight of the linear part")
+            if weights:
+                self._same_length(path, "weights", "thresholds")
+        elif kind == "tanh":
+            for branch in ((*path, "ascending"), (*path, "descending")):
+                self._branch(branch)
+
+    def _branch(self, path: Path) -> None:
+        a0, a1 = self.get(*path, "a0"), self.get(*path, "a1")
+        for key, value in (("a0", a0), ("a1", a1)):
+            if value == 0:
+                self.add((*path, key), "must not be 0, the branch would be constant; give a0 and a1 of the same sign")
+        if a0 and a1 and (a0 > 0) != (a1 > 0):
+            what = f"a0 = {shown(a0)} and a1 = {shown(a1)} make a falling branch"
+            self.add(path, f"{what}; give both the same sign")
+
+    def _effect(self, path: Path, effect: Any) -> None:
+        name = (*path, "name")
+        given = self.at(name)
+        if self.judged(path) or self.judged(name):
+            return
+        if not isinstance(effect, Mapping):
+            self.add(path, f"must be an effect with its name, not {shown(effect)}; write {{name: ..}}")
+        elif "name" not in effect:
+            self.add(name, "is missing; add the name of an effect")
+        elif not isinstance(given, str):
+            self.add(name, f"must be the name of an effect, not {shown(given)}; known are {', '.join(EFFECT_NAMES)}")
+        elif given == "asymmetry":
+            self.add(name, "asymmetry is not written here; make it a stage of model.memoryless")
+        elif given in EFFECT_NAMES or given.startswith("user:"):
+            self.add(name, f"the effect {shown(given)[9:-1]} is not supported by this version yet; remove the entry")
+        else:
+            self.add(name, _choice(given, EFFECT_NAMES))
+
+
+_NO_VALUE = "has no value; write one, or remove the key"
+
+
+def _entries(count: int) -> str:
+    return "1 value" if count == 1 else f"{count} values"
+
+
+def _nearest(word: str, known: Sequence[str]) -> str:
+    """`did you mean ..?` if one of the known words is near, else nothing."""
+    near = difflib.get_close_matches(word.lower(), known, 1, 0.6) if len(word) <= 60 else []
+    return f"did you mean {near[0]}?" if near else ""
+
+
+def _choice(value: Any, known: Sequence[Any]) -> str:
+    """Message for a value that is none of the known ones."""
+    listed = ", ".join(str(choice) for choice in known[:-1]) + (" or " if len(known) > 1 else "") + str(known[-1])
+    near = _nearest(value, known) if isinstance(value, str) else ""
+    return f"must be {listed}, not {shown(value)}; {near or 'choose one of them'}"
+
+
+def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said: str) -> str:
+    """A finding of pydantic in the words of this package."""
+    wrong = {
+        "float_type": "must be a number",
+        "float_parsing": "must be a number",
+        "int_type": "must be a whole number",
+        "int_from_float": "must be a whole number",
+        "int_parsing": "must be a whole number",
+        "string_type": "must be text",
+        "tuple_type": "must be a list",
+        "model_type": "must be a mapping",
+        "model_attributes_type": "must be a mapping",
+        "dict_type": "must be a mapping",
+    }.get(kind)
+    advice = {
+        "must be a number": "write it like 0.45",
+        "must be a whole number": "write it like 12",
+        "must be text": "put it in quotes",
+        "must be a list": "write [ ] around the values",
+        "must be a mapping": "write `key: value` pairs in it",
+    }.get(wrong or "", "")
+    if key == "initial_state" and kind == "float_type" and isinstance(value, Mapping | str):
+        wrong, advice = "must be a number or a list of numbers", "write it like 0.0"
+    if key == "memoryless" and kind == "tuple_type":
+        wrong, advice = "must be a stage or a list of stages", "write a mapping with kind: dead_zone or kind: tanh"
+    if wrong:
+        return f"{wrong}, not {shown(value)}; {advice}"
+    if kind == "literal_error" and key == "hystgen":
+        return f"must be 1, not {shown(value)}; this version reads format 1 only"
+    if kind == "literal_error":
+        known: Any = models.EmitDefaults.model_fields[key].annotation
+        return _choice(value, known.__args__)
+    if kind == "finite_number":
+        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in size"
+    bounds = (
+        ("greater_than", "gt", "must be above"),
+        ("greater_than_equal", "ge", "must be at least"),
+        ("less_than", "lt", "must be below"),
+        ("less_than_equal", "le", "must be at most"),
+    )
+    for name, limit, what in bounds:
+        if kind == name and limit in context:
+            return f"{what} {context[limit]:g}, not {shown(value)}; correct the number"
+    if kind == "too_short":
+        return f"has {_entries(len(value))}, at least {context.get('min_length')} needed; add to the list"
+    if kind == "too_long":
+        if key == "input_range":
+            return "must be two numbers; write [lowest, highest]"
+        return f"has {_entries(len(value))}, more than {context.get('max_length')}; shorten the list"
+    if kind == "string_too_long":
+        return f"has {len(value)} characters, more than {context.get('max_length')}; shorten it"
+    return f"{said[:1].lower()}{said[1:]}; correct the value"

@@ -1,0 +1,239 @@
+"""Parameter files: read and check (every problem at once), write, and identify by a hash.
+
+`load_parameters`, `parse_parameters` and `make_parameters` are the ways to checked `Parameters`; whatever they
+return can be written by `dump_parameters` and read again to the same value.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from hystgen.names import comment_text, name_problem
+from hystgen.param_checks import EFFECT_NAMES, check
+from hystgen.param_models import (
+    DeadZoneParameters,
+    DensityParameters,
+    DensityTable,
+    EmitDefaults,
+    ModelParameters,
+    Parameters,
+    PIParameters,
+    TanhBranch,
+    TanhParameters,
+    Units,
+    schema,
+)
+from hystgen.problems import ParameterError, Problem
+from hystgen.yaml_positions import MAX_BYTES, read, resolve
+
+__all__ = [
+    "EFFECT_NAMES",
+    "MAX_BYTES",
+    "DeadZoneParameters",
+    "DensityParameters",
+    "DensityTable",
+    "EmitDefaults",
+    "ModelParameters",
+    "PIParameters",
+    "ParameterError",
+    "Parameters",
+    "Problem",
+    "TanhBranch",
+    "TanhParameters",
+    "Units",
+    "canonical_json",
+    "comment_text",
+    "dump_parameters",
+    "load_parameters",
+    "make_parameters",
+    "name_problem",
+    "parameters_sha256",
+    "parse_parameters",
+    "schema",
+]
+
+_WIDTH = 100
+
+
+def load_parameters(path: str | os.PathLike[str]) -> Parameters:
+    """The checked parameters in a YAML file (UTF-8, at most 1 MiB).
+
+    Raises ParameterError with every problem and its position; also when the file cannot be read.
+    """
+    file = os.fspath(path)
+    try:
+        with open(file, "rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+            size = max(len(content), os.fstat(stream.fileno()).st_size)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise ParameterError(file, [Problem("", f"cannot be read: {reason}")]) from None
+    _refuse_size(len(content) if len(content) <= MAX_BYTES else size, file)
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = content[: error.start].decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        message = f"byte 0x{content[error.start]:02X} is not UTF-8; save the file as UTF-8"
+        raise ParameterError(file, [Problem("", message, line, column)]) from None
+    return parse_parameters(text, file)
+
+
+def parse_parameters(text: str, file: str = "<string>") -> Parameters:
+    """The checked parameters in a YAML text; `file` names it in messages. Raises ParameterError."""
+    _refuse_size(len(text.encode("utf-8", "surrogatepass")), file)
+    document = read(text.removeprefix("\ufeff"))
+    if not document.complete:
+        raise ParameterError(file, document.problems)
+    parameters, problems = check(document.data, document)
+    if parameters is None:
+        raise ParameterError(file, document.problems + problems)
+    return parameters
+
+
+def make_parameters(data: Mapping[str, Any], file: str = "<data>") -> Parameters:
+    """The checked parameters in plain data of the file's form (lists or tuples; None is as if left out).
+
+    Raises ParameterError; its problems have no positions, `file` names the data in messages.
+    """
+    parameters, problems = check(_plain(data))
+    if parameters is None:
+        raise ParameterError(file, problems)
+    return parameters
+
+
+def _refuse_size(size: int, file: str) -> None:
+    if size > MAX_BYTES:
+        message = f"the file has {size} bytes, more than {MAX_BYTES} (1 MiB); keep one model a file"
+        raise ParameterError(file, [Problem("", message)])
+
+
+def _plain(value: Any) -> Any:
+    """Lists as tuples, NumPy values as Python's, keys without a value left out."""
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items() if entry is not None}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    return tuple(_plain(entry) for entry in value) if isinstance(value, list | tuple) else value
+
+
+def _data(parameters: Parameters) -> dict[str, Any]:
+    """The parameters in the file's form, in its order, with every default filled in."""
+    data = parameters.model_dump()
+    pi = data["model"]["pi"]
+    for key in ("thresholds", "weights") if pi["density"] else ("density",):
+        del pi[key]
+    return data
+
+
+def canonical_json(parameters: Parameters) -> str:
+    """The one text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
+
+    A density stands as it was given, not as the plays made from it.
+    """
+    return json.dumps(_data(parameters), sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def parameters_sha256(parameters: Parameters) -> str:
+    """SHA-256 of the canonical text, in hexadecimal."""
+    return hashlib.sha256(canonical_json(parameters).encode("ascii")).hexdigest()
+
+
+# Writing -------------------------------------------------------------------------------------------------
+
+
+def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None = None, header: str = "") -> str:
+    """A YAML text that reads back to exactly these parameters; defaults are left out.
+
+    `comments` maps dotted paths of keys (`model.pi.weights`) to a comment that is set above the key, which is
+    then written even at its default; `header` is set above everything. Both may have several lines. Raises
+    ValueError for a comment on no key of the file's block form.
+    """
+    notes = dict(comments or {})
+    lines = _comment(header, "")
+    lines += _block(_data(parameters), _defaults(parameters), "", notes, "")
+    if notes:
+        raise ValueError(f"no such keys to comment: {', '.join(notes)}")
+    return "\n".join(lines) + "\n"
+
+
+def _defaults(parameters: Parameters) -> dict[str, Any]:
+    """What is left out when it has this value."""
+    least = Parameters(
+        hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=PIParameters(weights=(1.0,)))
+    )
+    data = least.model_dump()
+    for key in ("hystgen", "name", "input_range"):
+        del data[key]
+    for key in ("thresholds", "weights"):
+        del data["model"]["pi"][key]
+    data["model"]["pi"]["density"] = dict.fromkeys(DensityParameters.model_fields)
+    return data
+
+
+_FLOW = ("units", "ascending", "descending", "table")
+
+
+def _block(
+    data: Mapping[str, Any], defaults: Mapping[str, Any], indent: str, notes: dict[str, str], above: str
+) -> Iterator[str]:
+    """Lines of a mapping in block form."""
+    for key, value in data.items():
+        path = f"{above}.{key}" if above else key
+        wanted = path in notes or any(note.startswith(path + ".") for note in notes)
+        if value is None or (not wanted and key in defaults and value == defaults[key]):
+            continue
+        yield from _comment(notes.pop(path, ""), indent)
+        if key == "memoryless" and value:
+            yield f"{indent}{key}:"
+            for stage in value:
+                if stage.get("descending") == stage.get("ascending", ()):
+                    stage = {name: entry for name, entry in stage.items() if name != "descending"}
+                lines = [line for name, entry in stage.items() for line in _entry(name, entry, indent + "    ")]
+                yield f"{indent}  - {lines[0].lstrip()}"
+                yield from lines[1:]
+        elif isinstance(value, dict) and key not in _FLOW:
+            yield f"{indent}{key}:"
+            yield from _block(value, defaults.get(key) or {}, indent + "  ", notes, path)
+        else:
+            yield from _entry(key, value, indent)
+
+
+def _entry(key: str, value: Any, indent: str) -> Iterator[str]:
+    """Lines of one key with its value on the same line, wrapped where the value is a list."""
+    words = _flow(value).split(" ") if isinstance(value, tuple | dict) else [_flow(value)]
+    line = f"{indent}{key}:"
+    for word in words:
+        if len(line) + 1 + len(word) > _WIDTH and len(words) > 1:
+            yield line
+            line = indent + "   "
+        line += " " + word
+    yield line
+
+
+def _flow(value: Any) -> str:
+    """A value in flow form."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(entry)}" for key, entry in value.items() if entry is not None) + "}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "[" + ", ".join(_flow(entry) for entry in value) + "]"
+    if isinstance(value, float):
+        return float.__repr__(value)
+    return _quoted(value) if isinstance(value, str) else str(value)
+
+
+def _quoted(text: str) -> str:
+    """A text as a YAML scalar: plain where that is safe anywhere, else in double quotes."""
+    plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_/%^.]*(?:[ -][A-Za-z0-9_/%^.()]+)*", text) and resolve(text) == text
+    return text if plain else json.dumps(text, ensure_ascii=False)
+
+
+def _comment(text: str, indent: str) -> list[str]:
+    """Comment lines; characters that YAML does not take become `?`."""
+    lines = ["".join(c if c.isprintable() else "?" for c in line.expandtabs()) for line in text.splitlines()]
+    return [f"{indent}# {line}".rstrip() for line in lines]
