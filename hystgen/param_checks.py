@@ -15,8 +15,8 @@ from pydantic import BaseModel, ValidationError
 
 from hystgen import param_models as models
 from hystgen.names import name_problem
-from hystgen.param_models import MAX_NUMBER, TAG, Parameters
-from hystgen.problems import Path, Problem, path_text, shown
+from hystgen.param_models import MAX_NUMBER, MEMBERS, STAGE_KINDS, Parameters
+from hystgen.problems import Path, Problem, path_text, printable, shown
 from hystgen.yaml_positions import Document
 
 EFFECT_NAMES = (
@@ -35,8 +35,6 @@ EFFECT_NAMES = (
     "noncongruent",
 )
 """The closed catalogue of effects."""
-
-STAGE_KINDS = ("dead_zone", "tanh")
 
 _PARTS: dict[str, type[BaseModel]] = {
     "units": models.Units,
@@ -58,6 +56,7 @@ _WRITTEN = {
     "pi": "pi: {thresholds: [0, 0.5], weights: [0.7, 0.6]}",
     "thresholds": "thresholds: [0, 0.5, 1.0]",
     "weights": "weights: [0.7, 0.6, 0.5]",
+    "kind": "kind: dead_zone` or `kind: tanh",
     "ascending": "ascending: {a0: 6.0, a1: 0.4, a2: 0.0, a3: 0.0}",
     "r": "r: [0, 5, 10]",
     "p": "p: [0.8, 0.2, 0.1]",
@@ -99,7 +98,6 @@ class _Checker:
 
     def add(self, path: Path, message: str, at_key: bool = False) -> None:
         """Note a problem of the value (or key) at `path`; where there is none, at what should hold it."""
-        self._mark(path)
         line = column = None
         if self.document:
             places = self.document.keys if at_key else self.document.values
@@ -108,15 +106,16 @@ class _Checker:
         self.problems.append(Problem(path_text(path), message, line, column))
 
     def _mark(self, path: Path) -> None:
+        """Remember that the structure at `path` is not sound."""
         self._bad.add(path)
         self._above_bad.update(path[:n] for n in range(len(path)))
 
     def sound(self, path: Path) -> bool:
-        """Whether no problem is known at `path`, below it or in what holds it."""
+        """Whether the structure is sound at `path`, below it and in what holds it."""
         return path not in self._above_bad and not self.judged(path)
 
     def judged(self, path: Path) -> bool:
-        """Whether a problem is known at `path` or in what holds it."""
+        """Whether the structure at `path`, or of what holds it, is known not to be sound."""
         return any(path[:n] in self._bad for n in range(len(path) + 1))
 
     def at(self, path: Path) -> Any:
@@ -157,7 +156,7 @@ class _Checker:
                 if isinstance(value, Mapping):
                     continue
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
-            elif part.startswith(TAG):
+            elif part in MEMBERS:
                 continue
             else:
                 value = value.get(part) if isinstance(value, Mapping) else None
@@ -166,36 +165,33 @@ class _Checker:
 
     def _structural(self, path: Path, kind: str, context: Mapping[str, Any], said: str) -> None:
         value = self.at(path)
-        key = next((part for part in reversed(path) if isinstance(part, str)), "")
-        if kind == "missing" and isinstance(path[-1], int):
-            self.add(path[:-1], "must be two numbers; write [lowest, highest]")
+        key = _last_key(path)
+        if kind.startswith("union_tag") and isinstance(value, Mapping):  # a stage of neither kind
+            path, value, key = (*path, "kind"), value.get("kind"), "kind"
+            kind = "literal_error" if "kind" in self.at(path[:-1]) else "missing"
+            if self.judged(path):
+                return
+        if kind == "too_short" and len(value) >= context.get("min_length", 0):
+            return  # too few sound values, each unsound one being reported itself
+        self._mark(path)
+        if kind == "missing" and not isinstance(path[-1], int):
+            self.add(path, f"is missing; add `{_WRITTEN.get(key, f'{key}: 0.0')}`")
         elif kind == "missing":
-            written = "kind: dead_zone` or `kind: tanh" if key == "kind" else _WRITTEN.get(key, f"{key}: 0.0")
-            self.add(path, f"is missing; add `{written}`")
+            self.add(path[:-1], _TWO_NUMBERS)
         elif kind == "extra_forbidden":
             known = self._keys(path[:-1])
             near = _nearest(key, known)
             self.add(path, f"unknown key; {near or 'known here are ' + ', '.join(known)}", at_key=True)
         elif value is None:
-            self.add(path, _NO_VALUE)
-        elif kind.startswith("union_tag"):
-            self._stage(path, value)
+            self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
+        elif isinstance(path[-1], int) and not kind.startswith("union_tag"):
+            self.add(path, _reworded(kind, "", value, context, said))
         else:
             self.add(path, _reworded(kind, key, value, context, said))
 
-    def _stage(self, path: Path, value: Any) -> None:
-        """A memoryless stage that is neither of the two kinds."""
-        kinds = " or ".join(f"kind: {kind}" for kind in STAGE_KINDS)
-        if not isinstance(value, Mapping):
-            self.add(path, f"must be a stage, not {shown(value)}; write a mapping with {kinds}")
-        elif "kind" not in value:
-            self.add((*path, "kind"), f"is missing; add `{kinds.replace(' or ', '` or `')}`")
-        elif value["kind"] is not None and not self.judged((*path, "kind")):
-            self.add((*path, "kind"), _choice(value["kind"], STAGE_KINDS))
-
     def _keys(self, path: Path) -> list[str]:
         """The keys of the mapping at `path`."""
-        key = next((part for part in reversed(path) if isinstance(part, str)), "")
+        key = _last_key(path)
         part = _PARTS.get(key, Parameters)
         if key == "memoryless":
             part = models.TanhParameters if self.at((*path, "kind")) == "tanh" else models.DeadZoneParameters
@@ -207,7 +203,8 @@ class _Checker:
         while todo:
             path, value = todo.pop()
             if value is None and not self.judged(path):
-                self.add(path, _NO_VALUE)
+                self._mark(path)
+                self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
             elif isinstance(value, Mapping):
                 todo += [((*path, key), entry) for key, entry in value.items()]
             elif isinstance(value, tuple):
@@ -294,11 +291,12 @@ class _Checker:
         given = self.at(path)
         if not isinstance(given, Mapping):
             return
+        before = len(self.problems)
         source = [key for key in ("formula", "table") if key in given]
         size = [key for key in ("n", "tolerance") if key in given]
-        for one, other, found in (("formula", "table", source), ("n", "tolerance", size)):
-            if len(found) != 1:
-                what = f"has both {one} and {other}" if found else f"needs {one} or {other}"
+        for one, other, chosen in (("formula", "table", source), ("n", "tolerance", size)):
+            if len(chosen) != 1:
+                what = f"has both {one} and {other}" if chosen else f"needs {one} or {other}"
                 self.add(path, f"{what}; give one of the two")
         if source == ["formula"] and "r_max" not in given:
             self.add((*path, "r_max"), f"is missing; add `{_WRITTEN['r_max']}`")
@@ -310,16 +308,20 @@ class _Checker:
         if self.get(*table, "p"):
             self._same_length(table, "p", "r")
         formula = self._formula((*path, "formula"))
-        if not self.sound(path):
+        if len(self.problems) > before:
             return
         from hystgen import density as densities  # imports mpmath
 
         try:
-            if formula:
-                density = densities.from_formula(formula, given["r_max"])
+            if formula and (r_max := self.get(*path, "r_max")):
+                density = densities.from_formula(formula, r_max)
+            elif points := self.get(*table):
+                density = densities.from_table(**points)
             else:
-                density = densities.from_table(**given["table"])
-            if "n" in given:
+                return
+            if not self.sound(path):
+                return
+            if size == ["n"]:
                 found = density.discretise(given["p0"], given["n"])
             else:
                 found = density.discretise_to(given["p0"], given["tolerance"])
@@ -383,12 +385,21 @@ class _Checker:
         elif given == "asymmetry":
             self.add(name, "asymmetry is not written here; make it a stage of model.memoryless")
         elif given in EFFECT_NAMES or given.startswith("user:"):
-            self.add(name, f"the effect {shown(given)[9:-1]} is not supported by this version yet; remove the entry")
+            self.add(name, f"the effect {printable(given)} is not supported by this version yet; remove the entry")
         else:
-            self.add(name, _choice(given, EFFECT_NAMES))
+            advice = _nearest(given, EFFECT_NAMES) or f"known are {', '.join(EFFECT_NAMES)}"
+            self.add(name, f"unknown effect {printable(given)}; {advice}")
 
 
+_TWO_NUMBERS = "must be two numbers; write [lowest, highest]"
 _NO_VALUE = "has no value; write one, or remove the key"
+
+
+_KINDS = "write a mapping with kind: dead_zone or kind: tanh"
+
+
+def _last_key(path: Path) -> str:
+    return next((part for part in reversed(path) if isinstance(part, str)), "")
 
 
 def _entries(count: int) -> str:
@@ -429,19 +440,23 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         "must be a list": "write [ ] around the values",
         "must be a mapping": "write `key: value` pairs in it",
     }.get(wrong or "", "")
-    if key == "initial_state" and kind == "float_type" and isinstance(value, Mapping | str):
+    if key == "initial_state" and isinstance(value, Mapping | str):
         wrong, advice = "must be a number or a list of numbers", "write it like 0.0"
+    if kind.startswith("union_tag"):
+        wrong, advice = "must be a stage", _KINDS
     if key == "memoryless" and kind == "tuple_type":
-        wrong, advice = "must be a stage or a list of stages", "write a mapping with kind: dead_zone or kind: tanh"
+        wrong, advice = "must be a stage or a list of stages", _KINDS
+    if kind == "finite_number" or (kind == "float_type" and type(value) is int):
+        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in size"
+    if key == "input_range" and kind in ("too_long", "tuple_type"):
+        return _TWO_NUMBERS
     if wrong:
         return f"{wrong}, not {shown(value)}; {advice}"
     if kind == "literal_error" and key == "hystgen":
         return f"must be 1, not {shown(value)}; this version reads format 1 only"
     if kind == "literal_error":
-        known: Any = models.EmitDefaults.model_fields[key].annotation
-        return _choice(value, known.__args__)
-    if kind == "finite_number":
-        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in size"
+        known: Any = models.EmitDefaults.model_fields[key].annotation if key != "kind" else None
+        return _choice(value, known.__args__ if known else STAGE_KINDS)
     bounds = (
         ("greater_than", "gt", "must be above"),
         ("greater_than_equal", "ge", "must be at least"),
@@ -454,8 +469,6 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if kind == "too_short":
         return f"has {_entries(len(value))}, at least {context.get('min_length')} needed; add to the list"
     if kind == "too_long":
-        if key == "input_range":
-            return "must be two numbers; write [lowest, highest]"
         return f"has {_entries(len(value))}, more than {context.get('max_length')}; shorten the list"
     if kind == "string_too_long":
         return f"has {len(value)} characters, more than {context.get('max_length')}; shorten it"

@@ -20,6 +20,7 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
+from pydantic_core import PydanticCustomError
 
 from hystgen.names import MAX_NAME, NAME_PATTERN
 
@@ -29,8 +30,11 @@ MAX_NUMBER = 1e30
 MAX_DESCRIPTION = 500
 MAX_UNIT = 40
 
-TAG = "\0"
-"""First character of the names of union members, which no key in a file can begin with by accident."""
+STAGE_KINDS = ("dead_zone", "tanh")
+
+_MEMBER = "\0member "
+MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
+"""Names of union members: steps of pydantic's locations that are no keys of the file."""
 
 
 def _float(value: float) -> float:
@@ -40,6 +44,12 @@ def _float(value: float) -> float:
 Number = Annotated[float, Field(ge=-MAX_NUMBER, le=MAX_NUMBER, allow_inf_nan=False), AfterValidator(_float)]
 Positive = Annotated[float, Field(gt=0, le=MAX_NUMBER, allow_inf_nan=False), AfterValidator(_float)]
 NotNegative = Annotated[float, Field(ge=0, le=MAX_NUMBER, allow_inf_nan=False), AfterValidator(_float)]
+
+
+def _whole(value: Any) -> Any:
+    if type(value) is not int:  # true and 1.0 are equal to 1
+        raise PydanticCustomError("literal_error", "must be 1")
+    return value
 
 
 class _Part(BaseModel):
@@ -97,7 +107,7 @@ class DensityParameters(_Part):
 
 
 def _number_or_list(value: Any) -> str:
-    return TAG + ("list" if isinstance(value, tuple) else "number")
+    return _MEMBER + ("list" if isinstance(value, tuple) else "number")
 
 
 class PIParameters(_Part):
@@ -125,8 +135,8 @@ class PIParameters(_Part):
         description="p_0 .. p_n, as many as thresholds, not all zero",
     )
     initial_state: Annotated[
-        Annotated[Number, Tag(TAG + "number")]
-        | Annotated[tuple[Number, ...], Field(min_length=1, max_length=MAX_PLAYS + 1), Tag(TAG + "list")],
+        Annotated[Number, Tag(_MEMBER + "number")]
+        | Annotated[tuple[Number, ...], Field(min_length=1, max_length=MAX_PLAYS + 1), Tag(_MEMBER + "list")],
         Discriminator(_number_or_list),
     ] = Field(default=0.0, description="start memory M0: one number, or one a threshold (the first is ignored)")
     density: DensityParameters | None = Field(default=None, description="density in place of thresholds and weights")
@@ -178,11 +188,11 @@ class TanhParameters(_Part):
 
 def _kind(value: Any) -> str | None:
     kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
-    return TAG + kind if kind in ("dead_zone", "tanh") else None
+    return _MEMBER + kind if kind in STAGE_KINDS else None
 
 
 StageParameters = Annotated[
-    Annotated[DeadZoneParameters, Tag(TAG + "dead_zone")] | Annotated[TanhParameters, Tag(TAG + "tanh")],
+    Annotated[DeadZoneParameters, Tag(_MEMBER + "dead_zone")] | Annotated[TanhParameters, Tag(_MEMBER + "tanh")],
     Discriminator(_kind),
 ]
 
@@ -224,7 +234,7 @@ class Parameters(_Part):
     Built by `load_parameters`, `parse_parameters` and `make_parameters`, which also check how values fit together.
     """
 
-    hystgen: Literal[1] = Field(description="format version")
+    hystgen: Annotated[Literal[1], BeforeValidator(_whole)] = Field(description="format version")
     name: str = Field(
         description="prefix of every emitted C symbol, in upper case of every macro, and name of the files",
         json_schema_extra={"pattern": NAME_PATTERN, "maxLength": MAX_NAME},

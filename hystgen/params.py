@@ -10,7 +10,8 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any
 
 from hystgen.names import comment_text, name_problem
@@ -69,11 +70,12 @@ def load_parameters(path: str | os.PathLike[str]) -> Parameters:
     try:
         with open(file, "rb") as stream:
             content = stream.read(MAX_BYTES + 1)
-            size = max(len(content), os.fstat(stream.fileno()).st_size)
+            size = os.fstat(stream.fileno()).st_size  # 0 for a pipe or device
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ParameterError(file, [Problem("", f"cannot be read: {reason}")]) from None
-    _refuse_size(len(content) if len(content) <= MAX_BYTES else size, file)
+    if len(content) > MAX_BYTES:
+        raise _too_large(f"{size}, more" if size > MAX_BYTES else "more", file)
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -86,7 +88,9 @@ def load_parameters(path: str | os.PathLike[str]) -> Parameters:
 
 def parse_parameters(text: str, file: str = "<string>") -> Parameters:
     """The checked parameters in a YAML text; `file` names it in messages. Raises ParameterError."""
-    _refuse_size(len(text.encode("utf-8", "surrogatepass")), file)
+    size = len(text.encode("utf-8", "surrogatepass"))
+    if size > MAX_BYTES:
+        raise _too_large(f"{size}, more", file)
     document = read(text.removeprefix("\ufeff"))
     if not document.complete:
         raise ParameterError(file, document.problems)
@@ -107,10 +111,9 @@ def make_parameters(data: Mapping[str, Any], file: str = "<data>") -> Parameters
     return parameters
 
 
-def _refuse_size(size: int, file: str) -> None:
-    if size > MAX_BYTES:
-        message = f"the file has {size} bytes, more than {MAX_BYTES} (1 MiB); keep one model a file"
-        raise ParameterError(file, [Problem("", message)])
+def _too_large(size: str, file: str) -> ParameterError:
+    message = f"the file has {size} than {MAX_BYTES} bytes (1 MiB); keep one model a file"
+    return ParameterError(file, [Problem("", message)])
 
 
 def _plain(value: Any) -> Any:
@@ -156,23 +159,20 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
     """
     notes = dict(comments or {})
     lines = _comment(header, "")
-    lines += _block(_data(parameters), _defaults(parameters), "", notes, "")
+    lines += _block(_data(parameters), _defaults(), "", notes, "")
     if notes:
         raise ValueError(f"no such keys to comment: {', '.join(notes)}")
     return "\n".join(lines) + "\n"
 
 
-def _defaults(parameters: Parameters) -> dict[str, Any]:
+@cache
+def _defaults() -> dict[str, Any]:
     """What is left out when it has this value."""
-    least = Parameters(
-        hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=PIParameters(weights=(1.0,)))
-    )
-    data = least.model_dump()
+    pi = PIParameters(weights=(1.0,))
+    data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
     for key in ("hystgen", "name", "input_range"):
         del data[key]
-    for key in ("thresholds", "weights"):
-        del data["model"]["pi"][key]
-    data["model"]["pi"]["density"] = dict.fromkeys(DensityParameters.model_fields)
+    del data["model"]["pi"]["weights"]
     return data
 
 
@@ -185,10 +185,11 @@ def _block(
     """Lines of a mapping in block form."""
     for key, value in data.items():
         path = f"{above}.{key}" if above else key
-        wanted = path in notes or any(note.startswith(path + ".") for note in notes)
+        wanted = any(note == path or note.startswith(path + ".") for note in notes)
+        note = notes.pop(path, "")
         if value is None or (not wanted and key in defaults and value == defaults[key]):
             continue
-        yield from _comment(notes.pop(path, ""), indent)
+        yield from _comment(note, indent)
         if key == "memoryless" and value:
             yield f"{indent}{key}:"
             for stage in value:
@@ -198,18 +199,19 @@ def _block(
                 yield f"{indent}  - {lines[0].lstrip()}"
                 yield from lines[1:]
         elif isinstance(value, dict) and key not in _FLOW:
-            yield f"{indent}{key}:"
-            yield from _block(value, defaults.get(key) or {}, indent + "  ", notes, path)
+            lines = list(_block(value, defaults.get(key) or {}, indent + "  ", notes, path))
+            yield f"{indent}{key}:" if lines else f"{indent}{key}: {{}}"
+            yield from lines
         else:
             yield from _entry(key, value, indent)
 
 
 def _entry(key: str, value: Any, indent: str) -> Iterator[str]:
-    """Lines of one key with its value on the same line, wrapped where the value is a list."""
-    words = _flow(value).split(" ") if isinstance(value, tuple | dict) else [_flow(value)]
+    """Lines of one key with its value in flow form, wrapped between the numbers of a list."""
+    flow = _flow(value)
     line = f"{indent}{key}:"
-    for word in words:
-        if len(line) + 1 + len(word) > _WIDTH and len(words) > 1:
+    for word in flow.split(" ") if isinstance(value, tuple) or key == "table" else [flow]:
+        if len(line) + 1 + len(word) > _WIDTH and line.strip() != f"{key}:":
             yield line
             line = indent + "   "
         line += " " + word
@@ -219,8 +221,8 @@ def _entry(key: str, value: Any, indent: str) -> Iterator[str]:
 def _flow(value: Any) -> str:
     """A value in flow form."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_flow(entry)}" for key, entry in value.items() if entry is not None) + "}"
-    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "{" + ", ".join(f"{key}: {_flow(entry)}" for key, entry in value.items()) + "}"
+    if isinstance(value, tuple):
         return "[" + ", ".join(_flow(entry) for entry in value) + "]"
     if isinstance(value, float):
         return float.__repr__(value)

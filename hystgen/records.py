@@ -462,14 +462,14 @@ class _Reader:
                 f"the drive v is {kept['v'][0]:g} throughout; a fit needs a drive that moves, check the columns"
             )
         self.refuse_if_any()
-        t = kept.pop("t", None)
-        if t is None:
-            assert self.sample_time is not None
-            t = np.arange(samples) * self.sample_time
-            step = self.sample_time
-        else:
+        t: Array
+        if "t" in kept:
+            t = kept.pop("t")
             step = self._step(t)
-        v = kept.pop("v", np.empty(0))
+        else:
+            step = self.sample_time or 1.0
+            t = np.arange(samples, dtype=np.float64) * step
+        v: Array = kept.pop("v", np.empty(0, dtype=np.float64))
         y = kept.pop("y", None)
         return Record(Path(self.file).name, t, v, y, kept, step, tuple(self.notes))
 

@@ -6,6 +6,7 @@ Everything a compiled operator knows comes from here, once, for the bit referenc
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,7 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
     pi = cascade.pi
     n = pi.n
 
-    def reals(values: list[float] | tuple[float, ...], what: str) -> NDArray[Any]:
+    def reals(values: Sequence[float], what: str) -> NDArray[Any]:
         if any(abs(x) > largest / 16 for x in values):
             raise FormatError(f"{what} reach {max(abs(x) for x in values):.3g}, too large for {arithmetic}")
         return np.array(values, dtype=dtype)
@@ -88,7 +89,10 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
     lift = [math.fsum(products[:k]) for k in range(n + 2)]
     bounded = clamp and all(math.isfinite(end) for end in cascade.input_range)
 
-    kinds, firsts, sizes, numbers = [], [], [], []
+    kinds: list[int] = []
+    firsts: list[int] = []
+    sizes: list[int] = []
+    numbers: list[float] = []
     for j, stage in enumerate(cascade.stages):
         assert isinstance(stage, DeadZone | TanhEnvelope)
         low, high = cascade.stage_ranges(True)[j]
@@ -133,9 +137,9 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
         tanh=kernels.tanh_tables(dtype),
         atanh=kernels.atanh_tables(dtype),
     )
-    for kind, first in zip(kinds, firsts, strict=True):
+    for kind, place in zip(kinds, firsts, strict=True):
         if kind == reference.TANH:
-            tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
+            tables.stage_data[[place + 6, place + 13]] = np.nextafter(dtype(1), dtype(0))
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))
         size = w * sum(abs(p) for p in pi.weights) + abs(lift[-1]) + abs(cascade.output_offset)

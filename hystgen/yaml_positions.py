@@ -121,7 +121,7 @@ def read(text: str) -> Document:
     builder = _Builder(document)
     events = YAML(typ="safe", pure=True).parse(text)
     try:
-        while (event := _next(events, text, document)) is not None:
+        while (event := _next(events, text, builder)) is not None:
             builder.take(event, _start(event.start_mark))
     except _LimitError:
         pass
@@ -134,7 +134,7 @@ def read(text: str) -> Document:
     return document
 
 
-def _next(events: Iterator[Any], text: str, document: Document) -> Any:
+def _next(events: Iterator[Any], text: str, builder: _Builder) -> Any:
     """The parser's next event, None at the end; a text that is no YAML is refused."""
     try:
         return next(events, None)
@@ -143,14 +143,14 @@ def _next(events: Iterator[Any], text: str, document: Document) -> Any:
         position, message = _position(text, error.position), f"character U+{code:04X} is not allowed; remove it"
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        position = (1, 1) if mark is None else _start(mark)
+        position = builder.position if mark is None else _start(mark)
         context = f" ({_clean(error.context)})" if error.context else ""
         message = f"not valid YAML: {_clean(error.problem or 'cannot be read')}{context}; correct the text there"
     except Exception:
         # The parser has failures of its own, such as OverflowError for the escape "\UFFFFFFFF".
-        position, message = (1, 1), "not valid YAML: cannot be read; correct the escapes and directives in the file"
-    document.refuse((), position, message)
-    document.data = None
+        position, message = builder.position, "not valid YAML soon after this place; correct the text there"
+    builder.document.refuse((), position, message)
+    builder.document.data = None
     raise _LimitError
 
 
@@ -158,6 +158,8 @@ _WORDS = (
     ("'<stream end>'", "the end of the file"),
     ("'<document end>'", "the end mark '...'"),
     ("'<document start>'", "the start mark '---'"),
+    ("unexpected end of stream", "the end of the file"),
+    ("<block end>", "the end of it"),
     ("character '\\t'", "a tab"),
     ("the node content", "a value"),
     ("flow node", "value"),
@@ -199,12 +201,14 @@ def _value(event: Any) -> str | int | float | bool | None:
 class _Builder:
     def __init__(self, document: Document) -> None:
         self.document = document
+        self.position: Position = (1, 1)
         self.levels: list[_Level] = []
         self.count = 0
         self.documents = 0
 
     def take(self, event: Any, position: Position) -> None:
         """Take the parser's next event; raise _LimitError when the rest is not to be looked at."""
+        self.position = position
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:

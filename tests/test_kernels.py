@@ -297,7 +297,7 @@ def float64_arguments(kernel: str) -> Iterator[float]:
     """Over 20 000 positive ones: where the kernel branches, near 1/2 and 1, tiny, and spread out."""
     rng = np.random.default_rng(7)
     t = TABLES[kernel](np.float64)
-    # the worst that 10^9 random arguments showed
+    # the worst that about 10^9 random arguments showed
     yield {"tanh": 0.55080469212778527, "atanh": 0.7501587944095236}[kernel]
     if kernel == "tanh":
         for edge in [*t.knot, *t.bound, 0.5493061443340549]:

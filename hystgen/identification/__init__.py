@@ -23,7 +23,8 @@ from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.progress import Progress
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
-from hystgen.records import Record, read_record, write_atomically
+from hystgen.identification.thresholds import rounded
+from hystgen.records import SHORTEST, Record, read_record, write_atomically
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -79,8 +80,8 @@ class Fit:
         if free_offset:
             if data.y is None:
                 raise ValueError(f"{data.name} has no measured column y to take the offset from")
-            return predicted + float(np.mean(data.y - predicted))
-        return predicted + self.parameters.output_offset
+            return np.asarray(predicted + float(np.mean(data.y - predicted)))
+        return np.asarray(predicted + self.parameters.model.output_offset)
 
     def text(self) -> str:
         """The parameter file: what was fitted on what as comments, then the parameters."""
@@ -105,12 +106,12 @@ class Fit:
         n = len(self.parameters.model.pi.thresholds) - 1
         remarks = [
             f"{n} play{'' if n == 1 else 's'}. Errors of a free run with a free offset a record; % of the largest "
-            "peak-to-peak output of the row's records."
+            "peak-to-peak output of the row's records, each taken whole."
         ]
         if any(row.model == "trial" for row in self.rows):
             remarks.append(
-                f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the rest "
-                "(row held out). written: fitted to everything."
+                f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the "
+                "rest (row held out). written: fitted to everything."
             )
         elif any(row.part == "held out" for row in self.rows):
             remarks.append("written: fitted to the records of row fit only.")
@@ -198,7 +199,7 @@ def identify(
         settled = [pi.resettled(item, float(r[-1]), skip) for item in held]
         rows.append(pi.row("held out", "written", [pi.compare(item, r, p) for item in settled], [skip] * len(held)))
         told += [text for item in held if (text := _outside(item.name, item.v, (low, high)))]
-    offset = pi.rounded(errors[0].offset, pi.DIGITS)
+    offset = rounded(errors[0].offset, pi.DIGITS)
     told += _about_model(solution, wanted, compared, own)
     return Fit(_parameters(name, units, (low, high), r, p, offset), tuple(rows), tuple(told), before)
 
@@ -212,7 +213,7 @@ def _trial(
     for item in courses:
         split = round(len(item.v) * (1.0 - HELD_OUT))
         front = pi.resettled(replace(item, last=split), math.inf, skip)
-        if front.used < pi.SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
+        if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
             return [], f"{item.name}: {short}"
         fronts.append(front)
         splits.append(split)
@@ -223,7 +224,7 @@ def _trial(
     r, p = solution.thresholds, solution.weights
     rests = [pi.resettled(item, float(r[-1]), split) for item, split in zip(courses, splits, strict=True)]
     for item in rests:
-        if item.used < pi.SHORTEST:
+        if item.used < SHORTEST:
             return [], f"{item.name}: {short}"
     fit_errors = [pi.compare(item, r, p) for item in compared]
     held_errors = [pi.compare(item, r, p) for item in rests]
@@ -238,17 +239,17 @@ def _about_model(
 ) -> list[str]:
     """What the user should know about the model itself."""
     told = []
-    p, made = solution.weights, solution.floor
+    p, made = solution.weights, solution.fitted
     if made.free_p0 is not None and made.free_rms is not None:
         told.append(
-            f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data hardly "
-            f"tell: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement lowers p_0: "
-            "record more slowly if you can"
+            f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
+            f"hardly tell: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement lowers "
+            "p_0: record more slowly if you can"
         )
     elif p[0] == 0.0:
         told.append(
-            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is of "
-            "use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
+            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
+            "of use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
         )
     elif np.sum(p) > AMPLIFIES * p[0]:
         told.append(
@@ -258,15 +259,16 @@ def _about_model(
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
         if beyond:
             told.append(
-                f"{len(beyond)} threshold{'' if len(beyond) == 1 else 's'} above {solution.reach:.6g} hardly move in these "
-                "records; their weights are not to be trusted for larger drives"
+                f"{len(beyond)} threshold{'' if len(beyond) == 1 else 's'} above {solution.reach:.6g} hardly move in "
+                "these records; their weights are not to be trusted for larger drives"
             )
-    spread = np.concatenate([item.y[item.first : item.last] - np.mean(item.y[item.first : item.last]) for item in compared])
-    share = 1.0 - own.rms**2 / float(np.mean(spread**2))
+    outputs = [item.y[item.first : item.last] for item in compared]
+    spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
+    share = 1.0 - own.rms**2 / spread
     if share < 0.9:
         told.append(
-            f"the model explains only {100 * max(share, 0.0):.0f} % of the measured variance; check which column is which, "
-            "and the units"
+            f"the model explains only {100 * max(share, 0.0):.0f} % of the measured variance; check which column is "
+            "which, and the units"
         )
     return told
 
@@ -296,7 +298,7 @@ def _parameters(
     p: NDArray[np.float64],
     offset: float,
 ) -> Parameters:
-    from hystgen.params import Parameters
+    from hystgen.params import make_parameters
 
     content: dict[str, object] = {"hystgen": 1, "name": name}
     if units:
@@ -306,7 +308,7 @@ def _parameters(
         "pi": {"thresholds": r.tolist(), "weights": p.tolist(), "initial_state": 0.0},
         "output_offset": offset,
     }
-    return Parameters.model_validate(content)
+    return make_parameters(content)
 
 
 def identifier_from(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ from hystgen.identification import reduction, thresholds, weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
 from hystgen.identification.thresholds import Candidate, rounded
+from hystgen.identification.weights import Weights
 from hystgen.records import SHORTEST, Record
 
 Array = NDArray[np.float64]
@@ -29,12 +31,12 @@ class IdentificationError(ValueError):
 
 @dataclass(frozen=True)
 class Solution:
-    """A fitted play sum. `reach`: largest threshold that the records support."""
+    """A fitted play sum. `reach`: largest threshold that the records support; `fitted`: what was done about p_0."""
 
     thresholds: Array
     weights: Array
     reach: float
-    floor: weights.Weights
+    fitted: Weights
 
 
 def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
@@ -57,7 +59,7 @@ def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Cour
     if np.ptp(y[skip:]) == 0.0:
         raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
     first = 0 if history is not None else reduction.settled(v, math.inf)
-    return Course(record.name, v, y, history, max(first, skip), len(v))
+    return Course(record.name, v, y, history, max(first, skip), len(v), float(np.ptp(y[skip:])))
 
 
 def resettled(item: Course, largest: float, begin: int) -> Course:
@@ -98,8 +100,8 @@ def solve(
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
         raise IdentificationError(
-            "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign "
-            "of y, else check which column is which"
+            "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the "
+            "sign of y, else check which column is which"
         )
     if wanted is None:
         # A play without weight is no part of the model
@@ -152,6 +154,6 @@ def checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[floa
     places = tuple(float(r) for r in wanted)
     if not places or places[0] != 0.0:
         places = (0.0, *places)
-    if not all(math.isfinite(r) for r in places) or any(b <= a for a, b in zip(places, places[1:], strict=False)):
+    if not all(math.isfinite(r) for r in places) or any(b <= a for a, b in itertools.pairwise(places)):
         raise ValueError("thresholds are finite, not negative, and rise strictly")
     return places

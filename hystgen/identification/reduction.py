@@ -17,8 +17,8 @@ from hystgen import operators
 
 Array = NDArray[np.float64]
 
-CHUNK = 8192
-"""Samples whose plays are held at a time."""
+CHUNK = 2048
+"""Samples whose plays are held at a time; larger ones gain nothing and invite linear algebra threads to contend."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
@@ -29,7 +29,7 @@ class Course:
     """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
 
     The drive before `first` runs through the plays all the same. `history` are drive values visited before the record;
-    None when it is not known.
+    None when it is not known. `output_range`: peak-to-peak output of the whole record, which percentages refer to.
     """
 
     name: str
@@ -38,6 +38,7 @@ class Course:
     history: tuple[float, ...] | None
     first: int
     last: int
+    output_range: float
 
     @property
     def used(self) -> int:
@@ -49,11 +50,6 @@ class Course:
         """Least and largest drive among the samples compared."""
         part = self.v[self.first : self.last]
         return float(part.min()), float(part.max())
-
-    @property
-    def output_range(self) -> float:
-        """Peak-to-peak output of the samples compared."""
-        return float(np.ptp(self.y[self.first : self.last])) if self.used else 0.0
 
 
 def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:
@@ -146,7 +142,7 @@ def reduce(courses: Sequence[Course], thresholds: Array, tick: Callable[[int], N
 def _triangle(*parts: Array) -> Array:
     """The triangular factor of parts stacked on each other: same normal equations, at most as many rows as columns."""
     stacked = np.concatenate(parts)
-    return np.linalg.qr(stacked, mode="r") if len(stacked) > 1 else stacked
+    return np.asarray(np.linalg.qr(stacked, mode="r")) if len(stacked) > 1 else stacked
 
 
 def _without_offset(triangle: Array) -> Array:

@@ -12,7 +12,7 @@ class Row:
 
     `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples` were compared, `ignored` were not;
     `rms`, `max`: errors in output units with a free offset a record; `output_range`: the largest peak-to-peak output
-    among the row's records, of which `rms_percent` and `max_percent` are taken.
+    of the row's records, each taken whole, of which `rms_percent` and `max_percent` are taken.
     """
 
     part: str
@@ -64,7 +64,7 @@ def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
     widths = [max(len(line[k]) for line in (head, *body)) for k in range(len(head))]
     left = (0, 1, len(head) - 1)
     lines = [
-        "  ".join(cell.ljust(w) if k in left else cell.rjust(w) for k, (cell, w) in enumerate(zip(line, widths, strict=True)))
+        "  ".join(line[k].ljust(width) if k in left else line[k].rjust(width) for k, width in enumerate(widths))
         for line in (head, *body)
     ]
     return "\n".join([*(line.rstrip() for line in lines), *remarks]) + "\n"

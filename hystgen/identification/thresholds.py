@@ -23,14 +23,17 @@ samples before each reversal and can take any value, while a slightly larger dri
 the play below, and the error at the ends of the loop is already within 10 % of what plays up to 0.9 reach.
 """
 
-COUNTS = (4, 6, 8, 12, 16, 24)
+COUNTS = (6, 8, 12, 16, 24)
 """Numbers of plays tried by default."""
 
 POWERS = (1.0, 1.5, 2.0)
 """Spacings tried, `r_i = r_n (i/n)^power`: even, or denser near zero where loops bend most."""
 
-PARSIMONY = 1.02
+PARSIMONY = 1.01
 """The fewest plays whose validation error is within this factor of the best are chosen."""
+
+MANY = 100
+"""More plays than this are spaced evenly."""
 
 SAMPLES_A_PLAY = 8
 """The default never places more plays than one for this many samples."""
@@ -74,7 +77,8 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
         counts = [n for n in COUNTS if n * SAMPLES_A_PLAY <= samples] or (max(1, samples // SAMPLES_A_PLAY),)
     lists = []
     for n in counts:
-        for power in POWERS[: 1 if n < 2 else None]:
+        # A single play has one place; very many leave nothing to choose
+        for power in POWERS[: 1 if n < 2 or n > MANY else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
             lists.append(Candidate((0.0, *places)))
     return lists

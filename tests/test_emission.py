@@ -1,0 +1,142 @@
+"""Emitted C: bits equal on every compiler, clean under every dialect, no foreign symbols, same bytes anywhere."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from modelfiles import FILES
+
+import hystgen
+from hystgen.api import Model
+from hystgen.params import parse_parameters
+from hystgen.verification import compilers
+
+GOLDEN = Path(__file__).parent / "golden"
+LAYOUTS = ("self-contained", "single-header", "shared-runtime")
+DIALECTS = (["-std=c99"], ["-std=c11"], ["-x", "c++", "-std=c++17"])
+
+
+def model(name: str) -> Model:
+    return Model(parse_parameters(FILES[name], f"{name}.yaml"))
+
+
+def required_compilers() -> list[compilers.Compiler]:
+    found = compilers.available()
+    if os.environ.get("CI"):
+        assert [c.name for c in found] == list(compilers.NAMES), "CI verifies with gcc, clang and zig"
+    assert found, "no C compiler"
+    return found
+
+
+def check_codegen(name: str, **options: str) -> None:
+    """What ends every feature test: the emitted C gives the bits of the reference."""
+    required_compilers()
+    report = hystgen.verify(model(name), operator="both", length=int(os.environ.get("HYSTGEN_LENGTH", "30000")), **options)
+    assert report.ok, report.table()
+    assert {row.operator for row in report.rows} == {"forward", "inverse"}
+
+
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize("name", FILES)
+def test_bits_equal(name: str, arithmetic: str, engine: str) -> None:
+    check_codegen(name, arithmetic=arithmetic, engine=engine)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS[1:])
+@pytest.mark.parametrize("name", ["listed", "mixed"])
+def test_bits_equal_in_other_layouts(name: str, layout: str) -> None:
+    check_codegen(name, arithmetic="float32", layout=layout)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+def test_bits_equal_over_long_records(arithmetic: str) -> None:
+    report = hystgen.verify(model("two_branches"), operator="both", arithmetic=arithmetic, length=100_000)
+    assert report.ok, report.table()
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("operator", ["forward", "inverse", "both"])
+@pytest.mark.parametrize("name", FILES)
+def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_path: Path) -> None:
+    arithmetic = "float64" if name in ("bent", "curved") else "float32"
+    engine = "loop" if operator == "forward" else "corners"
+    hystgen.emit(model(name), tmp_path, operator=operator, layout=layout, arithmetic=arithmetic, engine=engine)
+    if layout == "single-header":
+        (tmp_path / "all.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')
+    sources = sorted(tmp_path.glob("*.c"))
+    for compiler in required_compilers():
+        for dialect in DIALECTS if compiler.name != "zig" else DIALECTS[:1]:
+            warnings = compilers.WARNINGS if "c++" in dialect else compilers.C_WARNINGS
+            for source in sources:
+                output = tmp_path / "one.o"
+                compiler.run(["-c", "-O2", *dialect, *warnings, "-o", output, source])
+                alone = source.stem == name or source.stem == "all"
+                if alone and layout != "shared-runtime" and compiler.name != "zig":
+                    symbols = subprocess.run(["nm", output], capture_output=True, text=True, check=True).stdout
+                    kinds = {line.split()[-2] for line in symbols.splitlines()}
+                    assert not kinds & {"U", "D", "d", "B", "b"}, symbols
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_nothing_forbidden_in_the_text(name: str) -> None:
+    for file, text in hystgen.api.emitted_files(model(name), operator="both", arithmetic="float32").items():
+        code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        assert not re.search(r"\b(double|malloc|printf|memcpy)\b", code), file
+        assert " / " not in re.sub(r"\) / 2|middle\) / 2", "", code).replace("+ 1) / 2", ""), file
+        includes = set(re.findall(r"#include <(\w+)\.h>", code))
+        assert includes <= {"stdint", "stdbool", "stddef", "float"}, file
+
+
+def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = hystgen.emit(model("mixed"), tmp_path / "a")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "p.yaml").write_text("# a comment\n" + FILES["mixed"])
+    hystgen.emit("p.yaml", "b")
+    for path in first:
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+    assert hystgen.differences("p.yaml", "b") == []
+    (tmp_path / "b" / "mixed.c").write_text("stale")
+    (tmp_path / "b" / "mixed.h").unlink()
+    assert [p.split(" ")[1] for p in hystgen.differences("p.yaml", "b")] == ["is", "differs"]
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+@pytest.mark.parametrize("name", FILES)
+def test_error_bounds_hold(name: str, arithmetic: str, engine: str) -> None:
+    """Against the double model, for drives and references inside the range."""
+    from hystgen.bounds import error_bounds
+
+    one = model(name)
+    bounds = error_bounds(one.cascade, arithmetic, engine)
+    rng = np.random.default_rng(5)
+    low, high = one.parameters.input_range
+    v = np.interp(np.linspace(0, 500, 20000), np.arange(501), rng.uniform(low, high, 501))
+    v = np.clip(v.astype(arithmetic).astype(float), low, high)
+    exact = one.simulate(v)
+    assert np.max(np.abs(one.simulate(v, arithmetic, engine=engine) - exact)) <= bounds.forward
+    u = np.clip(exact, *one.cascade.output_range).astype(arithmetic).astype(float)
+    drive = one.inverse().simulate(u, clamp=True)
+    assert np.max(np.abs(one.inverse().simulate(u, arithmetic, engine=engine) - drive)) <= bounds.inverse
+
+
+@pytest.mark.parametrize(("name", "options"), [
+    ("plain", {"operator": "inverse", "arithmetic": "float32", "engine": "corners"}),
+    ("bent", {"operator": "both", "arithmetic": "float64", "engine": "loop"}),
+    ("two_branches", {"operator": "inverse", "arithmetic": "float32", "layout": "single-header"}),
+])  # fmt: skip
+def test_golden(name: str, options: dict[str, str]) -> None:
+    """The C under review; HYSTGEN_UPDATE_GOLDEN=1 writes it anew."""
+    folder = GOLDEN / name
+    if os.environ.get("HYSTGEN_UPDATE_GOLDEN"):
+        for stale in folder.glob("*"):
+            stale.unlink()
+        hystgen.emit(model(name), folder, **options)
+    assert hystgen.differences(model(name), folder, **options) == []
