@@ -12,12 +12,16 @@ Usage: python examples/make_recording.py [FOLDER]
 
 from __future__ import annotations
 
+import itertools
 import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 RATE = 2000.0  # samples a second
 DRIVE_FULL = 100.0  # V, full scale of the 16-bit drive converter
@@ -25,16 +29,16 @@ SENSOR_FULL = 25.0  # um, full scale of the 16-bit sensor
 NOISE = 0.006  # um rms
 CODES = 65535
 
-CENTRE, CENTRE_SPREAD = 55.0, 60.0  # V, relay centres: mean and standard deviation
-HALF_WIDTH = 22.0  # V, scale on which relays become rarer with their half width
-IRREVERSIBLE = 6.5  # um, all relays from down to up
-REVERSIBLE = 13.0  # um at full drive
+CENTRE, CENTRE_SPREAD = 55.0, 35.0  # V, relay centres: mean and standard deviation
+HALF_WIDTH = 25.0  # V, scale on which relays become rarer with their half width
+IRREVERSIBLE = 8.0  # um, all relays from down to up
+REVERSIBLE = 11.0  # um at full drive
 STIFFENING = 0.03  # share of the reversible part
 
 GRID = 400  # cells of the relay plane along each axis
 
 
-def everett_table() -> np.ndarray:
+def everett_table() -> Array:
     """E[a, b]: share of the relays with beta >= b and alpha <= a, on a grid over the drive range."""
     edge = (np.arange(GRID) + 0.5) * DRIVE_FULL / GRID
     alpha, beta = edge[:, None], edge[None, :]
@@ -42,9 +46,9 @@ def everett_table() -> np.ndarray:
     density = np.exp(-0.5 * ((centre - CENTRE) / CENTRE_SPREAD) ** 2 - np.abs(half) / HALF_WIDTH)
     density = np.where(half > 0.0, density, np.where(half == 0.0, 0.5 * density, 0.0))
     table = np.zeros((GRID + 1, GRID + 1))
-    # From the top row of the triangle down in beta, up in alpha
+    # Summed up to alpha, and from the drive's top down to beta
     table[1:, :GRID] = np.cumsum(np.cumsum(density, axis=0)[:, ::-1], axis=1)[:, ::-1]
-    return table / table[GRID, 0]
+    return np.asarray(table / table[GRID, 0])
 
 
 class Relays:
@@ -96,16 +100,16 @@ class Relays:
         return total
 
 
-def uniform_noise(seed: int, count: int) -> np.ndarray:
+def bell_noise(seed: int, count: int) -> Array:
     """Nearly normal noise of unit variance: twelve raw generator words a sample, whose stream numpy guarantees."""
     words = np.random.PCG64(seed).random_raw(12 * count).reshape(count, 12)
-    return ((words >> np.uint64(11)).astype(np.float64) * 2.0**-53).sum(axis=1) - 6.0
+    return np.asarray(((words >> np.uint64(11)).astype(np.float64) * 2.0**-53).sum(axis=1) - 6.0)
 
 
 def measure(drive: list[float], seed: int) -> list[tuple[float, float, float]]:
     """Time, drive as the converter gives it, and what the sensor reads."""
     relays = Relays()
-    noise = NOISE * uniform_noise(seed, len(drive))
+    noise = NOISE * bell_noise(seed, len(drive))
     rows = []
     for k, wanted in enumerate(drive):
         v = round(wanted / DRIVE_FULL * CODES) * DRIVE_FULL / CODES
@@ -118,7 +122,7 @@ def measure(drive: list[float], seed: int) -> list[tuple[float, float, float]]:
 
 def ramps(corners: list[float], samples: list[int]) -> Iterator[float]:
     """Straight lines from corner to corner, each in so many samples."""
-    for start, stop, count in zip(corners, corners[1:], samples):
+    for (start, stop), count in zip(itertools.pairwise(corners), samples, strict=True):
         for k in range(count):
             yield start + (stop - start) * k / count
 
@@ -126,7 +130,8 @@ def ramps(corners: list[float], samples: list[int]) -> Iterator[float]:
 def fit_drive() -> list[float]:
     """Triangles over the full range, smaller ones at three heights, nested loops, then fading sines."""
     corners = [0, 100, 0, 100, 20, 80, 35, 65, 45, 55, 10, 40, 15, 35, 5, 95, 60, 90, 65, 85, 70, 100, 0]
-    samples = [round(6.0 * abs(b - a) * (0.6 if abs(b - a) >= 80 else 1.0)) for a, b in zip(corners, corners[1:])]
+    moves = [abs(b - a) for a, b in itertools.pairwise(corners)]
+    samples = [round(6.0 * move * (0.6 if move >= 80 else 1.0)) for move in moves]
     drive = list(ramps([float(c) for c in corners], samples))
     for k in range(1000):
         fade = 1.0 - k / 1000.0

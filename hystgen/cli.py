@@ -152,6 +152,165 @@ def verify(
         raise _Failed("verification failed", 1)
 
 
+def _numbers(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise _Failed(f"error: --history {text!r} is not a list of numbers; write --history 100,-100", 2) from None
+
+
+def _reading(columns: str | None, sample_time: float | None, delimiter: str | None) -> dict[str, Any]:
+    from hystgen import records
+
+    mapping = _shown("--columns", lambda: records.parse_columns(columns)) if columns else None
+    return {"columns": mapping, "sample_time": sample_time, "delimiter": delimiter}
+
+
+_RECORD_OPTIONS = [
+    click.option("--columns", metavar="t=Time,v=U,y=Pos", help="our names for the file's columns"),
+    click.option("--sample-time", type=float, help="seconds, for files without time"),
+    click.option("--delimiter", help="default: a comma"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before"),
+    click.option("--rest", type=float, default=0.0, help="seconds of pause; a model without dynamics does not see it"),
+]
+
+
+def record_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of every command that takes records."""
+    for option in reversed(_RECORD_OPTIONS):
+        command = option(command)
+    return command
+
+
+@main.command()
+@params_argument
+@click.argument("data", nargs=-1, required=True, type=click.Path())
+@click.option("-o", "output", type=click.Path(), help="CSV file, or a folder for several; default: standard output")
+@click.option("--operator", type=click.Choice(["forward", "inverse"]), default="forward", show_default=True)
+@click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="compute as the emitted C does; default: double")
+@click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="with --arithmetic")
+@record_options
+def simulate(
+    params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
+    history: str | None, rest: float, **reading: Any,
+) -> None:
+    """Run the model (column v) or its inverse (column u) over records; several files are one session.
+
+    Example: hystgen simulate stage_x.yaml drive.csv -o predicted.csv --history 100,-100
+    """
+    from hystgen import records, simulation
+
+    if len(data) > 1 and output is None:
+        raise _Failed("error: several records need -o with a folder", 2)
+    model = _load(params)
+    visited = _numbers(history)
+    how = _reading(**reading)
+    column, answer = ("v", "y") if operator == "forward" else ("u", "v")
+    read = [_shown(path, lambda path=path: records.read_record(path, need=(column,), **how)) for path in data]
+    for record in read:
+        for note in record.notes:
+            click.echo(f"warning: {record.name}: {note}", err=True)
+    clamp = operator == "inverse"
+    session = _shown(params, lambda: model.session(operator, arithmetic, engine, clamp))
+    if visited:
+        session.visit(visited)
+    folder = output is not None and (len(data) > 1 or Path(output).is_dir())
+    for path, record in zip(data, read, strict=True):
+        columns = record.columns()
+        signal = columns[column]
+        answers, status = session.run(signal)
+        for sentence in simulation.remarks(record.name, model.cascade, operator, signal, status):
+            click.echo(f"warning: {sentence}", err=True)
+        if answer in columns:
+            columns[f"{answer}_measured"] = columns.pop(answer)
+        columns[answer] = answers
+        if output is None:
+            click.echo(records.columns_text(list(columns), list(columns.values())), nl=False)
+            continue
+        if folder:
+            Path(output).mkdir(parents=True, exist_ok=True)
+        target = Path(output) / f"{Path(path).stem}.csv" if folder else Path(output)
+        _shown(str(target), lambda target=target, columns=columns: records.write_columns(
+            target, list(columns), list(columns.values())
+        ))  # fmt: skip
+        click.echo(str(target))
+
+
+@main.command()
+@click.argument("data", nargs=-1, required=True, type=click.Path())
+@click.option("-o", "output", required=True, type=click.Path(dir_okay=False), help="parameter file to write")
+@click.option("--model", type=click.Choice(["pi", "gpi-deadzone", "gpi-tanh", "auto"]), default="pi", show_default=True)
+@click.option("--thresholds", type=int, help="number of plays without r_0; default: chosen on held-out error")
+@click.option("--holdout", multiple=True, type=click.Path(), help="record that takes no part in the fit")
+@click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
+@click.option("--name", help="C identifier of the model; default: from the output file")
+@click.option("--units", metavar="V,um", help="units of drive and output")
+@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
+@record_options
+def identify(
+    data: tuple[str, ...], output: str, model: str, thresholds: int | None, holdout: tuple[str, ...], skip: int,
+    name: str | None, units: str | None, plot: str | None, history: str | None, rest: float, **reading: Any,
+) -> None:
+    """Fit a model to measured records and write its parameter file.
+
+    Example: hystgen identify sweep.csv --holdout other.csv -o stage_x.yaml --units V,um
+    """
+    from hystgen import identification, records
+
+    drive, _, displacement = (units or "").partition(",")
+    visited = _numbers(history)
+    how = _reading(**reading)
+
+    def run() -> None:
+        read = [records.read_record(path, **how) for path in data]
+        held = [records.read_record(path, **how) for path in holdout]
+        fit = identification.identify(
+            read,
+            model=model,
+            thresholds=thresholds,
+            holdout=held,
+            history=visited,
+            rest=rest,
+            name=name or identification.identifier_from(Path(output).stem),
+            units={"input": drive.strip(), "output": displacement.strip()},
+            skip=skip,
+            progress=True,
+        )
+        for warning in fit.warnings:
+            click.echo(f"warning: {warning}", err=True)
+        fit.write(output)
+        click.echo(fit.table())
+        click.echo(output)
+        if plot:
+            from hystgen.report import plots
+
+            plots.show_fit(fit, [*held, *read], plot)
+            click.echo(plot)
+
+    _shown(data[0], run)
+
+
+@main.command()
+@params_argument
+@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
+def show(params: str, plot: str | None) -> None:
+    """Print what a model can do: ranges, slopes, loop width, invertible or why not.
+
+    Example: hystgen show stage_x.yaml --plot stage_x.svg
+    """
+    from hystgen.report import plots, properties
+
+    model = _load(params)
+    click.echo(_shown(params, lambda: properties.properties(model)))
+    for warning in properties.warnings(model):
+        click.echo(f"warning: {warning}", err=True)
+    if plot:
+        _shown(params, lambda: plots.show_model(model, plot))
+        click.echo(plot)
+
+
 @main.command()
 def schema() -> None:
     """Print the JSON Schema of the parameter file.

@@ -211,6 +211,14 @@ def _short(r: Any) -> str:
 # Densities as polynomials on panels -----------------------------------------------------------------------
 
 
+def _polynomial(coefficients: Sequence[Any], t: Any) -> Any:
+    """Value at t, coefficients from the highest power down."""
+    value = 0
+    for c in coefficients:
+        value = value * t + c
+    return value
+
+
 class _Panel:
     """Density on `[start, end]` as a polynomial `sum c_k t**k` of `t = (r - middle)/half` in [-1, 1]."""
 
@@ -225,12 +233,8 @@ class _Panel:
     def moments(self, r: Any) -> tuple[Any, Any]:
         """Integrals of p and of r p over `[start, r]`."""
         t = (r - self.middle) / self.half
-        mass = lever = 0
-        for c in self._mass:
-            mass = mass * t + c
-        for c in self._lever:
-            lever = lever * t + c
-        return mass, self.middle * mass + lever
+        mass = _polynomial(self._mass, t)
+        return mass, self.middle * mass + _polynomial(self._lever, t)
 
 
 class Density:
@@ -356,7 +360,7 @@ def from_formula(formula: Formula, r_max: float) -> Density:
         samples = [formula(middle + half * t) for t in nodes]
         checks = [formula(middle + half * t) for t in between]
         coefficients = [mp.fdot(row, samples) for row in matrix]
-        miss = max(abs(mp.polyval(coefficients[::-1], t) - s) for t, s in zip(between, checks, strict=True))
+        miss = max(abs(_polynomial(coefficients[::-1], t) - s) for t, s in zip(between, checks, strict=True))
         for t, s in zip((*nodes, *between), (*samples, *checks), strict=True):
             lowest, highest = min(lowest, (s, middle + half * t)), max(highest, abs(s))
         return _Panel(a, b, coefficients, miss * (b - a))

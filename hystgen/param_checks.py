@@ -392,7 +392,7 @@ class _Checker:
 
 
 _TWO_NUMBERS = "must be two numbers; write [lowest, highest]"
-_NO_VALUE = "has no value; write one, or remove the key"
+_NO_VALUE = "has no value; write one, or remove it"
 
 
 _KINDS = "write a mapping with kind: dead_zone or kind: tanh"

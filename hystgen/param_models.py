@@ -280,7 +280,7 @@ def schema() -> dict[str, Any]:
 
 
 def _tidy(node: Any) -> Any:
-    """Without what only Python needs: titles of fields, and null as a value or default."""
+    """Without what only Python needs: titles of fields, null as a value, defaults that stand for nothing."""
     if isinstance(node, list):
         return [_tidy(entry) for entry in node]
     if not isinstance(node, dict):
@@ -288,7 +288,7 @@ def _tidy(node: Any) -> Any:
     if {"type": "null"} in node.get("anyOf", ()):
         value, _ = node["anyOf"]
         node = {**value, **{key: entry for key, entry in node.items() if key != "anyOf"}}
-    unneeded = {"default"} if node.get("default", 0) in (None, []) else set()
+    unneeded = {"default"} if isinstance(node.get("default"), dict | list | None) else set()
     if isinstance(node.get("title"), str):
         unneeded.add("title")
     return {key: _tidy(entry) for key, entry in node.items() if key not in unneeded}

@@ -75,7 +75,7 @@ def load_parameters(path: str | os.PathLike[str]) -> Parameters:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise ParameterError(file, [Problem("", f"cannot be read: {reason}")]) from None
     if len(content) > MAX_BYTES:
-        raise _too_large(f"{size}, more" if size > MAX_BYTES else "more", file)
+        raise _too_large(size if size > MAX_BYTES else None, file)
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -90,7 +90,7 @@ def parse_parameters(text: str, file: str = "<string>") -> Parameters:
     """The checked parameters in a YAML text; `file` names it in messages. Raises ParameterError."""
     size = len(text.encode("utf-8", "surrogatepass"))
     if size > MAX_BYTES:
-        raise _too_large(f"{size}, more", file)
+        raise _too_large(size, file)
     document = read(text.removeprefix("\ufeff"))
     if not document.complete:
         raise ParameterError(file, document.problems)
@@ -111,9 +111,9 @@ def make_parameters(data: Mapping[str, Any], file: str = "<data>") -> Parameters
     return parameters
 
 
-def _too_large(size: str, file: str) -> ParameterError:
-    message = f"the file has {size} than {MAX_BYTES} bytes (1 MiB); keep one model a file"
-    return ParameterError(file, [Problem("", message)])
+def _too_large(size: int | None, file: str) -> ParameterError:
+    has = f"more than {MAX_BYTES} bytes" if size is None else f"{size} bytes, more than {MAX_BYTES}"
+    return ParameterError(file, [Problem("", f"the file has {has} (1 MiB); keep one model a file")])
 
 
 def _plain(value: Any) -> Any:

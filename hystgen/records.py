@@ -143,15 +143,20 @@ def read_record(
     return reader.read()
 
 
-def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: Sequence[ArrayLike]) -> None:
-    """Write columns of equal length as CSV: shortest digits that read back to the same number, all or nothing."""
+def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
+    """Columns of equal length as CSV: shortest digits that read back to the same number."""
     columns = [_texts(np.asarray(values)) for values in arrays]
     if len(columns) != len(header) or len({len(column) for column in columns}) > 1:
-        raise ValueError("write_columns takes one name a column and columns of equal length")
+        raise ValueError("a CSV table takes one name a column and columns of equal length")
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(header)
     text.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
-    write_atomically(path, text.getvalue())
+    return text.getvalue()
+
+
+def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: Sequence[ArrayLike]) -> None:
+    """Write `columns_text` to a file, all or nothing."""
+    write_atomically(path, columns_text(header, arrays))
 
 
 def write_atomically(path: str | os.PathLike[str], text: str) -> None:

@@ -62,3 +62,26 @@ def simulate(cascade: Cascade, v: ArrayLike, clamp: bool = False) -> NDArray[np.
 def simulate_inverse(cascade: Cascade, u: ArrayLike, clamp: bool = False) -> NDArray[np.float64]:
     """Drive (N,) for the reference samples `u` (N,) from the start memory, in double precision."""
     return Session(cascade, "inverse", clamp=clamp).run(u)[0]
+
+
+def remarks(
+    name: str, cascade: Cascade, operator: str, signal: NDArray[np.float64], status: NDArray[np.int64]
+) -> list[str]:
+    """What a user should know about a simulated record, one sentence each."""
+    low, high = cascade.input_range
+    if operator == "forward":
+        outside = int(np.count_nonzero((signal < low) | (signal > high)))
+        if outside:
+            limited = bool(np.any(status & reference.INPUT_CLAMPED))
+            how = "limited to it" if limited else "extrapolated, not limited"
+            return [f"{name}: {outside} of {len(signal)} samples lie outside input_range {low:g} to {high:g}, {how}"]
+        return []
+    said = []
+    for bit, what in (
+        (reference.INPUT_CLAMPED, "references lie outside the output range and were limited"),
+        (reference.OUTPUT_CLAMPED, "drives were limited to input_range"),
+    ):
+        count = int(np.count_nonzero(status & bit))
+        if count:
+            said.append(f"{name}: {count} of {len(signal)} {what}")
+    return said

@@ -18,13 +18,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import memory
 from hystgen.identification import pi, reduction
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.progress import Progress
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
 from hystgen.identification.thresholds import rounded
-from hystgen.records import SHORTEST, Record, read_record, write_atomically
+from hystgen.records import SHORTEST, Record, RecordError, read_record, write_atomically
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -40,6 +41,12 @@ HELD_OUT = 0.25
 
 AMPLIFIES = 100.0
 """Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""
+
+SMALL_REACH = 0.1
+"""Largest threshold, as a share of the drive range, below which a record is said to show little hysteresis."""
+
+STARTS, UNLIKE = 8, 3.0
+"""A start of so many samples whose rms error is so many times that of the rest tells of a wrong history."""
 
 Source = Record | str | os.PathLike[str]
 
@@ -150,8 +157,8 @@ def identify(
     are not compared, though their drive counts. `p0_floor`: see `weights.fit`; 0 leaves p_0 as it comes.
     `progress`: a bar on a terminal's stderr when it takes more than a second.
 
-    The start memory in the parameter file is 0, that of a stage that was driven to zero and has been at rest: no
-    record knows in which state the firmware will find it. Raises RecordError for unusable files,
+    The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
+    actuator: no record tells in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError for wrong arguments.
     """
     if model not in MODELS:
@@ -170,19 +177,27 @@ def identify(
     def read(sources: Source | Iterable[Source]) -> list[Record]:
         if isinstance(sources, Record | str | os.PathLike):
             sources = [sources]
-        return [
-            source if isinstance(source, Record) else read_record(source, columns, sample_time, delimiter)
-            for source in sources
-        ]
+        found = []
+        for source in sources:
+            try:
+                found.append(
+                    source if isinstance(source, Record) else read_record(source, columns, sample_time, delimiter)
+                )
+            except RecordError as error:
+                refused.extend(error.problems)
+        return found
 
+    refused: list[str] = []
     fit_records, held_records = read(records), read(holdout)
+    if refused:
+        raise RecordError(refused)
     if not fit_records:
         raise ValueError("there is no record to fit")
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
     courses = [pi.course(record, before, skip) for record in fit_records]
     held = [pi.course(record, before, skip) for record in held_records]
     rows: list[Row] = []
-    with Progress(sum(len(item.v) for item in courses) * (1 if held else 2), progress) as bar:
+    with Progress(sum(len(item.v) for item in courses) * (1.0 if held else 2.0 - HELD_OUT), progress) as bar:
         if not held:
             rows, reason = _trial(courses, wanted, p0_floor, skip, bar)
             if reason:
@@ -200,8 +215,9 @@ def identify(
         rows.append(pi.row("held out", "written", [pi.compare(item, r, p) for item in settled], [skip] * len(held)))
         told += [text for item in held if (text := _outside(item.name, item.v, (low, high)))]
     offset = rounded(errors[0].offset, pi.DIGITS)
+    told += [text for each in errors if (text := _about_start(each, float(r[-1])))]
     told += _about_model(solution, wanted, compared, own)
-    return Fit(_parameters(name, units, (low, high), r, p, offset), tuple(rows), tuple(told), before)
+    return Fit(_parameters(name, units, (low, high), r, p, offset, before), tuple(rows), tuple(told), before)
 
 
 def _trial(
@@ -255,6 +271,13 @@ def _about_model(
         told.append(
             f"p_0 is small: the inverse amplifies small movements {np.sum(p) / p[0]:.0f} times as much as large ones"
         )
+    low = min(item.drive_range[0] for item in compared)
+    high = max(item.drive_range[1] for item in compared)
+    if solution.reach < SMALL_REACH * (high - low):
+        told.append(
+            f"the records tell little about hysteresis: no play above {solution.reach:.3g} moves enough in them; "
+            "record full cycles, several times, or give --history"
+        )
     if isinstance(wanted, tuple):
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
         if beyond:
@@ -271,6 +294,21 @@ def _about_model(
             "which, and the units"
         )
     return told
+
+
+def _about_start(errors: pi.Errors, largest: float) -> str:
+    """Whether a record's start disagrees with the history it was given."""
+    item = errors.course
+    end = reduction.settled(item.v, largest) - item.first
+    if item.history is None or end < STARTS or len(errors.error) - end < STARTS:
+        return ""
+    start, rest = (float(np.sqrt(np.mean(part**2))) for part in (errors.error[:end], errors.error[end:]))
+    if start <= UNLIKE * rest:
+        return ""
+    return (
+        f"{item.name}: the first {end} samples, whose output depends on the history, are off by {start:.3g} rms "
+        f"against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out if in doubt"
+    )
 
 
 def _outside(name: str, v: NDArray[np.float64], allowed: tuple[float, float]) -> str:
@@ -297,6 +335,7 @@ def _parameters(
     r: NDArray[np.float64],
     p: NDArray[np.float64],
     offset: float,
+    history: tuple[float, ...] | None,
 ) -> Parameters:
     from hystgen.params import make_parameters
 
@@ -305,10 +344,18 @@ def _parameters(
         content["units"] = dict(units)
     content["input_range"] = list(drive)
     content["model"] = {
-        "pi": {"thresholds": r.tolist(), "weights": p.tolist(), "initial_state": 0.0},
+        "pi": {"thresholds": r.tolist(), "weights": p.tolist(), "initial_state": _start(r, history)},
         "output_offset": offset,
     }
     return make_parameters(content)
+
+
+def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float | list[float]:
+    """The start memory to write: after the history, or virgin; one number where all plays agree."""
+    if history is None or len(r) < 2:
+        return 0.0
+    states, _ = memory.project(reduction.start_states(np.zeros(1), history, r).tolist(), r.tolist())
+    return states[0] if len(set(states)) == 1 else list(states)
 
 
 def identifier_from(text: str) -> str:

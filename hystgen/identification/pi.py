@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 DIGITS = 10
 """Significant digits of fitted numbers: far below what a record tells, above what depends on the linear algebra."""
 
+DUST = 1e-12
+"""A weight of less than this share of their sum is rounding, not a play."""
+
 MOST_PLAYS = 1000
 
 
@@ -80,6 +83,10 @@ def solve(
     Raises IdentificationError.
     """
     reach = thresholds.largest([item for item in courses if item.used])
+    if reach == 0.0:
+        raise IdentificationError(
+            "once the start memory is known the drive does not move any more; record more cycles, or give --history"
+        )
     if isinstance(wanted, tuple):
         lists = [Candidate(wanted)]
     else:
@@ -97,6 +104,7 @@ def solve(
     chosen = thresholds.choose(reduced, lists)
     fitted = weights.fit(reduced, thresholds.columns(reduced, chosen), floor)
     p = np.array([rounded(float(x), DIGITS) for x in fitted.p])
+    p[p < DUST * float(np.sum(p))] = 0.0
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
         raise IdentificationError(

@@ -14,7 +14,7 @@ PATIENCE = 1.0
 class Progress:
     """Context manager; `tick` counts samples. Silent unless `shown`, stderr is a terminal and time has passed."""
 
-    def __init__(self, total: int, shown: bool) -> None:
+    def __init__(self, total: float, shown: bool) -> None:
         self._total = total
         self._shown = shown and sys.stderr.isatty()
         self._done = 0

@@ -61,6 +61,8 @@ def largest(courses: Sequence[Course]) -> float:
     for course in courses:
         low_end, high_end = course.drive_range
         wanted = LEAST_TRAVEL * (high_end - low_end)
+        if wanted == 0.0:
+            continue
         low, high = 0.0, float(np.ptp(course.v))
         for _ in range(40):
             middle = 0.5 * (low + high)

@@ -1,0 +1,57 @@
+"""What a model can do, in words."""
+
+from __future__ import annotations
+
+from hystgen.api import Model
+from hystgen.bounds import error_bounds
+from hystgen.models import DeadZone
+
+HARD_RATIO = 1e6
+
+
+def properties(model: Model) -> str:
+    """The text of `hystgen show`: ranges, slopes, loop width, invertible or why not, error bounds."""
+    c, p = model.cascade, model.parameters
+    pi = c.pi
+    drive, output = (f" {unit}" if unit else "" for unit in (p.units.input, p.units.output))
+    fronts = ["dead zone" if isinstance(stage, DeadZone) else "tanh envelope" for stage in c.stages]
+    lines = [
+        f"{model.name}: {pi.n} plays" + (f" behind {', '.join(fronts)}" if fronts else ""),
+        *([p.description] if p.description else []),
+        f"drive range        {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}",
+        f"input of the plays {c.play_range[0]:.6g} to {c.play_range[1]:.6g}",
+        f"output range       {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output}"
+        " (every drive history in range from the start memory)",
+        f"loop width         {pi.width:.6g} (input of the plays, full width, large loops)",
+        "slopes             " + ", ".join(f"{s:.6g}" for s in pi.slopes[:8]) + (", ..." if pi.n > 7 else ""),
+        f"slope ratio        {c.slope_ratio:.6g} (largest slope of the model over its smallest)",
+        f"start memory       {'projected to the admissible set' if pi.projected else 'as given'}",
+    ]
+    if p.model.pi.density is not None:
+        lines.append(f"density            loading curve within {p.model.pi.density_error:.3g}{output}")
+    problems = c.inverse_problems()
+    if problems:
+        lines += ["inverse            none:", *(f"    {problem}" for problem in problems)]
+    else:
+        lines.append(
+            f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} are "
+            f"answered with drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
+        )
+        for arithmetic in ("float32", "float64"):
+            bounds = error_bounds(c, arithmetic, model.engine())
+            lines.append(
+                f"error, {arithmetic}     forward {bounds.forward:.3g}{output}, inverse {bounds.inverse:.3g}{drive}"
+                " at most, against the exact model"
+            )
+    return "\n".join(lines)
+
+
+def warnings(model: Model) -> list[str]:
+    """What the user should know before relying on the model."""
+    ratio = model.cascade.slope_ratio
+    if ratio > HARD_RATIO and not model.cascade.inverse_problems():
+        return [
+            f"the slope ratio is {ratio:.3g}: the inverse amplifies rounding and model errors by as much; "
+            "raise p_0 or narrow input_range"
+        ]
+    return []
