@@ -1,14 +1,21 @@
-# Everything a newcomer needs: `make test` sets up .venv by itself.
+# `make demo` and `make test` set up .venv by themselves.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: test lint clean
+.PHONY: demo test lint clean
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
 	touch $@
+
+demo: $(VENV)/ready
+	mkdir -p examples/out
+	$(BIN)/hystgen identify examples/stage_recording.csv --holdout examples/stage_holdout.csv \
+	    -o examples/out/stage.yaml --units V,um --plot examples/out/stage.png
+	$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out
+	$(BIN)/hystgen verify examples/out/stage.yaml
 
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2
