@@ -17,7 +17,7 @@ demo: $(VENV)/ready
 	$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out
 	$(BIN)/hystgen verify examples/out/stage.yaml
 
-test: $(VENV)/ready
+test: $(VENV)/ready lint
 	$(BIN)/python -m pytest -n 2
 
 lint: $(VENV)/ready

@@ -38,11 +38,23 @@ _PLACES = {
 __all__ = [*sorted(_PLACES), "__version__"]
 
 if TYPE_CHECKING:
-    from hystgen.api import InverseModel, Model, differences, emit, identify, load, verify
-    from hystgen.models import PI, Cascade, DeadZone, InverseCascade, NotInvertibleError, TanhEnvelope
-    from hystgen.params import ParameterError, schema
-    from hystgen.simulation import Session
-    from hystgen.tables import FormatError
+    from hystgen.api import InverseModel as InverseModel
+    from hystgen.api import Model as Model
+    from hystgen.api import differences as differences
+    from hystgen.api import emit as emit
+    from hystgen.api import identify as identify
+    from hystgen.api import load as load
+    from hystgen.api import verify as verify
+    from hystgen.models import PI as PI
+    from hystgen.models import Cascade as Cascade
+    from hystgen.models import DeadZone as DeadZone
+    from hystgen.models import InverseCascade as InverseCascade
+    from hystgen.models import NotInvertibleError as NotInvertibleError
+    from hystgen.models import TanhEnvelope as TanhEnvelope
+    from hystgen.params import ParameterError as ParameterError
+    from hystgen.params import schema as schema
+    from hystgen.simulation import Session as Session
+    from hystgen.tables import FormatError as FormatError
 
 
 def __getattr__(name: str) -> Any:

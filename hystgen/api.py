@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,7 +101,10 @@ class InverseModel:
 
 
 def load(path: str | os.PathLike[str]) -> Model:
-    """The model of a parameter file. Raises ParameterError with every problem in the file; warns of a projected memory."""
+    """The model of a parameter file.
+
+    Raises ParameterError with every problem in the file; warns of a start memory that had to be projected.
+    """
     model = Model(load_parameters(path))
     if model.cascade.pi.projected:
         warnings.warn(
@@ -204,6 +207,5 @@ __all__ = [
     "emitted_files",
     "identify",
     "load",
-    "replace",
     "verify",
 ]

@@ -25,7 +25,7 @@ SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computati
 
 @dataclass(frozen=True)
 class ErrorBounds:
-    """Largest differences from the exact model: `forward` in output units, `inverse` in drive units (inf: no inverse)."""
+    """Largest differences from the exact model: `forward` in output, `inverse` in drive units (inf: no inverse)."""
 
     forward: float
     inverse: float

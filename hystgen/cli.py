@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,14 +23,13 @@ TARGETS = ("host", "cortex-m0plus", "cortex-m4f", "cortex-m7", "cortex-m33", "rv
 class _Failed(click.ClickException):
     """A check that failed (exit code 1) or input that cannot be used (2); the message says everything."""
 
-    exit_code: int
-
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
-        self.__dict__["exit_code"] = code
+        self.exit_code = code  # type: ignore[misc]  # click declares it on the class and reads it on the instance
 
     def show(self, file: Any = None) -> None:
-        click.echo(self.message, err=True)
+        """Print the message alone: it already says that it is an error."""
+        click.echo(self.message, file=file, err=True)
 
 
 def _shown(path: str, action: Callable[[], Any]) -> Any:
@@ -63,7 +63,9 @@ def _load(path: str) -> Model:
 
 
 params_argument = click.argument("params", type=click.Path())
-operator_option = click.option("--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's")
+operator_option = click.option(
+    "--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's"
+)
 arithmetic_option = click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="default: the file's")
 engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
 layout_option = click.option(
@@ -76,6 +78,9 @@ layout_option = click.option(
 @click.version_option(__version__, prog_name="hystgen")
 def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
+    from hystgen import compiled
+
+    compiled.announce = lambda: click.echo("compiling for this machine, once: about 20 s", err=True)
 
 
 @main.command()
@@ -127,6 +132,7 @@ def verify(
     Example: hystgen verify stage_x.yaml --compiler gcc --compiler clang
     """
     from hystgen import verification
+    from hystgen.records import write_atomically
     from hystgen.verification import compilers
 
     chosen = tuple(targets.split(","))
@@ -146,7 +152,7 @@ def verify(
     )
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
-            Path(file).write_text(text(), encoding="utf-8")
+            _shown(file, partial(write_atomically, file, text()))
     click.echo(report.table())
     if not report.ok:
         raise _Failed("verification failed", 1)
@@ -168,12 +174,21 @@ def _reading(columns: str | None, sample_time: float | None, delimiter: str | No
     return {"columns": mapping, "sample_time": sample_time, "delimiter": delimiter}
 
 
+def _write_record(target: Path, columns: dict[str, Any]) -> None:
+    from hystgen import records
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    records.write_columns(target, list(columns), list(columns.values()))
+
+
 _RECORD_OPTIONS = [
     click.option("--columns", metavar="t=Time,v=U,y=Pos", help="our names for the file's columns"),
     click.option("--sample-time", type=float, help="seconds, for files without time"),
     click.option("--delimiter", help="default: a comma"),
     click.option("--history", metavar="V,V,..", help="drive values visited before"),
-    click.option("--rest", type=float, default=0.0, help="seconds of pause; a model without dynamics does not see it"),
+    click.option(
+        "--rest", type=click.FloatRange(min=0), default=0.0, help="seconds of pause; a model without dynamics sees none"
+    ),
 ]
 
 
@@ -194,7 +209,7 @@ def record_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @record_options
 def simulate(
     params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
-    history: str | None, rest: float, **reading: Any,
+    history: str | None, rest: float, **reading: Any,  # noqa: ARG001  a model without dynamics sees no pause
 ) -> None:
     """Run the model (column v) or its inverse (column u) over records; several files are one session.
 
@@ -204,11 +219,13 @@ def simulate(
 
     if len(data) > 1 and output is None:
         raise _Failed("error: several records need -o with a folder", 2)
+    if len({Path(path).stem for path in data}) < len(data):
+        raise _Failed("error: two records have the same name; their results would overwrite each other", 2)
     model = _load(params)
     visited = _numbers(history)
     how = _reading(**reading)
     column, answer = ("v", "y") if operator == "forward" else ("u", "v")
-    read = [_shown(path, lambda path=path: records.read_record(path, need=(column,), **how)) for path in data]
+    read = [_shown(path, partial(records.read_record, path, need=(column,), **how)) for path in data]
     for record in read:
         for note in record.notes:
             click.echo(f"warning: {record.name}: {note}", err=True)
@@ -216,8 +233,13 @@ def simulate(
     session = _shown(params, lambda: model.session(operator, arithmetic, engine, clamp))
     if visited:
         session.visit(visited)
-    folder = output is not None and (len(data) > 1 or Path(output).is_dir())
-    for path, record in zip(data, read, strict=True):
+    targets: list[Path | None] = [Path(output) if output else None] * len(data)
+    if output and (len(data) > 1 or Path(output).is_dir()):
+        targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
+    for path, target in zip(data, targets, strict=True):
+        if target and target.resolve() == Path(path).resolve():
+            raise _Failed(f"error: {target} is a record and would be overwritten; choose another -o", 2)
+    for record, target in zip(read, targets, strict=True):
         columns = record.columns()
         signal = columns[column]
         answers, status = session.run(signal)
@@ -226,15 +248,10 @@ def simulate(
         if answer in columns:
             columns[f"{answer}_measured"] = columns.pop(answer)
         columns[answer] = answers
-        if output is None:
+        if target is None:
             click.echo(records.columns_text(list(columns), list(columns.values())), nl=False)
             continue
-        if folder:
-            Path(output).mkdir(parents=True, exist_ok=True)
-        target = Path(output) / f"{Path(path).stem}.csv" if folder else Path(output)
-        _shown(str(target), lambda target=target, columns=columns: records.write_columns(
-            target, list(columns), list(columns.values())
-        ))  # fmt: skip
+        _shown(str(target), partial(_write_record, target, columns))
         click.echo(str(target))
 
 

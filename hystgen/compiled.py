@@ -11,14 +11,26 @@ import functools
 import hashlib
 import inspect
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
+# Called once, before the first function is compiled that is not in the cache; a place for a word to the user
+announce: Callable[[], None] | None = None
 
-def compile_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNamespace:
-    """Compile `functions`, given callees first, so that they call each other's compiled form by name."""
+# The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+
+
+def compile_together(
+    functions: Sequence[Callable[..., Any]], inlined: Collection[Callable[..., Any]] = ()
+) -> types.SimpleNamespace:
+    """Compile `functions`, given callees first, so that they call each other's compiled form by name.
+
+    Those in `inlined` become part of their callers: handing over a model's many tables costs more than they compute.
+    """
     import numba
 
+    _listen()
     sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions)
     mark = hashlib.sha256(sources.encode()).hexdigest()[:12]
     made: dict[str, Any] = {}
@@ -28,7 +40,8 @@ def compile_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNam
         twin = types.FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
         twin.__qualname__ = f"{function.__qualname__}_{mark}"
         twin.__module__ = function.__module__
-        made[function.__name__] = numba.njit(cache=True, error_model="numpy")(twin)
+        how = {**OPTIONS, "inline": "always" if function in inlined else "never"}
+        made[function.__name__] = numba.njit(**how)(twin)
     return types.SimpleNamespace(**made)
 
 
@@ -44,12 +57,31 @@ def _constants(functions: Sequence[Callable[..., Any]]) -> str:
 
 
 @functools.cache
+def _listen() -> None:
+    """Have `announce` called when numba starts to compile."""
+    from numba.core import event
+
+    class FirstCompilation(event.Listener):
+        def on_start(self, _: Any) -> None:
+            global announce
+            if announce:
+                announce()
+                announce = None
+
+        def on_end(self, _: Any) -> None:
+            pass
+
+    register: Callable[[str, event.Listener], None] = event.register
+    register("numba:compile", FirstCompilation())
+
+
+@functools.cache
 def reference() -> types.SimpleNamespace:
     """The compiled bit reference (`hystgen.reference`)."""
     from hystgen import kernels
     from hystgen import reference as plain
 
-    return compile_together([kernels.tanh, kernels.atanh, *plain.COMPILED])
+    return compile_together([kernels.tanh, kernels.atanh, *plain.COMPILED], plain.INLINED)
 
 
 @functools.cache

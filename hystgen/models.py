@@ -7,6 +7,7 @@ actuator: stages in order from the drive, the play sum, an output offset and the
 from __future__ import annotations
 
 import bisect
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -54,7 +55,7 @@ class PI:
     def __post_init__(self) -> None:
         thresholds = _numbers(self.thresholds, "thresholds")
         weights = _numbers(self.weights, "weights")
-        if thresholds[0] != 0.0 or any(b <= a for a, b in zip(thresholds, thresholds[1:], strict=False)):
+        if thresholds[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(thresholds)):
             raise ValueError("thresholds start with 0 and rise strictly")
         if len(weights) != len(thresholds):
             raise ValueError(f"{len(thresholds)} thresholds but {len(weights)} weights")
@@ -158,7 +159,7 @@ class DeadZone:
     def __post_init__(self) -> None:
         thresholds = _numbers(self.thresholds, "thresholds")
         weights = _numbers(self.weights, "weights")
-        if any(b <= a for a, b in zip(thresholds, thresholds[1:], strict=False)) or 0.0 not in thresholds:
+        if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
             raise ValueError("dead-zone thresholds rise strictly and contain 0")
         if len(weights) != len(thresholds):
             raise ValueError(f"{len(thresholds)} thresholds but {len(weights)} weights")
@@ -472,7 +473,7 @@ class Cascade:
         ]
 
     def simulate(self, v: ArrayLike, clamp: bool = False) -> Array:
-        """Output for the drive samples `v` (N,) from the start memory, in double precision; `clamp` limits the drive."""
+        """Output for the drive samples `v` (N,) from the start memory, in double; `clamp` limits the drive."""
         from hystgen import simulation
 
         return simulation.simulate(self, v, clamp=clamp)

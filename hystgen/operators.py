@@ -7,6 +7,7 @@ the README.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED = [_play_into, _stop_into]
+COMPILED: list[Callable[..., Any]] = [_play_into, _stop_into]
 
 
 def _signal(v: ArrayLike) -> Array:

@@ -160,9 +160,19 @@ def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: S
 
 
 def write_atomically(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text file so that it is either the old one or complete."""
-    target = Path(path)
-    handle, temporary = tempfile.mkstemp(prefix=".hystgen-", dir=target.parent)
+    """Write a text file so that it is either the old one or complete.
+
+    A link stays a link, and what is no regular file (a pipe, a terminal) is written to in place. Raises OSError.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        target.write_bytes(text.encode())
+        return
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=".hystgen-", dir=target.parent)
+    except OSError as failure:
+        # Name the file that was asked for, not the temporary one
+        raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None
     try:
         with os.fdopen(handle, "wb") as out:
             out.write(text.encode())
@@ -190,16 +200,21 @@ def _count(number: int, what: str) -> str:
 
 
 class _Table:
-    """What a file holds before it is judged: names, and columns of numbers with NaN where there is no value."""
+    """What a file holds before it is judged: names, and columns of numbers with NaN where there is no value.
 
-    def __init__(self, numbers: dict[str, Array], ignored: Sequence[str] = (), lines: Array | None = None) -> None:
+    `lines`: the line of each row, where the file has lines and something may have to be said about one of them.
+    """
+
+    def __init__(
+        self, numbers: dict[str, Array], ignored: Sequence[str] = (), lines: Sequence[int] | None = None
+    ) -> None:
         self.numbers = numbers
         self.ignored = list(ignored)
         self._lines = lines
 
-    def place(self, row: int) -> str:
-        """Line of the file, or index of the sample where there are no lines."""
-        return f"sample {row}" if self._lines is None else f"line {int(self._lines[row])}"
+    def line(self, row: int) -> int | None:
+        """Line of the file that a row came from; None where the file has no lines."""
+        return None if self._lines is None else int(self._lines[row])
 
 
 class _Reader:
@@ -366,13 +381,11 @@ class _Reader:
     def _renamed(self, numbers: Mapping[str, Array], chosen: Mapping[str, str]) -> dict[str, Array]:
         """Columns under our names; a column of the file that happens to bear a taken name gives way."""
         theirs = set(chosen.values())
-        others = {
-            name: x for name, x in numbers.items() if name not in theirs and name and name not in chosen
-        }
+        others = {name: x for name, x in numbers.items() if name not in theirs and name and name not in chosen}
         return {**{ours: numbers[name] for ours, name in chosen.items()}, **others}
 
     def _fast(self, body: str, names: list[str], chosen: Mapping[str, str]) -> _Table | None:
-        """All cells at once by numpy's C reader; None when there is anything that it does not take."""
+        """All cells at once by numpy's C reader; None when there is anything that has to be dropped or told."""
         if len(set(names)) != len(names) or "#" in body:
             return None
         try:
@@ -383,7 +396,9 @@ class _Reader:
             return None
         if cells.shape[1] != len(names) or not np.isfinite(cells).all():
             return None
-        return _Table(self._renamed({n: np.ascontiguousarray(cells[:, k]) for k, n in enumerate(names)}, chosen))
+        numbers = self._renamed({n: np.ascontiguousarray(cells[:, k]) for k, n in enumerate(names)}, chosen)
+        rises = "t" not in numbers or bool(np.all(np.diff(numbers["t"]) > 0.0))
+        return _Table(numbers) if rises else None
 
     def _slow(self, body: str, names: list[str], chosen: Mapping[str, str], line: int) -> _Table:
         """Line by line: finds what is wrong and where, and takes what is merely missing."""
@@ -401,8 +416,8 @@ class _Reader:
             if len(cells) != len(names):
                 bad += 1
                 if bad <= LISTED:
-                    self.problem(f"{_count(len(cells), 'column')} where the header has {len(names)}; "
-                                 "complete or remove the line", line, 1)
+                    found = _count(len(cells), "column")
+                    self.problem(f"{found} where the header has {len(names)}; complete or remove the line", line)
                 continue
             lines.append(line)
             for k, column in values.items():
@@ -434,9 +449,7 @@ class _Reader:
             if k not in text_columns:
                 numbers[names[k]] = np.array(values[k], dtype=np.float64)
                 numbers[names[k]][~np.isfinite(numbers[names[k]])] = np.nan
-        return _Table(
-            self._renamed(numbers, chosen), [names[k] for k in sorted(text_columns)], np.array(lines, dtype=np.float64)
-        )
+        return _Table(self._renamed(numbers, chosen), [names[k] for k in sorted(text_columns)], lines)
 
     # -- what a record has to be -------------------------------------------------------------------------------------
 
@@ -459,9 +472,7 @@ class _Reader:
         samples = int(np.count_nonzero(keep))
         shortest = SHORTEST if fit else 1
         if samples < shortest and not self.problems:
-            self.problem(
-                f"has {_count(samples, 'sample')}, at least {shortest} are needed; record for longer"
-            )
+            self.problem(f"has {_count(samples, 'sample')}, at least {shortest} are needed; record for longer")
         elif fit and samples and "v" in kept and float(np.ptp(kept["v"])) == 0.0:
             self.problem(
                 f"the drive v is {kept['v'][0]:g} throughout; a fit needs a drive that moves, check the columns"
@@ -483,14 +494,17 @@ class _Reader:
         number = int(np.count_nonzero(wrong))
         if not number:
             return
-        first = table.place(int(np.argmax(wrong)))
+        row = int(np.argmax(wrong))
+        line = table.line(row)
+        first = f"the first at index {row}" if line is None else f"the first in line {line}"
         if number > REPAIRABLE * length:
             self.problem(
-                f"{number} of {length} samples are {which}, the first at {first}; more than "
-                f"{100 * REPAIRABLE:g} % is not repaired, record or export again"
+                f"{number} of {length} samples are {which}, {first}; more than {100 * REPAIRABLE:g} % is not repaired, "
+                "record or export again",
+                line,
             )
         else:
-            self.notes.append(f"{_count(number, 'sample')} {which} dropped, the first at {first}")
+            self.notes.append(f"{_count(number, 'sample')} {which} dropped, {first}")
 
     def _rising(self, table: _Table, t: Array, keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Keep the samples whose time is later than all before them."""

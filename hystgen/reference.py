@@ -9,6 +9,7 @@ type.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,7 +59,7 @@ class State(NamedTuple):
     """One instance: plain arrays."""
 
     real: Reals
-    count: Counts
+    counts: Counts
     extremum: Reals
     tail: Reals
     end: Counts
@@ -72,7 +73,7 @@ def new_state(t: Tables) -> State:
     dtype = t.threshold.dtype
     return State(
         real=np.zeros(9, dtype),
-        count=np.zeros(9, np.int64),
+        counts=np.zeros(9, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         tail=np.zeros(max(n, 1), dtype),
         end=np.zeros(max(n, 1), np.int64),
@@ -121,9 +122,9 @@ def held(t: Tables, s: State, c: int, k: int) -> Any:
 
 def corners_settle(t: Tables, s: State) -> None:
     """Bring tail, base and next up to date after k, depth or the direction have changed."""
-    k = s.count[K]
-    rising = s.count[RISING]
-    depth = s.count[DEPTH]
+    k = s.counts[K]
+    rising = s.counts[RISING]
+    depth = s.counts[DEPTH]
     if depth > 0:
         s.real[TAIL] = held(t, s, depth - 1, k)
         s.real[NEXT] = activation(s, depth - 1, t.threshold[k], rising)
@@ -142,10 +143,10 @@ def corners_settle(t: Tables, s: State) -> None:
 def corners_advance(t: Tables, s: State) -> None:
     """The move has passed `next`: find the plays that follow now."""
     w = s.real[W]
-    rising = s.count[RISING]
+    rising = s.counts[RISING]
     low = 0
-    left = s.count[DEPTH]
-    k = s.count[K]
+    left = s.counts[DEPTH]
+    k = s.counts[K]
     probe = left
     while low < left:
         c = probe - 1
@@ -169,8 +170,8 @@ def corners_advance(t: Tables, s: State) -> None:
             probe = (k + high) // 2
             if probe > k + stride - 1:
                 probe = k + stride - 1
-    s.count[DEPTH] = left
-    s.count[K] = k
+    s.counts[DEPTH] = left
+    s.counts[K] = k
     corners_settle(t, s)
 
 
@@ -178,15 +179,15 @@ def corners_rest(t: Tables, s: State, w: Any) -> None:
     """Memory at rest: every play holds w."""
     n = len(t.threshold) - 1
     s.real[W] = w
-    s.count[K] = 1
-    s.count[DEPTH] = 0
-    s.count[RISING] = 1
+    s.counts[K] = 1
+    s.counts[DEPTH] = 0
+    s.counts[RISING] = 1
     if n > 0:
         s.extremum[0] = w
         s.tail[0] = t.limits[ZERO]
         s.end[0] = n + 1
         s.side[0] = 0
-        s.count[DEPTH] = 1
+        s.counts[DEPTH] = 1
     corners_settle(t, s)
 
 
@@ -194,9 +195,9 @@ def corners_start(t: Tables, s: State, play: Reals) -> None:
     """Memory with a state of its own for each play: one corner a play."""
     n = len(t.threshold) - 1
     s.real[W] = play[0]
-    s.count[K] = 1
-    s.count[DEPTH] = n
-    s.count[RISING] = 1
+    s.counts[K] = 1
+    s.counts[DEPTH] = n
+    s.counts[RISING] = 1
     for j in range(n):
         s.extremum[j] = play[n - j]
         if j > 0:
@@ -212,8 +213,8 @@ def push_corner(s: State, c: int) -> None:
     """Write the corner that turning back leaves into slot c."""
     s.extremum[c] = s.real[W]
     s.tail[c] = s.real[TAIL]
-    s.end[c] = s.count[K]
-    if s.count[RISING]:
+    s.end[c] = s.counts[K]
+    if s.counts[RISING]:
         s.side[c] = -1
     else:
         s.side[c] = 1
@@ -221,22 +222,22 @@ def push_corner(s: State, c: int) -> None:
 
 def corners_absorb(t: Tables, s: State, w: Any) -> None:
     """Move the input of the plays to w."""
-    rising = s.count[RISING]
+    rising = s.counts[RISING]
     if (rising and w < s.real[W]) or (not rising and w > s.real[W]):
-        if s.count[K] > 1:
-            push_corner(s, s.count[DEPTH])
-            s.count[DEPTH] += 1
-        s.count[RISING] = 1 - rising
-        s.count[K] = 1
+        if s.counts[K] > 1:
+            push_corner(s, s.counts[DEPTH])
+            s.counts[DEPTH] += 1
+        s.counts[RISING] = 1 - rising
+        s.counts[K] = 1
         corners_settle(t, s)
     s.real[W] = w
-    if reached(w, s.real[NEXT], s.count[RISING]):
+    if reached(w, s.real[NEXT], s.counts[RISING]):
         corners_advance(t, s)
 
 
 def corners_output(t: Tables, s: State) -> Any:
     """Output of the play sum for the memory as it is."""
-    return s.real[BASE] + s.real[W] * t.slope[s.count[K]]
+    return s.real[BASE] + s.real[W] * t.slope[s.counts[K]]
 
 
 # ---------------------------------------------------------------- corners_solve.c
@@ -279,18 +280,15 @@ def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: 
             if probe > k + stride - 1:
                 probe = k + stride - 1
         base = held(t, s, c, k)
-    if rising:
-        base = base - t.lift[k]
-    else:
-        base = base + t.lift[k]
+    base = base - t.lift[k] if rising else base + t.lift[k]
     return (output - base) * t.inverse_slope[k]
 
 
 def corners_solve(t: Tables, s: State, output: Any) -> Any:
     """Input of the plays that gives `output`; moves nothing."""
-    k = s.count[K]
-    rising = s.count[RISING]
-    depth = s.count[DEPTH]
+    k = s.counts[K]
+    rising = s.counts[RISING]
+    depth = s.counts[DEPTH]
     w = (output - s.real[BASE]) * t.inverse_slope[k]
     if (rising and w >= s.real[W]) or (not rising and w <= s.real[W]):
         if not reached(w, s.real[NEXT], rising):
@@ -464,12 +462,12 @@ def solve(t: Tables, s: State, u: Any) -> Any:
 
 def begin(t: Tables, s: State, applied: Any) -> None:
     """What init and reset have in common once the plays are set."""
-    s.count[ASCENDING] = 1
-    s.count[HAS_PENDING] = 0
-    s.count[REPEAT] = 0
-    s.count[STEPPED] = 0
-    s.count[BITS] = 0
-    s.count[STATUS] = 0
+    s.counts[ASCENDING] = 1
+    s.counts[HAS_PENDING] = 0
+    s.counts[REPEAT] = 0
+    s.counts[STEPPED] = 0
+    s.counts[BITS] = 0
+    s.counts[STATUS] = 0
     s.real[PENDING] = applied
     s.real[APPLIED] = applied
     s.real[LEVEL] = output(t, s)
@@ -492,11 +490,11 @@ def see_drive(t: Tables, s: State, v: Any) -> None:
     """The actuator sees drive v: its own move picks the branch."""
     if t.branches:
         if v > s.real[APPLIED]:
-            s.count[ASCENDING] = 1
+            s.counts[ASCENDING] = 1
         elif v < s.real[APPLIED]:
-            s.count[ASCENDING] = 0
+            s.counts[ASCENDING] = 0
     s.real[APPLIED] = v
-    absorb(t, s, front_forward(t, v, s.count[ASCENDING]))
+    absorb(t, s, front_forward(t, v, s.counts[ASCENDING]))
 
 
 def finite(t: Tables, x: Any) -> bool:
@@ -507,14 +505,14 @@ def finite(t: Tables, x: Any) -> bool:
 def forward_step(t: Tables, s: State, v: Any) -> Any:
     """One sample of the forward operator."""
     if not finite(t, v):
-        s.count[STATUS] |= HELD
+        s.counts[STATUS] |= HELD
         return s.real[ANSWER]
     if v < t.limits[DRIVE_MIN]:
         v = t.limits[DRIVE_MIN]
-        s.count[STATUS] |= INPUT_CLAMPED
+        s.counts[STATUS] |= INPUT_CLAMPED
     elif v > t.limits[DRIVE_MAX]:
         v = t.limits[DRIVE_MAX]
-        s.count[STATUS] |= INPUT_CLAMPED
+        s.counts[STATUS] |= INPUT_CLAMPED
     see_drive(t, s, v)
     s.real[ANSWER] = output(t, s)
     return s.real[ANSWER]
@@ -524,8 +522,8 @@ def answer(s: State, v: Any) -> Any:
     """Leave drive v pending and return it."""
     s.real[ANSWER] = v
     s.real[PENDING] = v
-    s.count[HAS_PENDING] = 1
-    s.count[STEPPED] = 1
+    s.counts[HAS_PENDING] = 1
+    s.counts[STEPPED] = 1
     return v
 
 
@@ -541,13 +539,13 @@ def clamp_drive(t: Tables, v: Any) -> Any:
 def fits(s: State, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
     if v == s.real[APPLIED]:
-        return bool(s.count[ASCENDING] == ascending)
+        return bool(s.counts[ASCENDING] == ascending)
     return bool((v > s.real[APPLIED]) == (ascending != 0))
 
 
 def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
     """The drive on the branch of its own move: that of u's move first, the other one next, else no move."""
-    up = s.count[ASCENDING]
+    up = s.counts[ASCENDING]
     if u > s.real[LEVEL]:
         up = 1
     elif u < s.real[LEVEL]:
@@ -556,7 +554,7 @@ def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
     if fits(s, v, up):
         return v, limited
     back = v - s.real[APPLIED]
-    if up == s.count[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+    if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
         return s.real[APPLIED], limited
     v, limited = front_inverse(t, w, 1 - up)
     if fits(s, v, 1 - up):
@@ -566,20 +564,20 @@ def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
 
 def inverse_step(t: Tables, s: State, u: Any) -> Any:
     """One sample of the inverse operator."""
-    if s.count[HAS_PENDING]:
+    if s.counts[HAS_PENDING]:
         see_drive(t, s, s.real[PENDING])
-        s.count[HAS_PENDING] = 0
+        s.counts[HAS_PENDING] = 0
     if not finite(t, u):
-        s.count[STATUS] |= HELD
-        if s.count[STEPPED]:
+        s.counts[STATUS] |= HELD
+        if s.counts[STEPPED]:
             return answer(s, s.real[ANSWER])
         return answer(s, clamp_drive(t, s.real[APPLIED]))
-    if s.count[REPEAT] and u == s.real[REFERENCE]:
-        s.count[STATUS] |= s.count[BITS]
+    if s.counts[REPEAT] and u == s.real[REFERENCE]:
+        s.counts[STATUS] |= s.counts[BITS]
         return answer(s, s.real[ANSWER])
     bits = 0
     s.real[REFERENCE] = u
-    s.count[REPEAT] = 1
+    s.counts[REPEAT] = 1
     if u < t.limits[OUTPUT_MIN]:
         u = t.limits[OUTPUT_MIN]
         bits = bits | INPUT_CLAMPED
@@ -597,22 +595,22 @@ def inverse_step(t: Tables, s: State, u: Any) -> Any:
     inside = clamp_drive(t, v)
     if inside != v:
         bits = bits | OUTPUT_CLAMPED
-    s.count[BITS] = bits
-    s.count[STATUS] |= bits
+    s.counts[BITS] = bits
+    s.counts[STATUS] |= bits
     return answer(s, inside)
 
 
 def inverse_commit(t: Tables, s: State, applied: Any) -> None:
     """What the drive really applied in place of the last answer."""
     if not finite(t, applied):
-        s.count[STATUS] |= HELD
+        s.counts[STATUS] |= HELD
         return
     v = clamp_drive(t, applied)
     if v != applied:
-        s.count[STATUS] |= INPUT_CLAMPED
+        s.counts[STATUS] |= INPUT_CLAMPED
     s.real[PENDING] = v
-    s.count[HAS_PENDING] = 1
-    s.count[REPEAT] = 0
+    s.counts[HAS_PENDING] = 1
+    s.counts[REPEAT] = 0
 
 
 def reset(t: Tables, s: State) -> None:
@@ -636,14 +634,20 @@ def run(t: Tables, s: State, inverse: int, op: Counts, x: Reals, answers: Reals,
             else:
                 forward_step(t, s, x[i])
         answers[i] = s.real[ANSWER] if op[i] == OP_STEP else t.limits[ZERO]
-        status[i] = s.count[STATUS]
-        s.count[STATUS] = 0
+        status[i] = s.counts[STATUS]
+        s.counts[STATUS] = 0
 
 
-COMPILED = [
+COMPILED: list[Callable[..., Any]] = [
     activation, reached, held, corners_settle, corners_advance, corners_rest, corners_start, push_corner,
     corners_absorb, corners_output, level, corners_locate, corners_solve, loop_rest, loop_start, loop_absorb,
     loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse, rest,
     absorb, output, solve, begin, init, see_drive, finite, forward_step, answer, clamp_drive, fits, choose_branch,
     inverse_step, inverse_commit, reset, run,
 ]  # fmt: skip  (callees before callers)
+
+# What every sample goes through
+INLINED: set[Callable[..., Any]] = {
+    reached, corners_absorb, push_corner, corners_output, corners_solve, absorb, output, solve, see_drive, finite,
+    forward_step, answer, clamp_drive,
+}  # fmt: skip

@@ -43,7 +43,9 @@ def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
     return a, b
 
 
-def _stage_numbers(stage: DeadZone | TanhEnvelope, low: float, high: float, clamp: bool) -> tuple[int, int, list[float]]:
+def _stage_numbers(
+    stage: DeadZone | TanhEnvelope, low: float, high: float, clamp: bool
+) -> tuple[int, int, list[float]]:
     if isinstance(stage, TanhEnvelope):
         numbers = []
         for ascending in (True, False):
@@ -89,13 +91,14 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
     lift = [math.fsum(products[:k]) for k in range(n + 2)]
     bounded = clamp and all(math.isfinite(end) for end in cascade.input_range)
 
+    ranges = cascade.stage_ranges(True)
     kinds: list[int] = []
     firsts: list[int] = []
     sizes: list[int] = []
     numbers: list[float] = []
     for j, stage in enumerate(cascade.stages):
         assert isinstance(stage, DeadZone | TanhEnvelope)
-        low, high = cascade.stage_ranges(True)[j]
+        low, high = ranges[j]
         kind, size, data = _stage_numbers(stage, low, high, bounded)
         kinds.append(kind)
         firsts.append(len(numbers))
@@ -112,7 +115,7 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
     else:
         limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
     limits[reference.OFFSET] = cascade.output_offset
-    if not any(stage.inverse_problems(*ends) for stage, ends in zip(cascade.stages, cascade.stage_ranges(True), strict=True)):
+    if not any(stage.inverse_problems(*ends) for stage, ends in zip(cascade.stages, ranges, strict=True)):
         # the drive that the start memory stands for: held before any sample, and where the first move starts
         for place, w in ((reference.START_APPLIED, pi.start[0]), (reference.RESET_APPLIED, 0.0)):
             limits[place] = float(cascade.front_inverse(w))
@@ -137,12 +140,12 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
         tanh=kernels.tanh_tables(dtype),
         atanh=kernels.atanh_tables(dtype),
     )
-    for kind, place in zip(kinds, firsts, strict=True):
+    for kind, first in zip(kinds, firsts, strict=True):
         if kind == reference.TANH:
-            tables.stage_data[[place + 6, place + 13]] = np.nextafter(dtype(1), dtype(0))
+            tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))
-        size = w * sum(abs(p) for p in pi.weights) + abs(lift[-1]) + abs(cascade.output_offset)
-        most = 4 * max(size, w, pi.thresholds[-1]) * max(1.0, float(np.max(tables.inverse_slope)))
+        output = w * sum(abs(p) for p in pi.weights) + abs(lift[-1]) + abs(cascade.output_offset)
+        most = 4 * max(output, w, pi.thresholds[-1]) * max(1.0, float(np.max(tables.inverse_slope)))
         reals([most], "intermediate results")
     return tables

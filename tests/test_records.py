@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 
@@ -53,7 +54,9 @@ class TestRead:
         assert np.array_equal(record.v, 0.25 * np.arange(N))
 
     def test_scientific_notation_quotes_blank_lines_and_comments(self, tmp_path: Path) -> None:
-        text = '# logger 7\n\n"t" , "v","y"\n' + "".join(f'{k}e-3, "{k}.5E+0",-1.25e{k % 3}\n\n# {k}\n' for k in range(N))
+        text = '# logger 7\n\n"t" , "v","y"\n' + "".join(
+            f'{k}e-3, "{k}.5E+0",-1.25e{k % 3}\n\n# {k}\n' for k in range(N)
+        )
         (tmp_path / "a.csv").write_text(text)
         record = read_record(tmp_path / "a.csv")
         assert record.t[3] == 3e-3
@@ -126,7 +129,7 @@ class TestRead:
             record = read_record(tmp_path / name)
             assert np.array_equal(record.v, np.delete(v, 5))
             assert list(record.extra) == ["temperature"]
-            assert "1 sample without a value in v or y or t dropped, the first at sample 5" in record.notes
+            assert "1 sample without a value in v or y or t dropped, the first at index 5" in record.notes
             assert any("comment" in note for note in record.notes)
 
     def test_section(self, tmp_path: Path) -> None:
@@ -154,7 +157,7 @@ class TestRepair:
         record = read_record(write(tmp_path / "a.csv", cells))
         assert len(record) == 97
         assert np.isfinite(record.v).all()
-        assert record.notes[0] == "3 samples without a value in v or y or t dropped, the first at line 9"
+        assert record.notes[0] == "3 samples without a value in v or y or t dropped, the first in line 9"
         assert "1 gap" not in record.notes[0]
 
     def test_time_that_does_not_rise_is_dropped_and_counted(self, tmp_path: Path) -> None:
@@ -164,7 +167,7 @@ class TestRepair:
         record = read_record(write(tmp_path / "a.csv", cells))
         assert len(record) == 98
         assert (np.diff(record.t) > 0).all()
-        assert record.notes == ("2 samples not later than the sample before dropped, the first at line 22",)
+        assert record.notes == ("2 samples not later than the sample before dropped, the first in line 22",)
 
     def test_gaps_are_kept_and_counted(self, tmp_path: Path) -> None:
         cells = rows(100)
@@ -185,15 +188,36 @@ class TestRepair:
         cells[15][2] = "nan"
         (problem,) = problems(write(tmp_path / "b.csv", cells))
         assert problem == (
-            ": error: 6 of 100 samples are without a value in v or y or t, the first at line 12; more than 5 % is not "
-            "repaired, record or export again"
+            ":12:1: error: 6 of 100 samples are without a value in v or y or t, the first in line 12; more than 5 % is "
+            "not repaired, record or export again"
+        )
+        values = {name: column.copy() for name, column in zip("tvy", np.array(cells, dtype=float).T, strict=True)}
+        np.savez(tmp_path / "b.npz", **values)
+        (problem,) = problems(tmp_path / "b.npz")
+        assert problem.startswith(
+            ": error: 6 of 100 samples are without a value in v or y or t, the first at index 10;"
         )
 
     def test_time_that_goes_back_for_good_is_refused(self, tmp_path: Path) -> None:
         cells = rows(100)
         cells[10][0] = "1e6"
         (problem,) = problems(write(tmp_path / "a.csv", cells))
-        assert "89 of 100 samples are not later than the sample before, the first at line 13" in problem
+        assert problem == (
+            ":13:1: error: 89 of 100 samples are not later than the sample before, the first in line 13; more than 5 % "
+            "is not repaired, record or export again"
+        )
+
+    def test_lines_count_comments_and_blank_lines(self, tmp_path: Path) -> None:
+        cells = rows(100)
+        cells[20][0] = cells[19][0]
+        lines = ["# logger", "", "t,v,y", *(",".join(row) for row in cells)]
+        lines[10:10] = ["", "# paused", ""]
+        (tmp_path / "a.csv").write_text("\n".join(lines))
+        place = lines.index(",".join(cells[20])) + 1
+        assert place == 20 + 4 + 3
+        assert read_record(tmp_path / "a.csv").notes == (
+            f"1 sample not later than the sample before dropped, the first in line {place}",
+        )
 
 
 class TestRefuse:
@@ -221,8 +245,8 @@ class TestRefuse:
             ':1:1: error: there is no column "v" among Time [s], Voltage (V), Chan3; did you mean --columns '
             '"v=Voltage (V)"?',
             ':1:1: error: there is no column "y" among Time [s], Voltage (V), Chan3; name it with --columns "y=COLUMN"',
-            ':1:1: error: there is no column "t" among Time [s], Voltage (V), Chan3; give --sample-time, or did you mean '
-            '--columns "t=Time [s]"?',
+            ':1:1: error: there is no column "t" among Time [s], Voltage (V), Chan3; give --sample-time, or did you '
+            'mean --columns "t=Time [s]"?',
         ]
         (problem,) = problems(path, columns={"t": "Time [s]", "v": "voltage (V)", "y": "Chan3"})
         assert 'there is no column "voltage (V)"' in problem
@@ -286,7 +310,9 @@ class TestRefuse:
     @pytest.mark.parametrize("name", ["a.h5", "a.parquet"])
     def test_forms_of_a_later_version(self, tmp_path: Path, name: str) -> None:
         (tmp_path / name).write_bytes(b"PAR1")
-        assert "files are not read by this version; export CSV, .npz or MATLAB .mat (v5)" in problems(tmp_path / name)[0]
+        assert (
+            "files are not read by this version; export CSV, .npz or MATLAB .mat (v5)" in problems(tmp_path / name)[0]
+        )
 
     def test_matlab_7_3_and_damaged_archives(self, tmp_path: Path) -> None:
         (tmp_path / "a.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b" " * 500)
@@ -327,11 +353,13 @@ class TestWriteColumns:
         write_columns(tmp_path / "a.csv", ("t", "v", "y"), (np.arange(100) * 0.1, v, v[::-1]))
         record = read_record(tmp_path / "a.csv")
         assert np.array_equal(record.v, v)
-        assert (tmp_path / "a.csv").read_text().splitlines()[:2] == ["t,v,y", f"0.0,{v[0]!r},{v[-1]!r}"]
+        assert (tmp_path / "a.csv").read_text().splitlines()[:2] == ["t,v,y", f"0.0,{float(v[0])!r},{float(v[-1])!r}"]
 
     def test_other_types_and_names(self, tmp_path: Path) -> None:
         write_columns(
-            tmp_path / "a.csv", ("a,b", "n"), (np.array([0.1, 1e-30], dtype=np.float32), np.array([1, -2], dtype=np.int16))
+            tmp_path / "a.csv",
+            ("a,b", "n"),
+            (np.array([0.1, 1e-30], dtype=np.float32), np.array([1, -2], dtype=np.int16)),
         )
         assert (tmp_path / "a.csv").read_text() == '"a,b",n\n0.1,1\n1e-30,-2\n'
 
@@ -343,10 +371,30 @@ class TestWriteColumns:
         (tmp_path / "folder").mkdir()
         with pytest.raises(OSError, match=r"\S"):
             write_columns(tmp_path / "folder", ("a",), (np.zeros(2),))
-        with pytest.raises(OSError, match=r"\S"):
-            write_columns(tmp_path / "none" / "a.csv", ("a",), (np.zeros(2),))
+        lost = tmp_path / "none" / "a.csv"
+        with pytest.raises(OSError, match=r"\S") as caught:
+            write_columns(lost, ("a",), (np.zeros(2),))
+        assert str(caught.value) == f"[Errno 2] No such file or directory: '{lost}'"
         assert target.read_text() == "old"
         assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "folder"]
+
+    def test_a_link_stays_a_link(self, tmp_path: Path) -> None:
+        (tmp_path / "real.csv").write_text("old")
+        (tmp_path / "link.csv").symlink_to("real.csv")
+        write_columns(tmp_path / "link.csv", ("a",), (np.zeros(1),))
+        assert (tmp_path / "link.csv").is_symlink()
+        assert (tmp_path / "real.csv").read_text() == "a\n0.0\n"
+
+    def test_a_pipe_is_written_to_and_not_replaced(self, tmp_path: Path) -> None:
+        pipe = tmp_path / "pipe"
+        os.mkfifo(pipe)
+        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+        try:
+            write_columns(pipe, ("a",), (np.zeros(1),))
+            assert os.read(reader, 100) == b"a\n0.0\n"
+        finally:
+            os.close(reader)
+        assert pipe.is_fifo()
 
     def test_usual_rights(self, tmp_path: Path) -> None:
         (tmp_path / "plain").write_text("")

@@ -87,7 +87,7 @@ def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[st
         )
     if shared:
         made.update(runtime_files(options.arithmetic))
-    samples = selftest.operators(values.numbers, options, cascade)
+    samples = selftest.operators(values.numbers, options)
     for ending, about in ((".h", f"checks {name} on the target"), (".c", "recorded samples and their exact answers")):
         file = f"{name}_selftest{ending}"
         made[file] = render(f"selftest{ending}.j2", values, banner=_banner(values, file, about), operators=samples)

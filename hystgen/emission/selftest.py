@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hystgen import reference
 from hystgen.emission.text import literal
-from hystgen.models import Cascade
 
 if TYPE_CHECKING:
     from hystgen.emission.module import Options
@@ -26,12 +26,12 @@ def _fractions(length: int) -> list[float]:
         seed = (seed * 1103515245 + 12345) % 2**31
         points.append((seed >> 12) / 2**19)
     path = []
-    for a, b in zip(points, points[1:], strict=False):
+    for a, b in itertools.pairwise(points):
         path += [a + (b - a) * part / 3 for part in range(3)]
     return path
 
 
-def operators(numbers: reference.Tables, options: Options, cascade: Cascade) -> list[dict[str, Any]]:
+def operators(numbers: reference.Tables, options: Options) -> list[dict[str, Any]]:
     """One entry an operator: its name and its samples as C text."""
     found = []
     for name in ("forward", "inverse"):

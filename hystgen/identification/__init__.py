@@ -212,9 +212,20 @@ def identify(
     high = max(item.drive_range[1] for item in compared)
     if held:
         settled = [pi.resettled(item, float(r[-1]), skip) for item in held]
+        for item in settled:
+            if item.used < SHORTEST:
+                raise IdentificationError(
+                    f"{item.name} is held out, but only {item.used} of its samples can be compared once its start "
+                    f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
+                )
         rows.append(pi.row("held out", "written", [pi.compare(item, r, p) for item in settled], [skip] * len(held)))
         told += [text for item in held if (text := _outside(item.name, item.v, (low, high)))]
     offset = rounded(errors[0].offset, pi.DIGITS)
+    told += [
+        f"{item.name}: only {item.used} samples are left once its start memory is known; it hardly counts"
+        for item in compared
+        if item.used < SHORTEST
+    ]
     told += [text for each in errors if (text := _about_start(each, float(r[-1])))]
     told += _about_model(solution, wanted, compared, own)
     return Fit(_parameters(name, units, (low, high), r, p, offset, before), tuple(rows), tuple(told), before)

@@ -6,6 +6,7 @@ implements it, on the triangular system of `reduction`, whose offsets are projec
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,14 @@ Array = NDArray[np.float64]
 
 STILL = 1e-9
 """A play that moves less than this share of the drive is one that does not move."""
+
+TIE = 1e-10
+"""Weight of the tie break between solutions that fit equally well, as a share of the squared output.
+
+Where the drive stays between few turning points several plays move alike, and how the weight is divided among them is
+left to rounding. Of such solutions the one with the least sum of squares is taken. A play that moves on its own by more
+than a thousandth keeps its weight to about a ten-thousandth part.
+"""
 
 FLOOR_COST = 0.05
 """How much the rms error may grow, as a share of itself, for p_0 to be raised to its floor."""
@@ -32,11 +41,15 @@ def _solve(matrix: Array, target: Array) -> Array:
 
     size = np.linalg.norm(matrix, axis=0)
     moving = size > STILL * size[0]
+    length = float(np.linalg.norm(target))
     weights = np.zeros(len(size))
-    if moving.any() and np.any(target):
-        # Columns of length one: the solution is the same and the solver's tolerance fits each of them
-        scaled, _ = nnls(matrix[:, moving] / size[moving], target, maxiter=100 * len(size))
-        weights[moving] = scaled / size[moving]
+    if moving.any() and length > 0.0:
+        # Columns and target of length one: the solution is the same, whatever the units, and the solver's absolute
+        # tolerance fits all of them
+        n = int(np.count_nonzero(moving))
+        unit = np.concatenate([matrix[:, moving] / size[moving], math.sqrt(TIE) * np.eye(n)])
+        scaled, _ = nnls(unit, np.concatenate([target / length, np.zeros(n)]), maxiter=100 * n)
+        weights[moving] = scaled * length / size[moving]
     return weights
 
 

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-WARNINGS = (
-    "-Wall -Wextra -pedantic -Wconversion -Wsign-conversion -Wdouble-promotion -Wshadow -Wundef -Wcast-qual "
-    "-Wvla -Werror"
-).split()
+WARNINGS = [
+    "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow", "-Wundef",
+    "-Wcast-qual", "-Wvla", "-Werror",
+]  # fmt: skip
 C_WARNINGS = [*WARNINGS, "-Wmissing-prototypes", "-Wstrict-prototypes"]
 
 # The strict build, and the one a user makes who passes nothing: gcc's and clang's default dialect, contraction allowed
