@@ -19,12 +19,12 @@ Array = NDArray[np.float64]
 STILL = 1e-9
 """A play that moves less than this share of the drive is one that does not move."""
 
-TIE = 1e-10
+TIE = 1e-12
 """Weight of the tie break between solutions that fit equally well, as a share of the squared output.
 
 Where the drive stays between few turning points several plays move alike, and how the weight is divided among them is
-left to rounding. Of such solutions the one with the least sum of squares is taken. A play that moves on its own by more
-than a thousandth keeps its weight to about a ten-thousandth part.
+left to rounding. Of such solutions the one with the least sum of squares is taken. A play of which a thousandth part
+moves like no other keeps its weight to about six digits.
 """
 
 FLOOR_COST = 0.05
