@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 DIGITS = 10
 """Significant digits of fitted numbers: far below what a record tells, above what depends on the linear algebra."""
 
-DUST = 1e-12
+DUST = 1e-9
 """A weight of less than this share of their sum is rounding, not a play."""
 
 MOST_PLAYS = 1000
