@@ -21,7 +21,7 @@ test: $(VENV)/ready lint
 	$(BIN)/python -m pytest -n 2
 
 lint: $(VENV)/ready
-	$(BIN)/ruff check hystgen tests
+	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime
 	$(BIN)/mypy
 
 clean:
