@@ -18,7 +18,8 @@ FILES = {
     + "    initial_state: [0, 0.3, 0.1, -0.2, 0.3, 0.5, 0.1]\n  output_offset: 1.5\n",
     "bent": head("bent", -3, 3)
     + PLAYS
-    + "  memoryless: {kind: dead_zone, thresholds: [-1.0, -0.4, 0, 0.4, 1.0], weights: [-1.1, -0.9, 4.8, -1.1, -1.1]}\n",
+    + "  memoryless:\n    kind: dead_zone\n    thresholds: [-1.0, -0.4, 0, 0.4, 1.0]\n"
+    + "    weights: [-1.1, -0.9, 4.8, -1.1, -1.1]\n",
     "curved": head("curved")
     + PLAYS
     + "  memoryless: {kind: tanh, ascending: {a0: 6, a1: 0.4, a2: 0.1, a3: 0.2}}\n",

@@ -36,7 +36,8 @@ def required_compilers() -> list[compilers.Compiler]:
 def check_codegen(name: str, **options: str) -> None:
     """What ends every feature test: the emitted C gives the bits of the reference."""
     required_compilers()
-    report = hystgen.verify(model(name), operator="both", length=int(os.environ.get("HYSTGEN_LENGTH", "30000")), **options)
+    length = int(os.environ.get("HYSTGEN_LENGTH", "30000"))
+    report = hystgen.verify(model(name), operator="both", length=length, **options)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} == {"forward", "inverse"}
 

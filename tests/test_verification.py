@@ -1,0 +1,141 @@
+"""Verification finds what it is there to find."""
+
+from __future__ import annotations
+
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from modelfiles import FILES
+
+import hystgen
+from hystgen import reference, tables
+from hystgen.api import Model
+from hystgen.emission import module
+from hystgen.params import parse_parameters
+from hystgen.verification import compilers, signals
+
+
+def model(name: str) -> Model:
+    return Model(parse_parameters(FILES[name], f"{name}.yaml"))
+
+
+@pytest.fixture
+def changed_c(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[str], str]], None]:
+    """Lets a test change the emitted `NAME.c` before it is compiled."""
+    emitted = module.files
+
+    def change(how: Callable[[str], str]) -> None:
+        def files(*arguments: object) -> dict[str, str]:
+            texts = emitted(*arguments)  # type: ignore[arg-type]
+            changed = {name: how(text) if name.endswith(".c") else text for name, text in texts.items()}
+            assert changed != texts
+            return changed
+
+        monkeypatch.setattr(module, "files", files)
+
+    return change
+
+
+def has_fused_multiply_add() -> bool:
+    cpu = Path("/proc/cpuinfo")
+    return cpu.is_file() and " fma " in cpu.read_text()
+
+
+@pytest.mark.skipif(not has_fused_multiply_add(), reason="this CPU cannot contract")
+@pytest.mark.parametrize("compiler", compilers.NAMES)
+def test_contraction_is_found_under_the_default_flags(compiler: str, changed_c: Callable[..., None]) -> None:
+    """Without the pragmas of the emitted C, users' default flags would change bits, and the defaults build shows it."""
+    changed_c(lambda text: re.sub("(?m)^#pragma.*$", "", text))
+    report = hystgen.verify(model("listed"), operator="both", compiler=[compiler], length=3000)
+    wrong = {row.build for row in report.rows if row.different}
+    assert wrong == {"defaults"}, report.table()
+
+
+@pytest.mark.parametrize("digit", ["0.4", "0.0119"])
+def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., None]) -> None:
+    """One unit in the last place of one number suffices."""
+
+    def change(text: str) -> str:
+        numbers = re.findall(r"(?<![\w.])\d+\.\d+(?:e[+-]?\d+)?f", text)
+        victim = next(number for number in numbers if number.startswith(digit[:3]) and np.float32(number[:-1]) != 0)
+        other = str(np.nextafter(np.float32(victim[:-1]), np.float32(np.inf))) + "f"
+        return text.replace(victim, other, 1)
+
+    changed_c(change)
+    report = hystgen.verify(model("plain"), operator="both", engine="loop", compiler=["gcc"], length=3000)
+    assert not report.ok
+    assert any(row.different for row in report.rows)
+
+
+def test_the_reports_say_what_failed(changed_c: Callable[..., None]) -> None:
+    changed_c(lambda text: text.replace("return x >=", "return x >", 1).replace("_MAX && x <=", "_MAX || x <="))
+    report = hystgen.verify(model("plain"), compiler=["gcc"], length=3000)
+    data = json.loads(report.to_json())
+    assert data["ok"] is False
+    assert [row["ok"] for row in data["rows"]].count(False) >= 2
+    suite = ElementTree.fromstring(report.to_junit())
+    assert int(suite.attrib["failures"]) == len(suite.findall(".//failure")) >= 2
+    assert "differ" in report.table()
+
+
+def test_c_that_does_not_compile_is_a_failure(changed_c: Callable[..., None]) -> None:
+    changed_c(lambda text: text + "\nint unused_argument(int x) { return 0; }\n")
+    report = hystgen.verify(model("plain"), compiler=["gcc"], length=1000)
+    assert [row.ok for row in report.rows] == [False, False]
+    assert "unused" in report.table()
+
+
+def test_a_compiler_that_is_asked_for_and_missing_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compilers, "find", lambda _: None)
+    report = hystgen.verify(model("plain"), compiler=["gcc"], length=1000)
+    assert not report.ok
+    assert "gcc is not installed" in report.table()
+
+
+def test_no_compiler_at_all_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compilers, "available", list)
+    report = hystgen.verify(model("plain"), length=1000)
+    assert not report.ok
+    assert "hystgen[zig]" in report.table()
+
+
+@pytest.mark.parametrize("inverse", [False, True])
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) -> None:
+    numbers = tables.build(model("listed").cascade, arithmetic)
+    real = numbers.threshold.dtype.type
+    with np.errstate(over="ignore"):
+        records = {name: (op, x.astype(real)) for name, op, x in signals.suite(numbers, inverse, 100_000)}
+    assert all(len(op) == len(x) == 100_000 for op, x in records.values())
+    low, high = numbers.limits[2:4] if inverse else numbers.limits[:2]
+
+    def reversals(name: str) -> int:
+        moves = np.diff(records[name][1])
+        moves = moves[moves != 0]
+        return int(np.count_nonzero(moves[1:] * np.sign(moves[:-1]) < 0))
+
+    sines = records["sines of many sizes"][1]
+    assert reversals("sines of many sizes") > 500
+    sizes = np.ptp(sines.reshape(50, -1), axis=1)
+    assert sizes.max() / sizes.min() > 1e4
+    assert reversals("nested loops") > 1000
+    assert reversals("random walk") > 10_000
+    assert np.mean(np.diff(records["steps"][1]) == 0) > 0.6
+    assert np.mean(np.diff(records["plateaus"][1]) == 0) > 0.5
+    outside = records["beyond the range"][1]
+    assert np.mean(outside > high) > 0.05
+    assert np.mean(outside < low) > 0.05
+    tiny = np.abs(records["denormals"][1])
+    assert np.mean((tiny > 0) & (tiny < np.finfo(real).tiny)) > 0.5
+    odd = records["NaN, infinities, extremes"][1]
+    assert np.isnan(odd).any()
+    assert np.isposinf(odd).any()
+    assert np.isneginf(odd).any()
+    called = {int(call) for op, _ in records.values() for call in np.unique(op)}
+    expected = {reference.OP_STEP, reference.OP_RESET, reference.OP_INIT}
+    assert called == (expected | {reference.OP_COMMIT} if inverse else expected)
