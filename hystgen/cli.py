@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -36,6 +38,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     """Run `action` and turn what it may raise into a message and an exit code."""
     from hystgen.models import NotInvertibleError
     from hystgen.params import ParameterError
+    from hystgen.problems import RecordError
     from hystgen.tables import FormatError
 
     try:
@@ -45,7 +48,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
         for warning in caught:
             click.echo(f"warning: {warning.message}", err=True)
         return result
-    except ParameterError as error:
+    except (ParameterError, RecordError) as error:
         raise _Failed(str(error), 2) from None
     except NotInvertibleError as error:
         raise _Failed("\n".join(f"{path}: error: no inverse: {reason}" for reason in error.reasons), 1) from None
@@ -120,7 +123,7 @@ def emit(params: str, output: str, check: bool, list_outputs: bool, **options: s
 @arithmetic_option
 @engine_option
 @layout_option
-@click.option("--compiler", multiple=True, help="gcc, clang or zig; default: every one installed")
+@click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report for programs")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
@@ -133,14 +136,11 @@ def verify(
     """
     from hystgen import verification
     from hystgen.records import write_atomically
-    from hystgen.verification import compilers
 
     chosen = tuple(targets.split(","))
-    for word, known, what in [(t, TARGETS, "target") for t in chosen] + [
-        (c, compilers.NAMES, "compiler") for c in compiler
-    ]:
-        if word not in known:
-            raise _Failed(f"error: unknown {what} {word!r}; use {', '.join(known)}", 2)
+    for word in chosen:
+        if word not in TARGETS:
+            raise _Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
     model = _load(params)
 
     def say(what: str) -> None:
@@ -150,10 +150,10 @@ def verify(
         params,
         lambda: verification.verify_model(model, compiler=compiler, targets=chosen, progress=say, **options),
     )
+    click.echo(report.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
             _shown(file, partial(write_atomically, file, text()))
-    click.echo(report.table())
     if not report.ok:
         raise _Failed("verification failed", 1)
 
@@ -162,9 +162,18 @@ def _numbers(text: str | None) -> list[float] | None:
     if text is None:
         return None
     try:
-        return [float(part) for part in text.split(",")]
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        raise _Failed(f"error: --history {text!r} is not a list of numbers; write --history 100,-100", 2) from None
+        numbers = [math.nan]
+    if not all(map(math.isfinite, numbers)):
+        raise _Failed(f"error: --history {text!r} is not a list of numbers; write --history 100,-100", 2)
+    return numbers
+
+
+def _seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
+    if not 0 <= value < math.inf:
+        raise click.BadParameter("give seconds, 0 or more")
+    return value
 
 
 def _reading(columns: str | None, sample_time: float | None, delimiter: str | None) -> dict[str, Any]:
@@ -187,7 +196,7 @@ _RECORD_OPTIONS = [
     click.option("--delimiter", help="default: a comma"),
     click.option("--history", metavar="V,V,..", help="drive values visited before"),
     click.option(
-        "--rest", type=click.FloatRange(min=0), default=0.0, help="seconds of pause; a model without dynamics sees none"
+        "--rest", type=float, callback=_seconds, default=0.0, help="seconds of pause, not seen by static models"
     ),
 ]
 
@@ -225,8 +234,10 @@ def simulate(
     visited = _numbers(history)
     how = _reading(**reading)
     column, answer = ("v", "y") if operator == "forward" else ("u", "v")
-    read = [_shown(path, partial(records.read_record, path, need=(column,), **how)) for path in data]
+    read = _shown(params, partial(records.read_records, data, need=(column,), **how))
     for record in read:
+        if {answer, f"{answer}_measured"} <= record.columns().keys():
+            raise _Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
         for note in record.notes:
             click.echo(f"warning: {record.name}: {note}", err=True)
     clamp = operator == "inverse"
@@ -234,7 +245,7 @@ def simulate(
     if visited:
         session.visit(visited)
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
-    if output and (len(data) > 1 or Path(output).is_dir()):
+    if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
     for path, target in zip(data, targets, strict=True):
         if target and target.resolve() == Path(path).resolve():
@@ -275,19 +286,25 @@ def identify(
     Example: hystgen identify sweep.csv --holdout other.csv -o stage_x.yaml --units V,um
     """
     from hystgen import identification, records
+    from hystgen.report import plots
 
     drive, _, displacement = (units or "").partition(",")
     visited = _numbers(history)
     how = _reading(**reading)
+    recordings = {Path(path).resolve() for path in (*data, *holdout)}
 
     def run() -> None:
-        read = [records.read_record(path, **how) for path in data]
-        held = [records.read_record(path, **how) for path in holdout]
+        if plot:
+            plots.check_path(plot)
+        read = records.read_records([*data, *holdout], **how)
+        for path in (output, plot):
+            if path and Path(path).resolve() in recordings:
+                raise ValueError(f"{path} is a record and would be overwritten; choose another name")
         fit = identification.identify(
-            read,
+            read[: len(data)],
             model=model,
             thresholds=thresholds,
-            holdout=held,
+            holdout=read[len(data) :],
             history=visited,
             rest=rest,
             name=name or identification.identifier_from(Path(output).stem),
@@ -301,9 +318,7 @@ def identify(
         click.echo(fit.table())
         click.echo(output)
         if plot:
-            from hystgen.report import plots
-
-            plots.show_fit(fit, [*held, *read], plot)
+            plots.show_fit(fit, [*read[len(data) :], *read[: len(data)]], plot)
             click.echo(plot)
 
     _shown(data[0], run)
@@ -320,6 +335,8 @@ def show(params: str, plot: str | None) -> None:
     from hystgen.report import plots, properties
 
     model = _load(params)
+    if plot:
+        _shown(params, partial(plots.check_path, plot))
     click.echo(_shown(params, lambda: properties.properties(model)))
     for warning in properties.warnings(model):
         click.echo(f"warning: {warning}", err=True)

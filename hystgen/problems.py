@@ -77,3 +77,15 @@ def path_text(path: Path) -> str:
         plain = part.isascii() and part.replace("_", "a").replace("-", "a").isalnum() and len(part) <= SHOWN
         text += ("." if text else "") + (part if plain else f'"{printable(part)}"')
     return text
+
+
+class RecordError(ValueError):
+    """A data file that is refused, with every problem found in it.
+
+    `problems` has one line a problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` where there is no
+    line); `str()` joins them.
+    """
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = list(problems)
+        super().__init__("\n".join(self.problems))

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.problems import printable
+from hystgen.problems import RecordError, printable
 
 Array = NDArray[np.float64]
 
@@ -49,18 +49,6 @@ ALIASES = {
     "y": ("y", "displacement", "position", "pos", "output", "measured", "sensor", "disp"),
     "u": ("u", "reference", "ref", "setpoint", "target"),
 }
-
-
-class RecordError(ValueError):
-    """A data file that is refused, with every problem found in it.
-
-    `problems` has one line a problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` where there is no
-    line); `str()` joins them.
-    """
-
-    def __init__(self, problems: Iterable[str]) -> None:
-        self.problems = list(problems)
-        super().__init__("\n".join(self.problems))
 
 
 @dataclass(frozen=True)
@@ -120,6 +108,31 @@ def parse_columns(text: str) -> dict[str, str]:
             raise ValueError(f'column "{printable(theirs)}" is given two names; name it once')
         mapping[ours] = theirs
     return mapping
+
+
+def read_records(
+    sources: Iterable[Record | str | os.PathLike[str]],
+    columns: Mapping[str, str] | None = None,
+    sample_time: float | None = None,
+    delimiter: str | None = None,
+    need: Sequence[str] = ("v", "y"),
+) -> list[Record]:
+    """Read several data files as `read_record` does; records that are in memory already are kept.
+
+    Raises RecordError with every problem in all files.
+    """
+    found: list[Record] = []
+    refused: list[str] = []
+    for source in sources:
+        try:
+            if not isinstance(source, Record):
+                source = read_record(source, columns, sample_time, delimiter, need)
+            found.append(source)
+        except RecordError as error:
+            refused.extend(error.problems)
+    if refused:
+        raise RecordError(refused)
+    return found
 
 
 def read_record(

@@ -55,8 +55,8 @@ def test_compiles_clean_without_undefined_symbols(compiler: str, real: list[str]
     for level in ("-O0", "-O2"):
         output = tmp_path / "runtime.o"
         source = RUNTIME / "hystgen_runtime.c"
-        command = [compiler, *dialect.split(), level, *real, *flags, "-ffp-contract=off", "-c", str(source), "-o", str(output)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        command = [compiler, *dialect.split(), level, *real, *flags, "-ffp-contract=off", "-c", str(source)]
+        done = subprocess.run([*command, "-o", str(output)], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         symbols = subprocess.run(["nm", str(output)], capture_output=True, text=True, check=True).stdout
         kinds = {line.split()[-2] for line in symbols.splitlines()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Mapping
@@ -14,6 +15,9 @@ def write(folder: Path, files: Mapping[str, str]) -> list[Path]:
     with tempfile.TemporaryDirectory(prefix=".hystgen-", dir=folder) as staging:
         for name, text in files.items():
             (Path(staging) / name).write_bytes(text.encode("ascii"))
+        for name in files:  # the one thing that could stop a replacement half-way
+            if (folder / name).is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
         for name in files:
             os.replace(Path(staging) / name, folder / name)
     return [folder / name for name in files]

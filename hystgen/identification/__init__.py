@@ -25,7 +25,7 @@ from hystgen.identification.progress import Progress
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
 from hystgen.identification.thresholds import rounded
-from hystgen.records import SHORTEST, Record, RecordError, read_record, write_atomically
+from hystgen.records import SHORTEST, Record, read_record, read_records, write_atomically
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -174,23 +174,9 @@ def identify(
     if not 0.0 <= p0_floor < 1.0:
         raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
 
-    def read(sources: Source | Iterable[Source]) -> list[Record]:
-        if isinstance(sources, Record | str | os.PathLike):
-            sources = [sources]
-        found = []
-        for source in sources:
-            try:
-                found.append(
-                    source if isinstance(source, Record) else read_record(source, columns, sample_time, delimiter)
-                )
-            except RecordError as error:
-                refused.extend(error.problems)
-        return found
-
-    refused: list[str] = []
-    fit_records, held_records = read(records), read(holdout)
-    if refused:
-        raise RecordError(refused)
+    to_fit, to_hold = _several(records), _several(holdout)
+    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter)
+    fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
@@ -229,6 +215,10 @@ def identify(
     told += [text for each in errors if (text := _about_start(each, float(r[-1])))]
     told += _about_model(solution, wanted, compared, own)
     return Fit(_parameters(name, units, (low, high), r, p, offset, before), tuple(rows), tuple(told), before)
+
+
+def _several(sources: Source | Iterable[Source]) -> list[Source]:
+    return [sources] if isinstance(sources, Record | str | os.PathLike) else list(sources)
 
 
 def _trial(

@@ -34,13 +34,21 @@ def _figure(columns: int) -> tuple[Any, Any]:
     return plt.subplots(1, columns, figsize=(4.6 * columns, 4.0), layout="constrained")
 
 
+def check_path(path: str | os.PathLike[str]) -> None:
+    """Raise PlotError for a file that no plot can be written to."""
+    target = Path(path)
+    if target.suffix.lower() not in FORMATS:
+        raise PlotError(f"{target}: a plot is a .png or .svg file")
+    if not target.parent.is_dir():
+        raise PlotError(f"{target}: the folder does not exist")
+
+
 def _save(figure: Any, path: str | os.PathLike[str]) -> None:
     import matplotlib.pyplot as plt
 
+    check_path(path)
     target = Path(path)
     kind = target.suffix.lower()
-    if kind not in FORMATS:
-        raise PlotError(f"{target}: a plot is a .png or .svg file")
     staging = target.with_name(f".{target.name}.part{kind}")
     try:
         figure.savefig(staging, dpi=110, metadata={"Date": None} if kind == ".svg" else {"Software": None})

@@ -34,7 +34,8 @@ class Row:
     operator: str
     samples: int = 0
     different: int = 0
-    max_ulp: float = 0.0
+    max_ulp: float | None = 0.0  # None: an answer is no finite number
+    first: str = ""
     ram: int | None = None
     error: str = ""
 
@@ -44,11 +45,15 @@ class Row:
         return not self.error and not self.different
 
     @property
+    def _most(self) -> str:
+        return "some not finite" if self.max_ulp is None else f"up to {self.max_ulp:.3g} ulp"
+
+    @property
     def verdict(self) -> str:
         """What the table says about it."""
         if self.error:
             return self.error.splitlines()[0]
-        return "bits equal" if self.ok else f"{self.different} differ, up to {self.max_ulp:.3g} ulp"
+        return "bits equal" if self.ok else f"{self.different} differ, {self._most}; first: {self.first}"
 
 
 @dataclass(frozen=True)
@@ -186,8 +191,9 @@ def write_sources(folder: Path, model: Model, options: module.Options) -> list[P
     return [path for path in files.write(folder, texts) if path.suffix == ".c"]
 
 
-def _check(library: _Library, op: str, records: Sequence[_Expected]) -> tuple[int, int, float]:
+def _check(library: _Library, op: str, records: Sequence[_Expected]) -> tuple[int, int, float | None, str]:
     samples = different = 0
+    first = ""
     worst = 0.0
     for record in records:
         answer, status = library.run(op, record.call, record.x)
@@ -196,8 +202,9 @@ def _check(library: _Library, op: str, records: Sequence[_Expected]) -> tuple[in
         samples += len(answer)
         different += int(wrong.sum())
         if wrong.any():
+            first = first or f"sample {int(np.argmax(wrong))} of {record.name}"
             worst = max(worst, _ulps(answer[wrong], record.answer[wrong]))
-    return samples, different, worst
+    return samples, different, worst if np.isfinite(worst) else None, first
 
 
 def verify_model(
@@ -236,13 +243,13 @@ def verify_model(
     real = "float" if options.arithmetic == "float32" else "double"
     with tempfile.TemporaryDirectory(prefix="hystgen-verify-") as folder:
         sources = write_sources(Path(folder), model, options)
-        for name, found in chosen:
+        for number, (name, found) in enumerate(chosen):
             for build, flags in BUILDS:
                 progress(f"{name} {build}")
                 if found is None:
                     report.rows.append(Row(HOST, name, build, "-", error=f"{name} is not installed"))
                     continue
-                output = Path(folder) / f"{name}-{build}.so"
+                output = Path(folder) / f"{number}-{build}.so"
                 try:
                     found.shared_library(sources, output, flags)
                 except compilers.CompileError as error:
@@ -250,9 +257,9 @@ def verify_model(
                     continue
                 library = _Library(output, real, operators)
                 for op in operators:
-                    samples, different, worst = _check(library, op, records[op])
+                    samples, different, worst, first = _check(library, op, records[op])
                     report.rows.append(
-                        Row(HOST, name, build, op, samples, different, worst, library.size(op))
+                        Row(HOST, name, build, op, samples, different, worst, first, library.size(op))
                     )
                 failed = library.selftest()
                 library.close()
