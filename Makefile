@@ -14,8 +14,11 @@ demo: $(VENV)/ready
 	mkdir -p examples/out
 	$(BIN)/hystgen identify examples/stage_recording.csv --holdout examples/stage_holdout.csv \
 	    -o examples/out/stage.yaml --units V,um --plot examples/out/stage.png
-	$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out
+	$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out >/dev/null
 	$(BIN)/hystgen verify examples/out/stage.yaml
+	@echo; echo "The C, ready to compile, and the plot:"
+	@$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out --list-outputs
+	@echo examples/out/stage.png
 
 test: $(VENV)/ready lint
 	$(BIN)/python -m pytest -n 2

@@ -90,6 +90,12 @@ class Fit:
             return np.asarray(predicted + float(np.mean(data.y - predicted)))
         return np.asarray(predicted + self.parameters.model.output_offset)
 
+    def settled(self, record: Source) -> int:
+        """First sample of a record at which no play remembers an unknown start; 0 where a history was given."""
+        data = read_record(record, need=("v",)) if not isinstance(record, Record) else record
+        largest = self.parameters.model.pi.thresholds[-1]
+        return 0 if self.history is not None else reduction.settled(data.v, largest)
+
     def text(self) -> str:
         """The parameter file: what was fitted on what as comments, then the parameters."""
         from hystgen.params import dump_parameters

@@ -101,18 +101,24 @@ def show_model(model: Model, path: str | os.PathLike[str]) -> None:
 
 
 def show_fit(fit: Fit, records: list[Record], path: str | os.PathLike[str]) -> None:
-    """Measured and predicted loops of each record, and the residual along time, as PNG or SVG. Raises PlotError."""
+    """Measured and predicted loops of the first record, residuals along time, and the weights, as PNG or SVG.
+
+    Samples that an unknown start memory reaches are left out. Raises PlotError.
+    """
     units = fit.parameters.units
     figure, axes = _figure(3)
     for i, record in enumerate(records):
         assert record.y is not None
-        predicted = fit.predict(record, free_offset=True)
+        known = slice(fit.settled(record), None)
+        residual = record.y - fit.predict(record)
+        residual -= np.mean(residual[known])
         if i == 0:
-            axes[0].plot(record.v, record.y, color=DRIVE, linewidth=0.8, label="measured")
-            axes[0].plot(record.v, predicted, color=OUTPUT, linewidth=0.8, label="model")
+            axes[0].plot(record.v[known], record.y[known], color=DRIVE, linewidth=0.8, label="measured")
+            model = (record.y - residual)[known]
+            axes[0].plot(record.v[known], model, color=OUTPUT, linewidth=0.8, label="model")
             axes[0].set(title=record.name)
         time = record.t - record.t[0]
-        axes[1].plot(time, record.y - predicted, linewidth=0.8, label=record.name)
+        axes[1].plot(time[known], residual[known], linewidth=0.8, label=record.name)
     axes[0].set(xlabel=_label("drive", units.input), ylabel=_label("output", units.output))
     axes[0].legend()
     axes[1].set(title="Residual", xlabel="time (s)", ylabel=_label("measured - model", units.output))
@@ -120,6 +126,7 @@ def show_fit(fit: Fit, records: list[Record], path: str | os.PathLike[str]) -> N
     part = fit.parameters.model.pi
     axes[2].plot(part.thresholds, part.weights, "o", color=OTHER, markersize=4)
     axes[2].vlines(part.thresholds, 0, part.weights, color=OTHER, linewidth=1)
-    axes[2].set(title="Weights", xlabel=_label("threshold", units.input), ylabel="weight")
+    per = f"{units.output}/{units.input}" if units.input and units.output else ""
+    axes[2].set(title="Weights", xlabel=_label("threshold", units.input), ylabel=_label("weight", per))
     figure.suptitle(f"{fit.parameters.name}: identified")
     _save(figure, path)
