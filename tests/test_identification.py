@@ -774,7 +774,12 @@ class TestRefused:
                 "60 samples can be compared, 100 plays need at least 102; record more cycles, give --history, or use "
                 "fewer thresholds",
             ),
-            (SINE, SINE, ("--history", "1,nan"), "--history '1,nan' is not a list of numbers; write --history 100,-100"),
+            (
+                SINE,
+                SINE,
+                ("--history", "1,nan"),
+                "--history '1,nan' is not a list of numbers; write --history 100,-100",
+            ),
             (SINE, SINE, ("--model", "gpi-tanh"), "this version fits model pi only, not gpi-tanh"),
         ],
         ids=lambda value: value if isinstance(value, str) else "",
