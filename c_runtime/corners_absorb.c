@@ -1,24 +1,26 @@
 #include "hystgen_runtime.h"
 
 /* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static hystgen_real_t hystgen_activation(const hystgen_corner_t *c, hystgen_real_t r, bool rising)
+static hystgen_reach_t hystgen_activation(const hystgen_corner_t *c, hystgen_play_t threshold, bool rising)
 {
+    const hystgen_reach_t e = c->extremum;
+    const hystgen_reach_t r = threshold;
     if (rising) {
-        return c->side > 0 ? c->extremum + (r + r) : c->side == 0 ? c->extremum + r : c->extremum;
+        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
     }
-    return c->side < 0 ? c->extremum - (r + r) : c->side == 0 ? c->extremum - r : c->extremum;
+    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
 }
 
-static bool hystgen_reached(hystgen_real_t x, hystgen_real_t level, bool rising)
+static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
 }
 
 /* What plays k and up contribute when corner c holds play k. Always from the corner's own tail, so that
    rounding does not pile up from sample to sample. */
-static hystgen_real_t hystgen_held(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k)
+static hystgen_sum_t hystgen_held(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k)
 {
-    hystgen_real_t block = c->extremum * (t->slope[c->end] - t->slope[k]);
+    hystgen_sum_t block = (hystgen_sum_t)c->extremum * (t->slope[c->end] - t->slope[k]);
     if (c->side > 0) {
         block = block + (t->lift[c->end] - t->lift[k]);
     } else if (c->side < 0) {
@@ -36,7 +38,7 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *
         m->next = hystgen_activation(c, t->threshold[m->k], m->rising);
     } else { /* every play follows */
         m->tail = 0;
-        m->next = m->rising ? HYSTGEN_REAL_MAX : -HYSTGEN_REAL_MAX;
+        m->next = m->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
     }
     m->base = m->rising ? m->tail - t->lift[m->k] : m->tail + t->lift[m->k];
 }
@@ -45,7 +47,7 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *
    block, galloping away from play k because most moves take one play at a time. */
 static void hystgen_corners_advance(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
-    const hystgen_real_t w = m->w;
+    const hystgen_reach_t w = m->w;
     const bool rising = m->rising;
     unsigned int low = 0;
     unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
@@ -86,7 +88,7 @@ static void hystgen_corners_advance(const hystgen_tables_t *t, hystgen_memory_t 
 
 /* Memory at rest: every play holds w, nothing has moved yet. */
 HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                                      hystgen_real_t w)
+                                      hystgen_play_t w)
 {
     m->w = w;
     m->k = 1;
@@ -104,7 +106,7 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
 
 /* Memory with a state of its own for each play: one corner a play. */
 HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                                       const hystgen_real_t *play)
+                                       const hystgen_play_t *play)
 {
     unsigned int j;
     m->w = play[0];
@@ -123,7 +125,7 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
 
 /* Moves the input of the plays to w. */
 HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                                        hystgen_real_t w)
+                                        hystgen_play_t w)
 {
     if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
         if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
@@ -145,7 +147,7 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
 }
 
 /* Output of the play sum for the memory as it is. */
-HYSTGEN_API hystgen_real_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
+HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
 {
-    return m->base + m->w * t->slope[m->k];
+    return m->base + (hystgen_sum_t)m->w * t->slope[m->k];
 }

@@ -1,5 +1,13 @@
 /* The whole run time as one translation unit: this is what the shared-runtime layout compiles. */
 #include "hystgen_runtime.h"
+#ifdef HYSTGEN_FIXED
+#include "over_slope.c"
+#include "corners_absorb.c"
+#include "corners_solve_fixed.c"
+#include "loop_absorb.c"
+#include "loop_solve_fixed.c"
+#include "curve.c"
+#else
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 #include "tanh_f64.c"
 #include "atanh_f64.c"
@@ -15,3 +23,4 @@
 #include "corners_solve.c"
 #include "loop_absorb.c"
 #include "loop_solve.c"
+#endif

@@ -12,17 +12,37 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* What the numbers of a model are: in floating point all of one type, in fixed point whole numbers as wide as they
+   have to be. play: inputs of the plays; reach: where plays start to follow; sum: outputs before they are rounded. */
+#ifdef HYSTGEN_FIXED
+typedef int32_t hystgen_play_t;
+typedef int64_t hystgen_reach_t;
+typedef int64_t hystgen_sum_t;
+#define HYSTGEN_REACH_MAX (INT64_MAX / 2)
+#else
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 typedef double hystgen_real_t;
-#define HYSTGEN_REAL_MAX DBL_MAX
+#define HYSTGEN_REACH_MAX DBL_MAX
 #else
 typedef float hystgen_real_t;
-#define HYSTGEN_REAL_MAX FLT_MAX
+#define HYSTGEN_REACH_MAX FLT_MAX
+#endif
+typedef hystgen_real_t hystgen_play_t;
+typedef hystgen_real_t hystgen_reach_t;
+typedef hystgen_real_t hystgen_sum_t;
 #endif
 #define HYSTGEN_API
 
 #include "hystgen_state.h"
-#include "hystgen_tables.h"
+#ifdef HYSTGEN_FIXED
+#include "hystgen_tables_fixed.h"
+
+int64_t hystgen_nearest(int64_t x, unsigned int bits);
+int64_t hystgen_curve(const hystgen_curve_t *c, int32_t x);
+hystgen_reach_t hystgen_back(const hystgen_back_t *b, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
+                             bool *limited);
+#else
+#include "hystgen_tables_float.h"
 
 hystgen_real_t hystgen_tanh(hystgen_real_t x);
 hystgen_real_t hystgen_atanh(hystgen_real_t x);
@@ -30,21 +50,22 @@ hystgen_real_t hystgen_envelope_forward(const hystgen_envelope_t *e, hystgen_rea
 hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_real_t y, bool *limited);
 hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_real_t x);
 hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y);
+#endif
 
 void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                          hystgen_real_t w);
+                          hystgen_play_t w);
 void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                           const hystgen_real_t *play);
+                           const hystgen_play_t *play);
 void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                            hystgen_real_t w);
-hystgen_real_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
-hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, const hystgen_memory_t *m,
-                                     hystgen_corner_t *corner, hystgen_real_t output);
+                            hystgen_play_t w);
+hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
+hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, const hystgen_memory_t *m,
+                                     hystgen_corner_t *corner, hystgen_sum_t output);
 
-void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_real_t *play, hystgen_real_t w);
-void hystgen_loop_start(const hystgen_tables_t *t, hystgen_real_t *play, const hystgen_real_t *start);
-void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_real_t *play, hystgen_real_t w);
-hystgen_real_t hystgen_loop_output(const hystgen_tables_t *t, const hystgen_real_t *play);
-hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_real_t *play, hystgen_real_t output);
+void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w);
+void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play, const hystgen_play_t *start);
+void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w);
+hystgen_sum_t hystgen_loop_output(const hystgen_tables_t *t, const hystgen_play_t *play);
+hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_play_t *play, hystgen_sum_t output);
 
 #endif

@@ -3,18 +3,18 @@
 /* The textbook engine: every play is visited in every sample. Stores go through volatile where a compiler would
    otherwise call memset or memcpy, which a freestanding target need not have. */
 
-HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_real_t *play, hystgen_real_t w)
+HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w)
 {
-    volatile hystgen_real_t *all = play;
+    volatile hystgen_play_t *all = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
         all[i] = w;
     }
 }
 
-HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_real_t *play, const hystgen_real_t *start)
+HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play, const hystgen_play_t *start)
 {
-    volatile hystgen_real_t *all = play;
+    volatile hystgen_play_t *all = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
         all[i] = start[i];
@@ -22,24 +22,24 @@ HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_real_t *p
 }
 
 /* play_r[w] = max(w - r, min(w + r, play)) */
-HYSTGEN_API void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_real_t *play, hystgen_real_t w)
+HYSTGEN_API void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w)
 {
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
-        const hystgen_real_t low = w - t->threshold[i];
-        const hystgen_real_t high = w + t->threshold[i];
-        const hystgen_real_t upper = play[i] > high ? high : play[i];
-        play[i] = upper < low ? low : upper;
+        const hystgen_reach_t low = (hystgen_reach_t)w - t->threshold[i];
+        const hystgen_reach_t high = (hystgen_reach_t)w + t->threshold[i];
+        const hystgen_reach_t upper = play[i] > high ? high : play[i];
+        play[i] = (hystgen_play_t)(upper < low ? low : upper);
     }
 }
 
 /* p_0 play_0 + p_1 play_1 + ..., in this order */
-HYSTGEN_API hystgen_real_t hystgen_loop_output(const hystgen_tables_t *t, const hystgen_real_t *play)
+HYSTGEN_API hystgen_sum_t hystgen_loop_output(const hystgen_tables_t *t, const hystgen_play_t *play)
 {
-    hystgen_real_t sum = 0;
+    hystgen_sum_t sum = 0;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
-        sum = sum + t->weight[i] * play[i];
+        sum = sum + (hystgen_sum_t)t->weight[i] * play[i];
     }
     return sum;
 }

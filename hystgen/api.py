@@ -17,6 +17,8 @@ from hystgen.params import Parameters, load_parameters
 
 if TYPE_CHECKING:
     from hystgen.emission.module import Options
+    from hystgen.fixed import FixedTables
+    from hystgen.reference import Tables
     from hystgen.simulation import Session
 
 
@@ -56,6 +58,14 @@ class Model:
         """'corners' or 'loop': the given engine, or the parameter file's, with `auto` decided."""
         return tables.choose_engine(engine or self.parameters.emit.engine, self.cascade.pi.n)
 
+    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables:
+        """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
+        return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
+
+    @property
+    def _lsb(self) -> tuple[float | None, float | None]:
+        return self.parameters.emit.drive_lsb, self.parameters.emit.output_lsb
+
     def session(
         self, operator: str = "forward", arithmetic: str | None = None, engine: str | None = None, clamp: bool = False
     ) -> Session:
@@ -64,7 +74,7 @@ class Model:
 
         if arithmetic is not None:
             check_arithmetic(arithmetic)
-            return Session(self.cascade, operator, arithmetic, self.engine(engine), clamp)
+            return Session(self.cascade, operator, arithmetic, self.engine(engine), clamp, self._lsb)
         return Session(self.cascade, operator, clamp=clamp)
 
     def simulate(
@@ -72,8 +82,8 @@ class Model:
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
-        Without `arithmetic` in double precision, unlimited unless `clamp`. With 'float32' or 'float64' the bit
-        reference of the emitted C, which limits the drive to `input_range`.
+        Without `arithmetic` in double precision, unlimited unless `clamp`. With 'float32', 'float64', 'q31' or 'q15'
+        the bit reference of the emitted C, which limits the drive to `input_range`; fixed point takes and gives codes.
         """
         return self.session("forward", arithmetic, engine, clamp).run(v)[0]
 
@@ -116,11 +126,9 @@ def load(path: str | os.PathLike[str]) -> Model:
 
 
 def check_arithmetic(arithmetic: str) -> None:
-    """Raise FormatError for an arithmetic that this version does not compute in."""
-    if arithmetic not in tables.FLOAT_ARITHMETICS:
-        raise tables.FormatError(
-            f"arithmetic {arithmetic} is not available in this version; use {' or '.join(tables.FLOAT_ARITHMETICS)}"
-        )
+    """Raise FormatError for an arithmetic that there is not."""
+    if arithmetic not in tables.ARITHMETICS:
+        raise tables.FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(tables.ARITHMETICS)}")
 
 
 def _model(source: Model | str | os.PathLike[str]) -> Model:
@@ -165,8 +173,8 @@ def emit(
 ) -> list[Path]:
     """Write the C files of a model (or parameter file) into folder `output` and return their paths.
 
-    Options: `operator` inverse, forward or both; `arithmetic` float32 or float64; `engine` auto, corners or loop;
-    `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
+    Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
+    loop; `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
     Raises ParameterError, NotInvertibleError and FormatError; then nothing is written.
     """
     from hystgen.emission import files

@@ -8,6 +8,11 @@ Inverse: the drive as sent is an exact input of the exact model, whose output th
 residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into
 at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front into that over its smallest
 slope. A clamp or commit gives both the same drive and adds nothing.
+
+With two branches two drives can give the same output, one on each, and rounding decides between them where the
+reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
+gap between the branches makes at the input of the plays, now and in what the plays remember. The bound counts that.
+The forward bound holds once the drive has moved off the one that the start memory stands for.
 """
 
 from __future__ import annotations
@@ -25,10 +30,14 @@ SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computati
 
 @dataclass(frozen=True)
 class ErrorBounds:
-    """Largest differences from the exact model: `forward` in output, `inverse` in drive units (inf: no inverse)."""
+    """Largest differences from the exact model: `forward` in output, `inverse` in drive units (inf: no inverse).
+
+    `rounding` is the part of `inverse` that does not come from taking another branch.
+    """
 
     forward: float
     inverse: float
+    rounding: float
 
 
 def _stage_errors(
@@ -82,10 +91,13 @@ def error_bounds(cascade: Cascade, arithmetic: str, engine: str) -> ErrorBounds:
     """
     forward, residual = _one(cascade, arithmetic, engine)
     own_forward, own_residual = _one(cascade, "float64", "corners")
-    inverse = math.inf
+    inverse = rounding = math.inf
     if not cascade.inverse_problems():
         pi = cascade.pi
         gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / cascade.front_slopes[0]
-        inverse = SECOND_ORDER * gain * (residual + own_residual)
-        inverse = min(inverse, cascade.input_range[1] - cascade.input_range[0])
-    return ErrorBounds(SECOND_ORDER * (forward + own_forward), inverse)
+        rounding = SECOND_ORDER * gain * (residual + own_residual)
+        gap = cascade.branch_gap
+        inverse = rounding + gain * pi.slopes[-1] * gap + gap / cascade.front_slopes[0]
+        whole = cascade.input_range[1] - cascade.input_range[0]
+        inverse, rounding = min(inverse, whole), min(rounding, whole)
+    return ErrorBounds(SECOND_ORDER * (forward + own_forward), inverse, rounding)

@@ -6,7 +6,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -141,6 +141,10 @@ def verify(
     for word in chosen:
         if word not in TARGETS:
             raise _Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
+    _keep((json_file, junit_file), [params])
+    for file in (json_file, junit_file):
+        if file and not Path(file).resolve().parent.is_dir():
+            raise _Failed(f"error: the folder of {file} does not exist", 2)
     model = _load(params)
 
     def say(what: str) -> None:
@@ -156,6 +160,14 @@ def verify(
             _shown(file, partial(write_atomically, file, text()))
     if not report.ok:
         raise _Failed("verification failed", 1)
+
+
+def _keep(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
+    """Refuse to write over what is read."""
+    read = {Path(path).resolve() for path in inputs}
+    for path in outputs:
+        if path and Path(path).resolve() in read:
+            raise _Failed(f"error: {path} is an input and would be overwritten; choose another name", 2)
 
 
 def _numbers(text: str | None) -> list[float] | None:
@@ -247,9 +259,7 @@ def simulate(
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
-    for path, target in zip(data, targets, strict=True):
-        if target and target.resolve() == Path(path).resolve():
-            raise _Failed(f"error: {target} is a record and would be overwritten; choose another -o", 2)
+    _keep(targets, [params, *data])
     for record, target in zip(read, targets, strict=True):
         columns = record.columns()
         signal = columns[column]
@@ -291,15 +301,12 @@ def identify(
     drive, _, displacement = (units or "").partition(",")
     visited = _numbers(history)
     how = _reading(**reading)
-    recordings = {Path(path).resolve() for path in (*data, *holdout)}
+    _keep((output, plot), (*data, *holdout))
 
     def run() -> None:
         if plot:
             plots.check_path(plot)
         read = records.read_records([*data, *holdout], **how)
-        for path in (output, plot):
-            if path and Path(path).resolve() in recordings:
-                raise ValueError(f"{path} is a record and would be overwritten; choose another name")
         fit = identification.identify(
             read[: len(data)],
             model=model,
@@ -336,6 +343,7 @@ def show(params: str, plot: str | None) -> None:
 
     model = _load(params)
     if plot:
+        _keep([plot], [params])
         _shown(params, partial(plots.check_path, plot))
     click.echo(_shown(params, lambda: properties.properties(model)))
     for warning in properties.warnings(model):

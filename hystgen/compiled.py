@@ -12,13 +12,22 @@ import hashlib
 import inspect
 import types
 from collections.abc import Callable, Collection, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hystgen.fixed import FixedTables
+    from hystgen.reference import Tables
 
 # Called once, before the first function is compiled that is not in the cache; a place for a word to the user
 announce: Callable[[], None] | None = None
 
 # The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
 OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+
+
+def bind_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNamespace:
+    """Copies of `functions`, given callees first, that call each other by name whatever module they are from."""
+    return _bound(functions, lambda _, twin: twin)
 
 
 def compile_together(
@@ -33,15 +42,25 @@ def compile_together(
     _listen()
     sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions)
     mark = hashlib.sha256(sources.encode()).hexdigest()[:12]
+
+    def compiled(function: Callable[..., Any], twin: types.FunctionType) -> Any:
+        twin.__qualname__ = f"{twin.__name__}_{mark}"
+        how = {**OPTIONS, "inline": "always" if function in inlined else "never"}
+        return numba.njit(**how)(twin)
+
+    return _bound(functions, compiled)
+
+
+def _bound(
+    functions: Sequence[Callable[..., Any]], finish: Callable[[Callable[..., Any], types.FunctionType], Any]
+) -> types.SimpleNamespace:
     made: dict[str, Any] = {}
     for function in functions:
         assert isinstance(function, types.FunctionType)
         scope = {**function.__globals__, **made}
         twin = types.FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
-        twin.__qualname__ = f"{function.__qualname__}_{mark}"
         twin.__module__ = function.__module__
-        how = {**OPTIONS, "inline": "always" if function in inlined else "never"}
-        made[function.__name__] = numba.njit(**how)(twin)
+        made[function.__name__] = finish(function, twin)
     return types.SimpleNamespace(**made)
 
 
@@ -75,13 +94,21 @@ def _listen() -> None:
     register("numba:compile", FirstCompilation())
 
 
+def reference(t: Tables | FixedTables, compiled: bool = True) -> types.SimpleNamespace:
+    """The bit reference of the tables' arithmetic (`hystgen.reference`, `hystgen.fixed`), compiled or plain Python."""
+    return _reference(type(t).__name__ == "FixedTables", compiled)
+
+
 @functools.cache
-def reference() -> types.SimpleNamespace:
-    """The compiled bit reference (`hystgen.reference`)."""
-    from hystgen import kernels
+def _reference(fixed_point: bool, compiled: bool) -> types.SimpleNamespace:
+    from hystgen import fixed, kernels
     from hystgen import reference as plain
 
-    return compile_together([kernels.tanh, kernels.atanh, *plain.COMPILED], plain.INLINED)
+    functions: list[Callable[..., Any]]
+    functions = fixed.COMPILED if fixed_point else [kernels.tanh, kernels.atanh, *plain.COMPILED]
+    if not compiled:
+        return bind_together(functions)
+    return compile_together(functions, fixed.INLINED if fixed_point else plain.INLINED)
 
 
 @functools.cache

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -133,8 +133,8 @@ class Stage(Protocol):
     def forward(self, x: ArrayLike, ascending: bool = True) -> Array:
         """Value of the branch at x."""
 
-    def inverse(self, y: ArrayLike, ascending: bool = True) -> Array:
-        """The x at which the branch has the value y."""
+    def inverse(self, y: ArrayLike, ascending: bool = True, low: float = ..., high: float = ...) -> Array:
+        """The x in [low, high] at which the branch has the value y."""
 
     def image(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
         """Least and largest value over [low, high]."""
@@ -144,6 +144,15 @@ class Stage(Protocol):
 
     def inverse_problems(self, low: float, high: float) -> list[str]:
         """Why the stage has no inverse over [low, high]."""
+
+
+class Pieces(NamedTuple):
+    """A piecewise straight map: breaks and the values there, and of each piece a point and the slope."""
+
+    breaks: tuple[float, ...]
+    values: tuple[float, ...]
+    anchors: tuple[tuple[float, float], ...]
+    slopes: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -228,23 +237,26 @@ class DeadZone:
                 mu.append(-self.weights[j] / (outer * inner))
         return DeadZone([self._value(rho) for rho in self.thresholds], mu)
 
-    def inverse(self, y: ArrayLike, ascending: bool = True) -> Array:
-        """The x that has the value y."""
-        return self.inverse_map().forward(y)
+    def inverse(
+        self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
+    ) -> Array:
+        """The x in [low, high], where the map has to rise, that has the value y; beyond it the end pieces go on."""
+        kept = self.over(low, high)
+        values = np.asarray(y, dtype=np.float64)
+        piece = np.searchsorted(np.asarray(kept.values), values, side="right")
+        anchor = np.asarray(kept.anchors)[piece]
+        return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / np.asarray(kept.slopes)[piece])
 
-    def restricted(self, low: float, high: float) -> DeadZone:
-        """The same map over [low, high] without the breaks that lie outside."""
-        kept = [
-            (r, e) for r, e in zip(self.thresholds, self.weights, strict=True) if r == 0.0 or low < r < high
-        ]
-        if low <= 0.0 <= high:
-            return DeadZone([r for r, _ in kept], [e for _, e in kept])
-        # Away from zero the breaks passed on the way stay part of the map
-        if low > 0.0:
-            kept = [(r, e) for r, e in zip(self.thresholds, self.weights, strict=True) if 0.0 <= r < high]
-        else:
-            kept = [(r, e) for r, e in zip(self.thresholds, self.weights, strict=True) if low < r <= 0.0]
-        return DeadZone([r for r, _ in kept], [e for _, e in kept])
+    def over(self, low: float, high: float) -> Pieces:
+        """The straight pieces that [low, high] touches; the first and the last go on beyond it."""
+        first, last = self._pieces(low, high)[0], self._pieces(low, high)[-1]
+        breaks = self.breaks[first:last]
+        return Pieces(
+            breaks,
+            tuple(self._value(b) for b in breaks),
+            self.anchors[first : last + 1],
+            self.piece_slopes[first : last + 1],
+        )
 
     def _pieces(self, low: float, high: float) -> range:
         first = bisect.bisect_right(self.breaks, low)
@@ -309,7 +321,9 @@ class TanhEnvelope:
             return np.asarray(a0 * float(kernels.tanh(np.float64(a1 * x + a2), tables)) + a3)
         return np.asarray(a0 * np.tanh(a1 * np.asarray(x, dtype=np.float64) + a2) + a3)
 
-    def inverse(self, y: ArrayLike, ascending: bool = True) -> Array:
+    def inverse(
+        self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
+    ) -> Array:
         """The x at which the branch is y (58); values the branch never reaches are taken as its last reachable ones."""
         a0, a1, a2, a3 = self.branch(ascending)
         edge = float(np.nextafter(1.0, 0.0))
@@ -379,8 +393,7 @@ class Cascade:
         """`v = G^-1[w]` on one branch, stages in reverse order."""
         v = w if isinstance(w, float) else np.asarray(w, dtype=np.float64)
         for stage, (low, high) in zip(reversed(self.stages), reversed(self.stage_ranges(ascending)), strict=True):
-            part = stage.restricted(low, high) if isinstance(stage, DeadZone) else stage
-            v = part.inverse(v if not isinstance(w, float) else float(v), ascending)
+            v = stage.inverse(v if not isinstance(w, float) else float(v), ascending, low, high)
         return np.asarray(v)
 
     def stage_ranges(self, ascending: bool) -> list[tuple[float, float]]:
@@ -391,6 +404,12 @@ class Cascade:
             ranges.append((low, high))
             low, high = stage.image(low, high, ascending)
         return ranges
+
+    @property
+    def stage_spans(self) -> list[tuple[float, float]]:
+        """The input range of every stage, over both branches of those before it."""
+        both = zip(self.stage_ranges(True), self.stage_ranges(False), strict=True)
+        return [(min(a[0], b[0]), max(a[1], b[1])) for a, b in both]
 
     @cached_property
     def play_range(self) -> tuple[float, float]:
@@ -419,6 +438,26 @@ class Cascade:
                 math.fsum([*(p * s for p, s in zip(self.pi.weights, states, strict=True)), self.output_offset])
             )
         return extremes[0], extremes[1]
+
+    @property
+    def start_is_defined(self) -> bool:
+        """Whether `G_R^-1`, and with it the drive that a start memory stands for, is unique."""
+        pairs = zip(self.stages, self.stage_ranges(True), strict=True)
+        return not any(stage.inverse_problems(*ends) for stage, ends in pairs if isinstance(stage, DeadZone))
+
+    @cached_property
+    def branch_gap(self) -> float:
+        """Bound of how far the branches of G lie apart within `input_range`; 0 with one branch.
+
+        Both rise, so that between two drives a < b they are nowhere farther apart than L(b) - R(a).
+        """
+        if not self.branches_differ:
+            return 0.0
+        low, high = self.input_range
+        drives = [low + (high - low) * i / 512 for i in range(513)]
+        up = [float(self.front(v, True)) for v in drives]
+        down = [float(self.front(v, False)) for v in drives]
+        return max(max(down[i + 1] - up[i], up[i + 1] - down[i]) for i in range(512))
 
     @cached_property
     def front_slopes(self) -> tuple[float, float]:

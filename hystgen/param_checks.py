@@ -370,6 +370,8 @@ class _Checker:
         if a0 and a1 and (a0 > 0) != (a1 > 0):
             what = f"a0 = {shown(a0)} and a1 = {shown(a1)} make a falling branch"
             self.add(path, f"{what}; give both the same sign")
+        elif a0 and a1 and not 1e-150 < abs(a0 * a1) < 1e150:
+            self.add(path, f"a0 a1, the branch's steepest slope, is {shown(a0 * a1)}; keep to 1e-150 .. 1e150")
 
     def _effect(self, path: Path, effect: Any) -> None:
         name = (*path, "name")

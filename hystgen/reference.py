@@ -10,7 +10,7 @@ type.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,21 @@ class Tables(NamedTuple):
     atanh: AtanhTables
 
 
+class PlayTables(Protocol):
+    """What memory and plays need of a model's constants, in any arithmetic."""
+
+    @property
+    def threshold(self) -> Reals: ...
+    @property
+    def weight(self) -> Reals: ...
+    @property
+    def slope(self) -> Reals: ...
+    @property
+    def lift(self) -> Reals: ...
+    @property
+    def limits(self) -> Reals: ...
+
+
 class State(NamedTuple):
     """One instance: plain arrays."""
 
@@ -67,7 +82,7 @@ class State(NamedTuple):
     play: Reals
 
 
-def new_state(t: Tables) -> State:
+def new_state(t: PlayTables) -> State:
     """Memory for one instance of the model; `init` gives it its values."""
     n = len(t.threshold) - 1
     dtype = t.threshold.dtype
@@ -109,7 +124,7 @@ def reached(x: Any, level: Any, rising: int) -> bool:
     return bool(x <= level)
 
 
-def held(t: Tables, s: State, c: int, k: int) -> Any:
+def held(t: PlayTables, s: State, c: int, k: int) -> Any:
     """What plays k and up contribute when corner c holds play k."""
     end = s.end[c]
     block = s.extremum[c] * (t.slope[end] - t.slope[k])
@@ -120,7 +135,7 @@ def held(t: Tables, s: State, c: int, k: int) -> Any:
     return s.tail[c] + block
 
 
-def corners_settle(t: Tables, s: State) -> None:
+def corners_settle(t: PlayTables, s: State) -> None:
     """Bring tail, base and next up to date after k, depth or the direction have changed."""
     k = s.counts[K]
     rising = s.counts[RISING]
@@ -140,7 +155,7 @@ def corners_settle(t: Tables, s: State) -> None:
         s.real[BASE] = s.real[TAIL] + t.lift[k]
 
 
-def corners_advance(t: Tables, s: State) -> None:
+def corners_advance(t: PlayTables, s: State) -> None:
     """The move has passed `next`: find the plays that follow now."""
     w = s.real[W]
     rising = s.counts[RISING]
@@ -175,7 +190,7 @@ def corners_advance(t: Tables, s: State) -> None:
     corners_settle(t, s)
 
 
-def corners_rest(t: Tables, s: State, w: Any) -> None:
+def corners_rest(t: PlayTables, s: State, w: Any) -> None:
     """Memory at rest: every play holds w."""
     n = len(t.threshold) - 1
     s.real[W] = w
@@ -191,7 +206,7 @@ def corners_rest(t: Tables, s: State, w: Any) -> None:
     corners_settle(t, s)
 
 
-def corners_start(t: Tables, s: State, play: Reals) -> None:
+def corners_start(t: PlayTables, s: State, play: Reals) -> None:
     """Memory with a state of its own for each play: one corner a play."""
     n = len(t.threshold) - 1
     s.real[W] = play[0]
@@ -220,7 +235,7 @@ def push_corner(s: State, c: int) -> None:
         s.side[c] = 1
 
 
-def corners_absorb(t: Tables, s: State, w: Any) -> None:
+def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     """Move the input of the plays to w."""
     rising = s.counts[RISING]
     if (rising and w < s.real[W]) or (not rising and w > s.real[W]):
@@ -235,7 +250,7 @@ def corners_absorb(t: Tables, s: State, w: Any) -> None:
         corners_advance(t, s)
 
 
-def corners_output(t: Tables, s: State) -> Any:
+def corners_output(t: PlayTables, s: State) -> Any:
     """Output of the play sum for the memory as it is."""
     return s.real[BASE] + s.real[W] * t.slope[s.counts[K]]
 
@@ -243,7 +258,7 @@ def corners_output(t: Tables, s: State) -> Any:
 # ---------------------------------------------------------------- corners_solve.c
 
 
-def level(t: Tables, s: State, c: int, k: int, rising: int) -> Any:
+def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
     """Output at the moment play k of corner c's block starts to follow."""
     w = activation(s, c, t.threshold[k], rising)
     tail = held(t, s, c, k + 1)
@@ -315,7 +330,7 @@ def loop_start(s: State, start: Reals) -> None:
         s.play[i] = start[i]
 
 
-def loop_absorb(t: Tables, s: State, w: Any) -> None:
+def loop_absorb(t: PlayTables, s: State, w: Any) -> None:
     """play_r[w] = max(w - r, min(w + r, play)), play by play."""
     for i in range(len(s.play)):
         low = w - t.threshold[i]
@@ -328,7 +343,7 @@ def loop_absorb(t: Tables, s: State, w: Any) -> None:
         s.play[i] = upper
 
 
-def loop_output(t: Tables, s: State) -> Any:
+def loop_output(t: PlayTables, s: State) -> Any:
     """p_0 play_0 + p_1 play_1 + ..., in this order."""
     total = t.limits[ZERO]
     for i in range(len(s.play)):
@@ -551,13 +566,13 @@ def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
     elif u < s.real[LEVEL]:
         up = 0
     v, limited = front_inverse(t, w, up)
-    if fits(s, v, up):
+    if fits(s, clamp_drive(t, v), up):
         return v, limited
-    back = v - s.real[APPLIED]
+    back = clamp_drive(t, v) - s.real[APPLIED]
     if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
         return s.real[APPLIED], limited
     v, limited = front_inverse(t, w, 1 - up)
-    if fits(s, v, 1 - up):
+    if fits(s, clamp_drive(t, v), 1 - up):
         return v, limited
     return s.real[APPLIED], limited
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import compiled, reference, tables
+from hystgen import compiled, fixed, reference, tables
 from hystgen.models import Cascade
 
 
@@ -16,7 +16,8 @@ class Session:
     """One instance of an operator, run over records that follow one another.
 
     `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
-    `clamp`; with one it is the bit reference of the emitted C, which clamps. Raises NotInvertibleError and FormatError.
+    `clamp`; with one it is the bit reference of the emitted C, which clamps, in codes of `lsb` (drive and output, None
+    for the finest) where it is fixed point. Raises NotInvertibleError and FormatError.
     """
 
     def __init__(
@@ -26,13 +27,15 @@ class Session:
         arithmetic: str | None = None,
         engine: str = "corners",
         clamp: bool = False,
+        lsb: tuple[float | None, float | None] = (None, None),
     ) -> None:
         self._inverse = int(operator == "inverse")
         if self._inverse:
             cascade.inverse()
-        self.tables = tables.build(cascade, arithmetic or "float64", engine, clamp or arithmetic is not None)
+        limited = clamp or arithmetic is not None
+        self.tables = tables.build(cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse))
         self.state = reference.new_state(self.tables)
-        self._code = compiled.reference()
+        self._code = compiled.reference(self.tables)
         self._code.init(self.tables, self.state)
 
     def visit(self, drives: Iterable[float]) -> None:
@@ -42,8 +45,15 @@ class Session:
         self.state.real[reference.LEVEL] = self._code.output(self.tables, self.state)
 
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], NDArray[np.int64]]:
-        """Answers (N,) for the input samples (N,), and the status bits of each sample."""
+        """Answers (N,) for the input samples (N,), and the status bits of each sample.
+
+        Fixed point takes and gives codes. Raises ValueError for numbers that are none.
+        """
         samples = np.ascontiguousarray(x, dtype=self.tables.threshold.dtype)
+        if samples.dtype.kind == "i":
+            given, most = np.asarray(x), int(self.tables.limits[fixed.CODE_MAX])
+            if np.any(given != samples) or np.any(samples < -most - 1) or np.any(samples > most):
+                raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
         return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.int64), samples)
 
     def operate(self, op: NDArray[np.int64], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:

@@ -7,16 +7,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import kernels, reference
 from hystgen.bounds import error_bounds
-from hystgen.models import Cascade, DeadZone, TanhEnvelope
+from hystgen.models import UNBOUNDED, Cascade, DeadZone, TanhEnvelope
 from hystgen.reference import Tables
 
+if TYPE_CHECKING:
+    from hystgen.fixed import FixedTables
+
+ARITHMETICS = ("float32", "float64", "q31", "q15")
 ENGINES = ("corners", "loop")
 FLOAT_ARITHMETICS = ("float32", "float64")
 SMALLEST_CORNERS = 3  # plays from which on the corner list is cheaper than visiting every play
@@ -44,7 +48,7 @@ def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
 
 
 def _stage_numbers(
-    stage: DeadZone | TanhEnvelope, low: float, high: float, clamp: bool
+    stage: DeadZone | TanhEnvelope, low: float, high: float
 ) -> tuple[int, int, list[float]]:
     if isinstance(stage, TanhEnvelope):
         numbers = []
@@ -52,24 +56,43 @@ def _stage_numbers(
             a0, a1, a2, a3 = stage.branch(ascending)
             numbers += [a0, a1, a2, a3, 1.0 / a0, 1.0 / a1, 1.0]  # the last becomes the largest number below 1
         return reference.TANH, 0, numbers
-    if clamp or any(s <= 0 for s in stage.piece_slopes):
-        stage = stage.restricted(low, high)
-    slopes = stage.piece_slopes
+    kept = stage.over(low, high)
     return (
         reference.DEAD_ZONE,
-        len(stage.breaks),
+        len(kept.breaks),
         [
-            *stage.breaks,
-            *(float(stage.forward(b)) for b in stage.breaks),
-            *(x for x, _ in stage.anchors),
-            *(y for _, y in stage.anchors),
-            *slopes,
-            *(1.0 / s if s > 0 else 0.0 for s in slopes),
+            *kept.breaks,
+            *kept.values,
+            *(x for x, _ in kept.anchors),
+            *(y for _, y in kept.anchors),
+            *kept.slopes,
+            *(1.0 / s if s > 0 else 0.0 for s in kept.slopes),
         ],
     )
 
 
-def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners", clamp: bool = True) -> Tables:
+def build(
+    cascade: Cascade,
+    arithmetic: str = "float64",
+    engine: str = "corners",
+    clamp: bool = True,
+    lsb: tuple[float | None, float | None] = (None, None),
+    inverse: bool = True,
+) -> Tables | FixedTables:
+    """Tables of `cascade` in 'float32', 'float64', 'q31' or 'q15' for engine 'corners' or 'loop'.
+
+    Without `clamp` the drive and output limits are those of the (float) arithmetic, and without `inverse` too the
+    stages are not cut to where they can be inverted; `lsb` are the physical units of a
+    drive and an output code in fixed point. Raises FormatError when the model does not fit the arithmetic.
+    """
+    if arithmetic in FLOAT_ARITHMETICS:
+        return build_float(cascade, arithmetic, engine, clamp, inverse)
+    from hystgen import fixed_tables
+
+    return fixed_tables.build(cascade, arithmetic, engine, *lsb)[0]
+
+
+def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inverse: bool) -> Tables:
     """Tables of `cascade` in 'float32' or 'float64' for engine 'corners' or 'loop'.
 
     Without `clamp` the drive and output limits are those of the arithmetic. Raises FormatError when a number or an
@@ -91,15 +114,15 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
     lift = [math.fsum(products[:k]) for k in range(n + 2)]
     bounded = clamp and all(math.isfinite(end) for end in cascade.input_range)
 
-    ranges = cascade.stage_ranges(True)
+    everywhere = not bounded and not inverse
+    spans = [UNBOUNDED] * len(cascade.stages) if everywhere else cascade.stage_spans
     kinds: list[int] = []
     firsts: list[int] = []
     sizes: list[int] = []
     numbers: list[float] = []
     for j, stage in enumerate(cascade.stages):
         assert isinstance(stage, DeadZone | TanhEnvelope)
-        low, high = ranges[j]
-        kind, size, data = _stage_numbers(stage, low, high, bounded)
+        kind, size, data = _stage_numbers(stage, *spans[j])
         kinds.append(kind)
         firsts.append(len(numbers))
         sizes.append(size)
@@ -115,13 +138,16 @@ def build(cascade: Cascade, arithmetic: str = "float64", engine: str = "corners"
     else:
         limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
     limits[reference.OFFSET] = cascade.output_offset
-    if not any(stage.inverse_problems(*ends) for stage, ends in zip(cascade.stages, ranges, strict=True)):
+    if cascade.start_is_defined:
         # the drive that the start memory stands for: held before any sample, and where the first move starts
         for place, w in ((reference.START_APPLIED, pi.start[0]), (reference.RESET_APPLIED, 0.0)):
             limits[place] = float(cascade.front_inverse(w))
     if cascade.branches_differ and not cascade.inverse_problems():
-        limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).inverse
+        limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits[reference.REAL_MAX] = largest
+    if max(map(abs, limits)) > largest:
+        reached = max(map(abs, limits))
+        raise FormatError(f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}")
 
     tables = Tables(
         threshold=reals(pi.thresholds, "thresholds"),

@@ -32,6 +32,14 @@ FILES = {
     + "  memoryless:\n    - {kind: dead_zone, thresholds: [-1, 0, 0.4, 1], weights: [-1.1, 2.8, -0.1, 0.1]}\n"
     + "    - kind: tanh\n      ascending: {a0: 6, a1: 0.1, a2: 0.1, a3: 0.2}\n"
     + "      descending: {a0: 6, a1: 0.1, a2: 0.1, a3: 0.5}\n",
+    "behind": head("behind", -1, 1.5)
+    + PLAYS
+    + "  memoryless:\n    - kind: tanh\n      ascending: {a0: 1, a1: 1, a2: 0, a3: 0}\n"
+    + "      descending: {a0: 1, a1: 1, a2: 0, a3: 0.5}\n"
+    + "    - {kind: dead_zone, thresholds: [0, 1], weights: [1, 2]}\n",
+    "away": head("away", 2, 5)
+    + PLAYS
+    + "  memoryless: {kind: dead_zone, thresholds: [0, 1, 3], weights: [-1, 2, 0.5]}\n",
     "linear": head("linear", 0, 1) + "\n  pi: {thresholds: [0], weights: [2]}\n",
     "density": head("density", 0, 10) + '\n  pi: {density: {formula: "0.8*exp(-0.3*r)", p0: 0.7, r_max: 4, n: 40}}\n',
 }

@@ -36,23 +36,24 @@ def required_compilers() -> list[compilers.Compiler]:
 def check_codegen(name: str, **options: str) -> None:
     """What ends every feature test: the emitted C gives the bits of the reference."""
     required_compilers()
-    length = int(os.environ.get("HYSTGEN_LENGTH", "30000"))
+    length = int(os.environ.get("HYSTGEN_LENGTH", "10000"))
     report = hystgen.verify(model(name), operator="both", length=length, **options)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} == {"forward", "inverse"}
 
 
 @pytest.mark.parametrize("engine", ["corners", "loop"])
-@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
 def test_bits_equal(name: str, arithmetic: str, engine: str) -> None:
     check_codegen(name, arithmetic=arithmetic, engine=engine)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS[1:])
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])
-def test_bits_equal_in_other_layouts(name: str, layout: str) -> None:
-    check_codegen(name, arithmetic="float32", layout=layout)
+def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) -> None:
+    check_codegen(name, arithmetic=arithmetic, layout=layout)
 
 
 @pytest.mark.slow
@@ -66,7 +67,7 @@ def test_bits_equal_over_long_records(arithmetic: str) -> None:
 @pytest.mark.parametrize("operator", ["forward", "inverse", "both"])
 @pytest.mark.parametrize("name", FILES)
 def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_path: Path) -> None:
-    arithmetic = "float64" if name in ("bent", "curved") else "float32"
+    arithmetic = {"bent": "float64", "curved": "float64", "mixed": "q31", "listed": "q15"}.get(name, "float32")
     engine = "loop" if operator == "forward" else "corners"
     hystgen.emit(model(name), tmp_path, operator=operator, layout=layout, arithmetic=arithmetic, engine=engine)
     if layout == "single-header":
@@ -132,6 +133,7 @@ def test_error_bounds_hold(name: str, arithmetic: str, engine: str) -> None:
     ("plain", {"operator": "inverse", "arithmetic": "float32", "engine": "corners"}),
     ("bent", {"operator": "both", "arithmetic": "float64", "engine": "loop"}),
     ("two_branches", {"operator": "inverse", "arithmetic": "float32", "layout": "single-header"}),
+    ("curved", {"operator": "inverse", "arithmetic": "q15"}),
 ])  # fmt: skip
 def test_golden(name: str, options: dict[str, str]) -> None:
     """The C under review; HYSTGEN_UPDATE_GOLDEN=1 writes it anew."""

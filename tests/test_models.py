@@ -226,3 +226,48 @@ def test_inverse_memory_follows_the_forward_memory() -> None:
     v = model.inverse().simulate(u)
     np.testing.assert_allclose(v, Cascade(model).inverse().simulate(u), atol=1e-13)
     assert memory.is_admissible(model.inverse().start, model.inverse().thresholds, 1e-12)
+
+
+def test_breaks_that_only_the_descending_branch_reaches_count() -> None:
+    envelope = TanhEnvelope((1.0, 1.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.5))
+    model = Cascade(PI([0], [1.0]), (envelope, DeadZone([0, 1], [1, 2])), 0.0, (-1.5, 1.5))
+    v = np.array([1.0, 1.5, 1.4, 1.2, 0.9])
+    for arithmetic in (None, "float64", "float32"):
+        y = Session(model, "forward", arithmetic).run(v)[0]
+        assert np.abs(y - brute(model, v)).max() < 1e-5
+
+
+def test_a_map_that_falls_outside_the_range_is_used_inside() -> None:
+    """Segments are judged inside the range, and beyond it the forward map is still the map."""
+    stage = DeadZone([0, 1, 3], [-1, 2, 0.5])
+    model = Cascade(PI([0, 0.5], [1.0, 0.5]), (stage,), 0.0, (2.0, 5.0))
+    assert model.inverse_problems() == []
+    v = np.array([2.0, 4.5, 3.0, 5.0, 2.5, -1.0, 0.5])
+    y = model.simulate(v)
+    assert np.abs(y - brute_from(model, v, np.array([0.0, 0.0]))).max() < 1e-12
+    u = model.simulate(v[:5])
+    assert np.abs(model.simulate(model.inverse().simulate(u)) - u).max() < 1e-12
+
+
+def brute_from(model: Cascade, v: np.ndarray, s: np.ndarray) -> np.ndarray:
+    r, p = np.array(model.pi.thresholds), np.array(model.pi.weights)
+    y = []
+    for x in v:
+        for stage in model.stages:
+            x = _dead_zone(stage, x)
+        s = np.maximum(x - r, np.minimum(x + r, s))
+        y.append(p @ s + model.output_offset)
+    return np.array(y)
+
+
+def test_a_start_beyond_the_range_takes_the_branch_of_the_limited_drive() -> None:
+    envelope = TanhEnvelope((1.0, 1.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.3))
+    model = Cascade(PI([0, 0.2], [1.0, 0.5], 0.9), (envelope,), 0.0, (-1.0, 1.0))
+    u = model.simulate(np.array([0.9, 0.5, 0.95, -0.7]))
+    v = model.inverse().simulate(u, clamp=True)
+    assert np.abs(model.simulate(v) - u).max() < 1e-12
+
+
+def test_decimal_states_of_a_history_are_no_projection() -> None:
+    assert not PI([0, 0.45, 0.9], [1, 1, 1], [1, 0.55, 0.1]).projected
+    assert PI([0, 0.45, 0.9], [1, 1, 1], [1, 0.55, 0.0999]).projected

@@ -48,7 +48,9 @@ void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("real", [[], ["-DHYSTGEN_REAL_IS_DOUBLE"]], ids=["float", "double"])
+@pytest.mark.parametrize(
+    "real", [[], ["-DHYSTGEN_REAL_IS_DOUBLE"], ["-DHYSTGEN_FIXED"]], ids=["float", "double", "fixed"]
+)
 @pytest.mark.parametrize("dialect", ["-std=c99", "-std=c11", "-x c++ -std=c++17"])
 def test_compiles_clean_without_undefined_symbols(compiler: str, real: list[str], dialect: str, tmp_path: Path) -> None:
     flags = WARNINGS if "c++" in dialect else C_WARNINGS

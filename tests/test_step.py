@@ -40,6 +40,13 @@ class Actuator:
         return v
 
     def front_inverse(self, w: float) -> float:
+        if not any(isinstance(stage, TanhEnvelope) for stage in self.model.stages):
+            # what the map does outside the range is nobody's business: its ends go on straight
+            for end, inside in ((self.low, self.low + 1e-3), (self.high, self.high - 1e-3)):
+                slope = (self.front(end, True) - self.front(inside, True)) / (end - inside)
+                if (w - self.front(end, True)) / slope * (end - inside) >= 0:
+                    return end + (w - self.front(end, True)) / slope
+            return bisect(lambda v: self.front(v, True), w, self.low, self.high)
         return bisect(lambda v: self.front(v, True), w, -50.0, 50.0)
 
     def set(self, plays: np.ndarray) -> None:
@@ -127,12 +134,13 @@ class Compensator:
         first = True if limited > self.level else False if limited < self.level else a.up
         self.level = limited
         # On one curve both directions meet in the drive as it is; with two, each reaches down or up to its own end
-        ways = {True: (a.drive, 100.0), False: (-100.0, a.drive)}
+        ways = {True: (a.drive, max(a.drive, a.high) + 0.9), False: (min(a.drive, a.low) - 0.9, a.drive)}
         if not self.plant.model.branches_differ:
             first = limited >= a.would_give(a.drive, a.up)
         for up in (first, not first):
             low, high = ways[up]
-            if a.would_give(low, up) - CLOSE <= limited <= a.would_give(high, up) + CLOSE:
+            # more than a branch ever gives is a drive beyond the range, in the branch's own direction
+            if limited >= a.would_give(low, up) - CLOSE if up else limited <= a.would_give(high, up) + CLOSE:
                 v = bisect(lambda x, up=up: a.would_give(x, up), limited, low, high)
                 break
         else:

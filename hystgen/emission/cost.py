@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hystgen import reference
+from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
 
 if TYPE_CHECKING:
@@ -29,10 +31,35 @@ def _struct(*fields: int) -> int:
     return -(-at // max(fields)) * max(fields)
 
 
-def estimate(cascade: Cascade, options: Options, numbers: reference.Tables) -> Cost:
-    """Cost of the emitted model."""
+_SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
+          "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
+_STRUCTS = {"tables_t": 24, "dead_zone_t": 28, "curve_t": 16}  # of pointers and counts
+
+
+def _constants(text: str, real: int, fixed: bool) -> int:
+    """Bytes of the constants that the C text defines, alignment left out."""
+    total = 0
+    for kind, size in re.findall(r"^static const (\w+) \w+(?:\[(\d+)\])? = ", text, flags=re.MULTILINE):
+        own = next((width for ending, width in _STRUCTS.items() if kind.endswith(ending)), None)
+        if kind.endswith("envelope_t"):
+            own = 7 * real
+        elif kind.endswith("back_t"):
+            own = 16 + 8 + 2 * real + 16 + 8
+        elif kind.endswith("tables_t") and fixed:
+            own = 28 + 2 * real
+        elif own is None:
+            own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
+            own = own or (4 if fixed else real)
+        total += own * int(size or 1)
+    return total
+
+
+def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | FixedTables, text: str) -> Cost:
+    """Cost of the emitted model whose implementation is `text`."""
     n = cascade.pi.n
-    real = 4 if options.arithmetic == "float32" else 8
+    fixed = isinstance(numbers, FixedTables)
+    real = {"float32": 4, "float64": 8, "q31": 4, "q15": 2}[options.arithmetic]
+    play, reach, sums = (4, 8 if options.arithmetic == "q31" else 4, 8) if fixed else (real, real, real)
     corners = options.engine == "corners"
     branches = cascade.branches_differ
     sizes = []
@@ -40,26 +67,21 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables) -> C
         if not getattr(options, op):
             continue
         if corners:
-            memory = _struct(real, real, real, real, 2, 2, 1) + max(n, 1) * _struct(real, real, 2, 1)
+            memory = [_struct(sums, sums, reach, play, 2, 2, 1), max(n, 1) * _struct(sums, play, 2, 1)]
         else:
-            memory = (n + 1) * real
+            memory = [(n + 1) * play]
         if op == "forward":
             fields = [real] * (1 + branches) + [1] * branches + [4]
         else:
             fields = [real] * (4 + branches) + [1] * (3 + branches) + [4, 4]
-        rest = _struct(*fields)
-        sizes.append((op, memory + rest))
-
-    used = [True, not corners, corners, corners or options.inverse, options.inverse]
-    counts = [n + 1, n + 1, n + 2, n + 2, n + 2]
-    reals = sum(count for count, use in zip(counts, used, strict=True) if use)
-    reals += len(numbers.start) if len(numbers.start) > 1 else 0
-    stage_bytes = len(numbers.stage_data) * real
+        widest = sums if corners else play
+        whole = sum(memory) + _struct(*fields)
+        sizes.append((op, -(-whole // widest) * widest))
     worst = [(op, _worst(n, op, corners, numbers)) for op, _ in sizes]
-    return Cost(reals * real + stage_bytes + 24, sizes, worst)
+    return Cost(_constants(text, reach if fixed else real, fixed), sizes, worst)
 
 
-def _worst(n: int, op: str, corners: bool, numbers: reference.Tables) -> str:
+def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:
     """Most multiplications and comparisons of real numbers in one step, kernels of tanh and atanh not counted."""
     bisect = n.bit_length()
     probes = bisect + 2 * bisect  # through the corners, then through one block with galloping
@@ -73,6 +95,16 @@ def _worst(n: int, op: str, corners: bool, numbers: reference.Tables) -> str:
     else:
         products = (n + 1) + 2 * n + 1
         compares = absorb_compares + n + 1 + 10
+    if numbers.branches:
+        compares += 12
+    if isinstance(numbers, FixedTables):
+        products = 2 * products + 2  # wide ones count twice
+        if numbers.fronts:
+            passes = 1 if op == "forward" else 2 + int(numbers.branches)
+            degree = numbers.coefficient.shape[1] - 1
+            products += passes * (degree + 1)
+            compares += passes * (int(max(numbers.pieces)).bit_length() + 2)
+        return f"{products} multiplications of 32 by 32 bits, {compares} comparisons"
     fronts = [0, 0]
     for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True):
         passes = 1 if op == "forward" else 2 + int(numbers.branches)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 VERSION = 1  # of the interface between emitted models and a shared run time
 
-KERNEL_FILES = (
+FLOAT_KERNELS = (
     "tanh_{bits}.c",
     "atanh_{bits}.c",
     "envelope_forward.c",
@@ -26,6 +26,46 @@ KERNEL_FILES = (
     "loop_absorb.c",
     "loop_solve.c",
 )
+FIXED_KERNELS = (
+    "over_slope.c",
+    "corners_absorb.c",
+    "corners_solve_fixed.c",
+    "loop_absorb.c",
+    "loop_solve_fixed.c",
+    "curve.c",
+)
+
+
+@dataclass(frozen=True)
+class Family:
+    """How an arithmetic appears in C: `bits` names it, `real` is the type of inputs and answers.
+
+    In floating point every number has that type; in fixed point `reach` and `sum` are those of where plays start to
+    follow and of outputs before they are rounded, `reach_max` is beyond any of the former.
+    """
+
+    bits: str
+    real: str
+    reach_max: str
+    reach: str = ""
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is fixed point."""
+        return bool(self.reach)
+
+    @property
+    def tables(self) -> str:
+        """The header of the run time that has the types of its tables."""
+        return "hystgen_tables_fixed.h" if self.fixed else "hystgen_tables_float.h"
+
+
+FAMILIES = {
+    "float32": Family("f32", "float", "FLT_MAX"),
+    "float64": Family("f64", "double", "DBL_MAX"),
+    "q31": Family("q31", "int32_t", "(INT64_MAX / 2)", "int64_t"),
+    "q15": Family("q15", "int16_t", "INT32_MAX", "int32_t"),
+}
 
 
 def data_folder(name: str) -> Path:
@@ -87,9 +127,10 @@ def _read(name: str) -> str:
     return (data_folder("c_runtime") / name).read_text(encoding="utf-8")
 
 
-def kernel_pieces(bits: str) -> list[Piece]:
-    """Every piece of every kernel file for `bits` 'f32' or 'f64', callees before callers."""
-    return [piece for name in KERNEL_FILES for piece in split_pieces(_read(name.format(bits=bits)))]
+def kernel_pieces(family: Family) -> list[Piece]:
+    """Every piece of every kernel file of an arithmetic, callees before callers."""
+    files = FIXED_KERNELS if family.fixed else FLOAT_KERNELS
+    return [piece for name in files for piece in split_pieces(_read(name.format(bits=family.bits)))]
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
@@ -107,21 +148,31 @@ def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
     return [piece for piece in by_name.values() if piece.name in wanted]
 
 
-def render(pieces: Iterable[Piece], prefix: str, real_max: str, static: bool) -> str:
+def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
-    text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REAL_MAX", real_max)
+    text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
+    return _named(text, prefix, family)
+
+
+def _named(text: str, prefix: str, family: Family) -> str:
+    if not family.fixed:  # one type for everything
+        text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
+        text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
     return text.replace("hystgen_", prefix + "_")
 
 
-def types(file: str, wanted: Iterable[str], prefix: str) -> str:
+def types(file: str, wanted: Iterable[str], prefix: str, family: Family) -> str:
     """Type definitions of a header of the run time, those named in `wanted` (all of them when empty)."""
     pieces = split_pieces(_read(file))
     chosen = set(wanted) or {piece.name for piece in pieces}
-    return "\n".join(piece.text for piece in pieces if piece.name in chosen).replace("hystgen_", prefix + "_")
+    return _named("\n".join(piece.text for piece in pieces if piece.name in chosen), prefix, family)
 
 
-def prototypes(prefix: str) -> str:
+def prototypes(prefix: str, family: Family) -> str:
     """Prototypes of all kernels."""
-    pieces = split_pieces(_read("hystgen_runtime.h").partition('#include "hystgen_tables.h"')[2])
-    return "".join(piece.text for piece in pieces).replace("hystgen_", prefix + "_")
+    _, _, text = _read("hystgen_runtime.h").partition('#include "hystgen_state.h"')
+    fixed, _, others = text.partition("#else")
+    floating, _, both = others.partition("#endif")
+    pieces = split_pieces((fixed if family.fixed else floating) + both)
+    return _named("".join(piece.text for piece in pieces), prefix, family)

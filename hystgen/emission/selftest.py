@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen import reference
+from hystgen import compiled, fixed, reference
 from hystgen.emission.text import literal
+from hystgen.fixed import FixedTables
 
 if TYPE_CHECKING:
     from hystgen.emission.module import Options
@@ -31,7 +32,7 @@ def _fractions(length: int) -> list[float]:
     return path
 
 
-def operators(numbers: reference.Tables, options: Options) -> list[dict[str, Any]]:
+def operators(numbers: reference.Tables | FixedTables, options: Options) -> list[dict[str, Any]]:
     """One entry an operator: its name and its samples as C text."""
     found = []
     for name in ("forward", "inverse"):
@@ -40,26 +41,34 @@ def operators(numbers: reference.Tables, options: Options) -> list[dict[str, Any
     return found
 
 
-def _samples(numbers: reference.Tables, inverse: bool) -> list[dict[str, Any]]:
-    real = numbers.threshold.dtype.type
+def _samples(numbers: reference.Tables | FixedTables, inverse: bool) -> list[dict[str, Any]]:
+    def at(low: Any, high: Any, part: float) -> Any:
+        """The argument that far along a range: in the arithmetic's own operations, or the nearest code there is."""
+        if isinstance(numbers, FixedTables):
+            most = int(numbers.limits[fixed.CODE_MAX])
+            return min(max(round(int(low) + (int(high) - int(low)) * part), -most - 1), most)
+        real = numbers.threshold.dtype.type
+        return low + (high - low) * real(part)
+
     first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
     low, high = numbers.limits[first], numbers.limits[first + 1]
     drive_low, drive_high = numbers.limits[reference.DRIVE_MIN], numbers.limits[reference.DRIVE_MAX]
     calls, arguments = [], []
     for i, part in enumerate(_fractions(180)):
         calls.append(reference.OP_STEP)
-        arguments.append(low + (high - low) * real(part))
+        arguments.append(at(low, high, part))
         if inverse and i % 23 == 22:
             calls.append(reference.OP_COMMIT)
-            arguments.append(drive_low + (drive_high - drive_low) * real(0.3 + i / 1000.0))
+            arguments.append(at(drive_low, drive_high, 0.3 + i / 1000.0))
         if i == 120:
             calls.append(reference.OP_RESET)
-            arguments.append(low + (high - low) * real(0.25))
+            arguments.append(at(low, high, 0.25))
     state = reference.new_state(numbers)
-    reference.init(numbers, state)
-    x = np.array(arguments, dtype=real)
+    code = compiled.reference(numbers, compiled=False)
+    code.init(numbers, state)
+    x = np.array(arguments, dtype=numbers.threshold.dtype)
     answers, status = np.zeros_like(x), np.zeros(len(x), dtype=np.int64)
-    reference.run(numbers, state, int(inverse), np.array(calls, dtype=np.int64), x, answers, status)
+    code.run(numbers, state, int(inverse), np.array(calls, dtype=np.int64), x, answers, status)
     return [
         {"call": CALLS[c], "argument": literal(a), "answer": literal(y), "status": int(s)}
         for c, a, y, s in zip(calls, x, answers, status, strict=True)

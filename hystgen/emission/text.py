@@ -11,7 +11,9 @@ WIDTH = 110
 
 
 def literal(x: Any) -> str:
-    """The shortest C literal that gives exactly this float32 or float64 back."""
+    """The C literal that gives exactly this float32, float64 or whole number back, the shortest one."""
+    if isinstance(x, np.integer | int):
+        return str(x)
     if not np.isfinite(x):
         raise ValueError("only finite numbers have a literal")
     return f"{np.float32(x)!s}f" if isinstance(x, np.float32) else repr(float(x))
@@ -27,7 +29,7 @@ def table(kind: str, name: str, values: Sequence[Any]) -> str:
     """A constant array of literals."""
     lines = [f"static const {kind} {name}[{len(values)}] = {{", "   "]
     for i, value in enumerate(values):
-        item = " " + literal(value) + ("," if i + 1 < len(values) else "")
+        item = " " + literal(value) + ("u" if kind == "uint32_t" else "") + ("," if i + 1 < len(values) else "")
         if len(lines[-1]) + len(item) > WIDTH:
             lines.append("   ")
         lines[-1] += item

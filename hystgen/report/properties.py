@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from hystgen import fixed_tables
 from hystgen.api import Model
 from hystgen.bounds import error_bounds
 from hystgen.models import DeadZone
+from hystgen.tables import FormatError
 
 HARD_RATIO = 1e6
 
@@ -40,10 +42,31 @@ def properties(model: Model) -> str:
         for arithmetic in ("float32", "float64"):
             bounds = error_bounds(c, arithmetic, model.engine())
             lines.append(
-                f"error, {arithmetic}     forward {bounds.forward:.3g}{output}, inverse {bounds.inverse:.3g}{drive}"
+                f"error, {arithmetic}     forward {bounds.forward:.3g}{output}, inverse {bounds.rounding:.3g}{drive}"
                 " at most, against the exact model"
             )
+        lines += _fixed(model, drive, output)
+        if c.branches_differ:
+            lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
     return "\n".join(lines)
+
+
+def _fixed(model: Model, drive: str, output: str) -> list[str]:
+    """What fixed point gives the user, in physical units, or why it cannot be had."""
+    lines = []
+    emit = model.parameters.emit
+    for arithmetic in ("q31", "q15"):
+        try:
+            form = fixed_tables.build(model.cascade, arithmetic, model.engine(), emit.drive_lsb, emit.output_lsb)[1]
+        except FormatError as error:
+            lines.append(f"{arithmetic}                not available: {error}")
+            continue
+        a, b = float(form.drive_lsb), float(form.output_lsb)
+        lines.append(
+            f"error, {arithmetic}         forward {form.forward_error * b:.3g}{output}, inverse "
+            f"{(form.inverse_rounding or 0) * a:.3g}{drive}; codes of {a:.4g}{drive} and {b:.4g}{output}"
+        )
+    return lines
 
 
 def warnings(model: Model) -> list[str]:

@@ -15,9 +15,10 @@ import cffi
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled, reference, tables
+from hystgen import compiled, reference
 from hystgen.api import Model, emit_options
-from hystgen.emission import files, module
+from hystgen.emission import files, module, runtime
+from hystgen.fixed import FixedTables
 from hystgen.verification import compilers, signals
 
 HOST = "host"
@@ -116,19 +117,21 @@ class _Expected:
     status: NDArray[np.uint8]
 
 
-def expected_records(numbers: reference.Tables, inverse: bool, length: int) -> list[_Expected]:
-    """The verification records of an operator with the answers of the bit reference."""
-    code = compiled.reference()
-    real = numbers.threshold.dtype
+def expected_records(
+    numbers: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int
+) -> list[_Expected]:
+    """The verification records of an operator, in numbers of type `real`, with the answers of the bit reference."""
+    code = compiled.reference(numbers)
     records = []
-    for name, op, values in signals.suite(numbers, inverse, length):
-        with np.errstate(over="ignore"):
-            x = values.astype(real)
+    for name, op, values in signals.suite(numbers, real, inverse, length):
+        x = values.astype(numbers.threshold.dtype)
         state = reference.new_state(numbers)
         answer, status = np.zeros_like(x), np.zeros(len(x), dtype=np.int64)
         code.init(numbers, state)
         code.run(numbers, state, int(inverse), op, x, answer, status)
-        records.append(_Expected(name, op.astype(np.uint8), x, answer, status.astype(np.uint8)))
+        records.append(
+            _Expected(name, op.astype(np.uint8), x.astype(real), answer.astype(real), status.astype(np.uint8))
+        )
     return records
 
 
@@ -225,7 +228,9 @@ def verify_model(
     asked for and missing is a failed row. Raises what `emit` raises.
     """
     options = emit_options(model, operator, arithmetic, engine, layout)
-    numbers = tables.build(model.cascade, options.arithmetic, options.engine)
+    numbers = model.tables(options.arithmetic, options.engine)
+    family = runtime.FAMILIES[options.arithmetic]
+    real = np.dtype({"float": "f4", "double": "f8", "int32_t": "i4", "int16_t": "i2"}[family.real])
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     for target in targets:
@@ -239,8 +244,7 @@ def verify_model(
         report.rows.append(Row(HOST, "-", "-", "-", error=message))
         return report
     progress("reference")
-    records = {op: expected_records(numbers, op == "inverse", length) for op in operators}
-    real = "float" if options.arithmetic == "float32" else "double"
+    records = {op: expected_records(numbers, real, op == "inverse", length) for op in operators}
     with tempfile.TemporaryDirectory(prefix="hystgen-verify-") as folder:
         sources = write_sources(Path(folder), model, options)
         for number, (name, found) in enumerate(chosen):
@@ -255,7 +259,7 @@ def verify_model(
                 except compilers.CompileError as error:
                     report.rows.append(Row(HOST, name, build, "-", error=str(error)))
                     continue
-                library = _Library(output, real, operators)
+                library = _Library(output, family.real, operators)
                 for op in operators:
                     samples, different, worst, first = _check(library, op, records[op])
                     report.rows.append(

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import reference
+from hystgen.fixed import FixedTables
 
 Calls = tuple[str, NDArray[np.int64], NDArray[np.float64]]
 
@@ -21,12 +23,25 @@ def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
     return np.interp(np.linspace(0, len(points) - 1, length), np.arange(len(points)), points)
 
 
-def suite(tables: reference.Tables, inverse: bool, length: int = 100_000) -> Iterator[Calls]:
-    """Records of `length` calls: name, operations and arguments; the same ones every time."""
+def suite(
+    tables: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
+) -> Iterator[Calls]:
+    """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same ones every time."""
+    for name, op, x in _suite(tables, real, inverse, length):
+        with np.errstate(over="ignore"):
+            if real.kind == "i":
+                x = np.clip(np.rint(x), np.iinfo(real).min, np.iinfo(real).max)
+            yield name, op, x.astype(real).astype(np.float64)
+
+
+def _suite(
+    tables: reference.Tables | FixedTables, real_type: np.dtype[Any], inverse: bool, length: int
+) -> Iterator[Calls]:
     first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
     low, high = (float(x) for x in tables.limits[first : first + 2])
     middle, half = (low + high) / 2, (high - low) / 2
-    real = tables.threshold.dtype.type
+    whole = real_type.kind == "i"
+    real = np.float64 if whole else real_type.type
     info = np.finfo(real)
     rng = np.random.default_rng(20220916)
     phase = np.linspace(0, 1, length)
@@ -49,18 +64,24 @@ def suite(tables: reference.Tables, inverse: bool, length: int = 100_000) -> Ite
     moving = rng.random(length) < 0.2
     yield record("plateaus", np.where(moving, rng.uniform(low, high, length), plateaus))
     yield record("beyond the range", middle + 1.5 * half * np.sin(2 * np.pi * 150 * phase) + 0.1 * half * walk)
-    tiny = float(info.smallest_subnormal) * rng.integers(-1000, 1000, length)
-    yield record("denormals", np.where(rng.random(length) < 0.7, tiny, float(info.tiny) * rng.normal(0, 3, length)))
-    least = np.spacing(real(abs(middle)))
+    if not whole:
+        tiny = float(info.smallest_subnormal) * rng.integers(-1000, 1000, length)
+        small = float(info.tiny) * rng.normal(0, 3, length)
+        yield record("denormals", np.where(rng.random(length) < 0.7, tiny, small))
+    least = 1.0 if whole else np.spacing(real(abs(middle)))
     yield record("last bits", middle + float(least) * np.round(rng.normal(0, 4, length)))
 
-    special = np.array(
-        [np.nan, np.inf, -np.inf, 0.0, -0.0, float(info.max), -float(info.max), float(info.tiny), low, high]
-    )
+    if whole:
+        most = float(np.iinfo(real_type).max)
+        special = np.array([most, -most, -most - 1, 0.0, 1.0, -1.0, low, high, low + 1, high - 1])
+    else:
+        special = np.array(
+            [np.nan, np.inf, -np.inf, 0.0, -0.0, float(info.max), -float(info.max), float(info.tiny), low, high]
+        )
     x = _through(points, length)
     places = rng.random(length) < 0.2
     x[places] = rng.choice(special, int(places.sum()))
-    yield record("NaN, infinities, extremes", x)
+    yield record("extremes" if whole else "NaN, infinities, extremes", x)
 
     kinds = [reference.OP_STEP, reference.OP_RESET, reference.OP_INIT]
     chances = [0.995, 0.004, 0.001]

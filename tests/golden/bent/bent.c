@@ -18,7 +18,7 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* The constant tables of one model. */
+/* The constant tables of one model in floating point. */
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {
@@ -93,7 +93,7 @@ static void bent_loop_absorb(const bent_tables_t *t, bent_real_t *play, bent_rea
         const bent_real_t low = w - t->threshold[i];
         const bent_real_t high = w + t->threshold[i];
         const bent_real_t upper = play[i] > high ? high : play[i];
-        play[i] = upper < low ? low : upper;
+        play[i] = (upper < low ? low : upper);
     }
 }
 
@@ -147,14 +147,14 @@ static const bent_real_t bent_lift[8] = {
     0.0, 0.0, 0.27, 0.702, 1.188, 1.62, 1.8900000000000001, 1.9224
 };
 
-static const bent_real_t bent_inverse_slope[8] = {
+static const bent_real_t bent_reciprocal[8] = {
     0.0, 1.3888888888888888, 0.7575757575757577, 0.5555555555555556, 0.4629629629629629, 0.4166666666666667,
     0.3968253968253968, 0.3949447077409163
 };
 
 /* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights; plays without r_0 */
 static const bent_tables_t bent_tables = {
-    bent_threshold, bent_weight, NULL, bent_lift, bent_inverse_slope, 6
+    bent_threshold, bent_weight, NULL, bent_lift, bent_reciprocal, 6
 };
 
 /* the straight pieces of the dead-zone sum */

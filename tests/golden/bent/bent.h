@@ -9,7 +9,7 @@
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout self-contained
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   488 bytes
+ *     constant tables   516 bytes
  *     forward instance  72 bytes of RAM
  *     inverse instance  104 bytes of RAM
  *     forward step, worst case: 8 multiplications, 21 comparisons

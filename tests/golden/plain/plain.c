@@ -18,7 +18,7 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* The constant tables of one model. */
+/* The constant tables of one model in floating point. */
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {
@@ -31,12 +31,14 @@ typedef struct {
 } plain_tables_t;
 
 /* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static plain_real_t plain_activation(const plain_corner_t *c, plain_real_t r, bool rising)
+static plain_real_t plain_activation(const plain_corner_t *c, plain_real_t threshold, bool rising)
 {
+    const plain_real_t e = c->extremum;
+    const plain_real_t r = threshold;
     if (rising) {
-        return c->side > 0 ? c->extremum + (r + r) : c->side == 0 ? c->extremum + r : c->extremum;
+        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
     }
-    return c->side < 0 ? c->extremum - (r + r) : c->side == 0 ? c->extremum - r : c->extremum;
+    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
 }
 
 static bool plain_reached(plain_real_t x, plain_real_t level, bool rising)
@@ -240,13 +242,13 @@ static const plain_real_t plain_lift[8] = {
     0.0f, 0.0f, 0.27f, 0.702f, 1.188f, 1.62f, 1.89f, 1.9224f
 };
 
-static const plain_real_t plain_inverse_slope[8] = {
+static const plain_real_t plain_reciprocal[8] = {
     0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
 };
 
 /* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights; plays without r_0 */
 static const plain_tables_t plain_tables = {
-    plain_threshold, NULL, plain_slope, plain_lift, plain_inverse_slope, 6
+    plain_threshold, NULL, plain_slope, plain_lift, plain_reciprocal, 6
 };
 
 static bool plain_finite(plain_real_t x)

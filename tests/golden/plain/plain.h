@@ -59,18 +59,18 @@ typedef float plain_real_t;
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
+    plain_real_t tail;       /* what the plays from `end` on contribute to the output */
     plain_real_t extremum;  /* input of the plays at which the move that left this corner ended */
-    plain_real_t tail;      /* what the plays from `end` on contribute to the output */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } plain_corner_t;
 
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
+    plain_real_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
+    plain_real_t tail;    /* what plays k .. n contribute to the output */
+    plain_real_t next;  /* w at which play k starts to follow */
     plain_real_t w;      /* input of the plays, w = G[v] */
-    plain_real_t base;   /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    plain_real_t tail;   /* what plays k .. n contribute to the output */
-    plain_real_t next;   /* w at which play k starts to follow */
     uint_least16_t k;
     uint_least16_t depth;  /* corners held */
     bool rising;           /* direction of the present move of w */

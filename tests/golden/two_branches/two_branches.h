@@ -6,16 +6,17 @@
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
- * Model: 6 plays behind envelope; arithmetic float32; engine corners; operator inverse; layout single-header
+ * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout single-header
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   204 bytes
+ *     constant tables   360 bytes
  *     inverse instance  128 bytes of RAM
- *     inverse step, worst case: 39 multiplications, 39 comparisons, 1 tanh, 2 atanh
+ *     inverse step, worst case: 39 multiplications, 51 comparisons, 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
- * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero
- * or round other than to nearest: there the answers can differ from the reference in the last bits.
+ * the parameter file; reset starts again from plays at 0. Define TWO_BRANCHES_IMPLEMENTATION in one C file
+ * before including this header. Not for targets that flush denormal numbers to zero or round other than to
+ * nearest: there the answers can differ from the reference in the last bits.
  */
 #ifndef TWO_BRANCHES_H
 #define TWO_BRANCHES_H
@@ -46,7 +47,8 @@ typedef float two_branches_real_t;
 #define TWO_BRANCHES_DRIVE_MAX 4.0f
 #define TWO_BRANCHES_OUTPUT_MIN (-11.322212f) /* output, um, over every drive history in range */
 #define TWO_BRANCHES_OUTPUT_MAX 13.554334f
-#define TWO_BRANCHES_INVERSE_MAX_ERROR 0.00062483986f /* against the double model, drive, V */
+#define TWO_BRANCHES_INVERSE_MAX_ERROR 7.912489f /* against the double model, drive, V */
+#define TWO_BRANCHES_INVERSE_ROUNDING_ERROR 0.00062483986f /* the same while both take the same branch */
 
 /* Sticky bits of the status functions */
 #define TWO_BRANCHES_STATUS_INPUT_CLAMPED 1u /* the input was out of range and was limited */
@@ -59,18 +61,18 @@ typedef float two_branches_real_t;
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
+    two_branches_real_t tail;       /* what the plays from `end` on contribute to the output */
     two_branches_real_t extremum;  /* input of the plays at which the move that left this corner ended */
-    two_branches_real_t tail;      /* what the plays from `end` on contribute to the output */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } two_branches_corner_t;
 
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
+    two_branches_real_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
+    two_branches_real_t tail;    /* what plays k .. n contribute to the output */
+    two_branches_real_t next;  /* w at which play k starts to follow */
     two_branches_real_t w;      /* input of the plays, w = G[v] */
-    two_branches_real_t base;   /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    two_branches_real_t tail;   /* what plays k .. n contribute to the output */
-    two_branches_real_t next;   /* w at which play k starts to follow */
     uint_least16_t k;
     uint_least16_t depth;  /* corners held */
     bool rising;           /* direction of the present move of w */
@@ -123,7 +125,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* The constant tables of one model. */
+/* The constant tables of one model in floating point. */
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {
@@ -290,12 +292,14 @@ static two_branches_real_t two_branches_envelope_inverse(const two_branches_enve
 }
 
 /* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static two_branches_real_t two_branches_activation(const two_branches_corner_t *c, two_branches_real_t r, bool rising)
+static two_branches_real_t two_branches_activation(const two_branches_corner_t *c, two_branches_real_t threshold, bool rising)
 {
+    const two_branches_real_t e = c->extremum;
+    const two_branches_real_t r = threshold;
     if (rising) {
-        return c->side > 0 ? c->extremum + (r + r) : c->side == 0 ? c->extremum + r : c->extremum;
+        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
     }
-    return c->side < 0 ? c->extremum - (r + r) : c->side == 0 ? c->extremum - r : c->extremum;
+    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
 }
 
 static bool two_branches_reached(two_branches_real_t x, two_branches_real_t level, bool rising)
@@ -505,13 +509,13 @@ static const two_branches_real_t two_branches_lift[8] = {
     0.0f, 0.0f, 0.27f, 0.702f, 1.188f, 1.62f, 1.89f, 1.9224f
 };
 
-static const two_branches_real_t two_branches_inverse_slope[8] = {
+static const two_branches_real_t two_branches_reciprocal[8] = {
     0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
 };
 
 /* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights; plays without r_0 */
 static const two_branches_tables_t two_branches_tables = {
-    two_branches_threshold, NULL, two_branches_slope, two_branches_lift, two_branches_inverse_slope, 6
+    two_branches_threshold, NULL, two_branches_slope, two_branches_lift, two_branches_reciprocal, 6
 };
 
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
@@ -590,8 +594,9 @@ static two_branches_real_t two_branches_inverse_answer(two_branches_inverse_t *s
 }
 
 /* Whether going to v is a move of the branch that v was computed on. */
-static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_branches_real_t v, bool ascending)
+static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_branches_real_t drive, bool ascending)
 {
+    const two_branches_real_t v = two_branches_clamp_drive(drive);
     return v > self->applied ? ascending : v < self->applied ? !ascending : self->ascending == ascending;
 }
 
@@ -599,12 +604,14 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
 static two_branches_real_t two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t u,
     two_branches_real_t w, bool *limited)
 {
+    two_branches_real_t back;
     const bool up = u > self->level ? true : u < self->level ? false : self->ascending;
     two_branches_real_t v = two_branches_front_inverse(w, up, limited);
     if (two_branches_inverse_fits(self, v, up)) {
         return v;
     }
-    if (up == self->ascending && v - self->applied >= -0.0012496796f && v - self->applied <= 0.0012496796f) {
+    back = two_branches_clamp_drive(v) - self->applied;
+    if (up == self->ascending && back >= -0.0012496796f && back <= 0.0012496796f) {
         return self->applied; /* stepped back by rounding alone */
     }
     v = two_branches_front_inverse(w, !up, limited);

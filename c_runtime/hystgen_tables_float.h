@@ -1,6 +1,6 @@
-/* The constant tables of one model. */
-#ifndef HYSTGEN_TABLES_H
-#define HYSTGEN_TABLES_H
+/* The constant tables of one model in floating point. */
+#ifndef HYSTGEN_TABLES_FLOAT_H
+#define HYSTGEN_TABLES_FLOAT_H
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {

@@ -1,0 +1,95 @@
+#include "hystgen_runtime.h"
+
+/* Output at the moment play k, the last of a block that is passed whole, or any play inside corner c's block,
+   starts to follow; `w` is the input of the plays there. */
+static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising,
+                                   hystgen_reach_t *w)
+{
+    const hystgen_sum_t tail = hystgen_held(t, c, k + 1);
+    *w = hystgen_activation(c, t->threshold[k], rising);
+    return (rising ? tail - t->lift[k + 1] : tail + t->lift[k + 1]) + (hystgen_sum_t)*w * t->slope[k + 1];
+}
+
+static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
+{
+    return rising ? output >= level : output <= level;
+}
+
+/* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners.
+   Whole numbers decide which play follows last, so that every engine finds the same. */
+static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, const hystgen_memory_t *m,
+                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
+                                              bool rising, hystgen_sum_t output)
+{
+    hystgen_reach_t w = m->w; /* the last place known to be passed, and the output there */
+    hystgen_sum_t here = hystgen_corners_output(t, m);
+    unsigned int low = 0;
+    unsigned int probe = left;
+    hystgen_reach_t start;
+    hystgen_sum_t there;
+    while (low < left) {
+        const hystgen_corner_t *c = &corner[probe - 1];
+        there = hystgen_level(t, c, c->end - 1u, rising, &start);
+        if (hystgen_passed(output, there, rising)) {
+            w = start;
+            here = there;
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
+        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0) {
+        const hystgen_corner_t *c = &corner[left - 1];
+        unsigned int high = c->end - 1u;
+        unsigned int stride = 1;
+        probe = k;
+        while (k < high) {
+            there = hystgen_level(t, c, probe, rising, &start);
+            if (hystgen_passed(output, there, rising)) {
+                w = start;
+                here = there;
+                k = probe + 1;
+                stride = stride * 2;
+            } else {
+                high = probe;
+            }
+            probe = (k + high) / 2;
+            if (probe > k + stride - 1) {
+                probe = k + stride - 1;
+            }
+        }
+    }
+    return hystgen_going(t, w, rising ? output - here : here - output, k, rising);
+}
+
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
+   free slot above the corners is scratch space for the corner that turning back would leave. */
+HYSTGEN_API hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, const hystgen_memory_t *m,
+                                                  hystgen_corner_t *corner, hystgen_sum_t output)
+{
+    const hystgen_sum_t here = hystgen_corners_output(t, m);
+    unsigned int depth = m->depth;
+    if (output == here) {
+        return m->w;
+    }
+    if (m->rising && output > here) {
+        const hystgen_reach_t w = hystgen_going(t, m->w, output - here, m->k, true);
+        /* the reciprocal is off by less than 4 steps: short of that the same plays follow, the usual sample */
+        return w < m->next - 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->k, true, output);
+    }
+    if (!m->rising && output < here) {
+        const hystgen_reach_t w = hystgen_going(t, m->w, here - output, m->k, false);
+        return w > m->next + 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->k, false, output);
+    }
+    if (m->k > 1) {
+        hystgen_corner_t *c = &corner[depth];
+        c->extremum = m->w;
+        c->tail = m->tail;
+        c->end = m->k;
+        c->side = m->rising ? -1 : 1;
+        depth = depth + 1;
+    }
+    return hystgen_corners_locate(t, m, corner, depth, 1, !m->rising, output);
+}

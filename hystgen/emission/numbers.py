@@ -1,0 +1,242 @@
+"""A model's numbers as C text: tables, limits and error bounds, for floating and for fixed point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hystgen import fixed, fixed_tables, reference, tables
+from hystgen.bounds import error_bounds
+from hystgen.emission.text import literal, operand, table
+from hystgen.fixed import FixedTables
+from hystgen.models import Cascade
+from hystgen.params import Parameters
+from hystgen.reference import Tables
+
+if TYPE_CHECKING:
+    from hystgen.emission.module import Options
+
+
+def fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
+    """What the templates need to know of the numbers; `prefix` is that of the types of the run time."""
+    if options.arithmetic in tables.FLOAT_ARITHMETICS:
+        return _float_fields(parameters, cascade, options, prefix)
+    return _fixed_fields(parameters, cascade, options, prefix)
+
+
+def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
+    """The places of `limits` that both kinds of arithmetic have."""
+    limits = numbers.limits
+    largest = limits[fixed.CODE_MAX] if isinstance(numbers, FixedTables) else math.inf
+    return {
+        "numbers": numbers,
+        # no code of the type lies beyond: a comparison would be always false
+        "drive_can_exceed": limits[reference.DRIVE_MAX] < largest,
+        "output_can_exceed": limits[reference.OUTPUT_MAX] < largest,
+        "drive_min": operand(limits[reference.DRIVE_MIN]),
+        "drive_max": operand(limits[reference.DRIVE_MAX]),
+        "output_min": operand(limits[reference.OUTPUT_MIN]),
+        "output_max": operand(limits[reference.OUTPUT_MAX]),
+        "offset": operand(limits[reference.OFFSET]),
+        "start": literal(numbers.start[0]),
+        "start_list": len(numbers.start) > 1,
+        "start_applied": literal(limits[reference.START_APPLIED]),
+        "reset_applied": literal(limits[reference.RESET_APPLIED]),
+        "hold": operand(limits[reference.HOLD]),
+    }
+
+
+def _arrays(
+    numbers: Tables | FixedTables, name: str, columns: Sequence[tuple[str, str, str, bool]]
+) -> tuple[list[str], list[str]]:
+    """Tables as text, and the pointers to them: NULL for those that nothing reads."""
+    arrays, pointers = [], []
+    for field, own, kind, used in columns:
+        if used:
+            arrays.append(table(kind, f"{name}_{own}", list(getattr(numbers, field))))
+        pointers.append(f"{name}_{own}" if used else "NULL")
+    return arrays, pointers
+
+
+def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
+    name, real_t = parameters.name, f"{prefix}_real_t"
+    corners = options.engine == "corners"
+    numbers = tables.build_float(cascade, options.arithmetic, options.engine, True, True)
+    dtype = numbers.threshold.dtype.type
+    bounds = error_bounds(cascade, options.arithmetic, options.engine)
+    arrays, pointers = _arrays(
+        numbers,
+        name,
+        [
+            ("threshold", "threshold", real_t, True),
+            ("weight", "weight", real_t, not corners),
+            ("slope", "slope", real_t, corners),
+            ("lift", "lift", real_t, corners or options.inverse),
+            ("inverse_slope", "reciprocal", real_t, options.inverse),
+        ],
+    )
+    if len(numbers.start) > 1:
+        arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
+    stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
+    return {
+        **_limits(numbers),
+        "arrays": arrays,
+        "pointers": pointers,
+        "stages": stages,
+        "fronts": bool(stages),
+        "front": bool(stages),
+        "envelopes": any(stage["kind"] == "envelope" for stage in stages),
+        "forward_max_error": operand(_upward(bounds.forward, dtype)),
+        "inverse_max_error": operand(_upward(bounds.inverse, dtype)) if options.inverse else "",
+        "inverse_rounding_error": operand(_upward(bounds.rounding, dtype)) if options.inverse else "",
+        "wide_t": f"{name}_real_t",
+        "play_t": f"{name}_real_t",
+        "precision": [],
+    }
+
+
+def _upward(x: float, dtype: Any) -> Any:
+    rounded = dtype(x)
+    return rounded if float(rounded) >= x else np.nextafter(rounded, dtype(np.inf))
+
+
+def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:
+    data = numbers.stage_data[int(numbers.stage_first[j]) :]
+    own = f"{name}_stage_{j + 1}"
+    if numbers.stage_kind[j] == reference.TANH:
+        ascending, descending = data[:7], data[7:14]
+        if np.array_equal(ascending, descending):
+            branches = [{"name": own, "numbers": [literal(x) for x in ascending]}]
+            place = f"&{own}"
+        else:
+            branches = [
+                {"name": f"{own}_ascending", "numbers": [literal(x) for x in ascending]},
+                {"name": f"{own}_descending", "numbers": [literal(x) for x in descending]},
+            ]
+            place = f"ascending ? &{own}_ascending : &{own}_descending"
+        return {"kind": "envelope", "branches": branches, "table": place}
+    n = int(numbers.stage_size[j])
+    arrays, pointers, first = [], [], 0
+    parts = (("break_x", n), ("break_y", n), ("anchor_x", n + 1), ("anchor_y", n + 1), ("slope", n + 1))
+    for part, size in (*parts, ("inverse_slope", n + 1)):
+        unused = part in ("break_y", "inverse_slope") and not options.inverse
+        if unused or not size:
+            pointers.append("NULL")
+        else:
+            pointers.append(f"{own}_{part}")
+            arrays.append(table(real_t, f"{own}_{part}", list(data[first : first + size])))
+        first += size
+    return {"kind": "dead_zone", "name": own, "arrays": arrays, "pointers": pointers, "n": n, "table": f"&{own}"}
+
+
+def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
+    name, emit = parameters.name, parameters.emit
+    corners = options.engine == "corners"
+    numbers, form = fixed_tables.build(
+        cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb
+    )
+    limits = numbers.limits
+    arrays, pointers = _arrays(
+        numbers,
+        name,
+        [
+            ("threshold", "threshold", f"{prefix}_play_t", True),
+            ("weight", "weight", "int32_t", not corners),
+            ("slope", "slope", "int32_t", corners or options.inverse),
+            ("lift", "lift", f"{prefix}_sum_t", corners),
+            ("reciprocal", "reciprocal", "uint32_t", options.inverse),
+            ("shift", "shift", "uint8_t", options.inverse),
+        ],
+    )
+    if len(numbers.start) > 1:
+        arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
+    margin = limits[fixed.MARGIN]
+    pointers += [literal(limits[fixed.PLAY_MIN] - margin), literal(limits[fixed.PLAY_MAX] + margin)]
+    fine = int(limits[fixed.FINE])
+    units = parameters.units
+    drive, output = (f" {unit}" if unit else "" for unit in (units.input, units.output))
+    precision = [
+        f"Precision: a drive code is {float(form.drive_lsb):.6g}{drive}, an output code {float(form.output_lsb):.6g}"
+        f"{output}; against the exact model",
+        f"    forward within {form.forward_error:.4g} output codes = "
+        f"{form.forward_error * float(form.output_lsb):.4g}{output}",
+    ]
+    if form.inverse_rounding is not None:
+        precision.append(
+            f"    inverse within {form.inverse_rounding:.4g} drive codes = "
+            f"{form.inverse_rounding * float(form.drive_lsb):.4g}{drive}"
+            + (" on the same branch" if numbers.branches else "")
+        )
+    precision += [
+        f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 bits hold "
+        "2^63),",
+        f"    inputs of plays between {limits[fixed.PLAY_MIN]} and {limits[fixed.PLAY_MAX]}, "
+        f"{form.sum_bits} fraction bits of an output code",
+    ]
+    return {
+        **_limits(numbers),
+        "arrays": arrays,
+        "pointers": pointers,
+        "stages": [],
+        "fronts": bool(numbers.fronts),
+        "front": bool(numbers.fronts) or fine > 0,
+        "fine": fine,
+        "fine_factor": 2**fine,
+        "fraction": int(limits[fixed.FRACTION]),
+        "code_max": int(limits[fixed.CODE_MAX]),
+        "curves": _curves(numbers, name, options) if numbers.fronts else [],
+        "drive_lsb": _physical(form.drive_lsb),
+        "output_lsb": _physical(form.output_lsb),
+        "forward_max_error": _decimal(form.forward_error),
+        "inverse_max_error": _decimal(form.inverse_error) if options.inverse and form.inverse_error else "",
+        "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
+        "wide_t": f"{prefix}_reach_t",
+        "play_t": f"{prefix}_play_t",
+        "precision": precision,
+    }
+
+
+def _physical(x: Any) -> str:
+    return repr(float(x))
+
+
+def _decimal(x: float) -> str:
+    """x in a few digits, rounded up."""
+    digits = max(0, 5 - math.ceil(math.log10(x)))
+    return repr(math.ceil(x * 10**digits) / 10**digits)
+
+
+def _curves(numbers: FixedTables, name: str, options: Options) -> list[dict[str, Any]]:
+    """The curves of the memoryless part that are used: forward, and back where there is an inverse."""
+    found = []
+    directions = (("ascending", 0), ("descending", 1)) if numbers.branches else (("", 0),)
+    kinds = (("front", fixed.FORWARD), ("back", fixed.INVERSE)) if options.inverse else (("front", fixed.FORWARD),)
+    for kind, first in kinds:
+        for direction, branch in directions:
+            which = first + branch
+            own = f"{name}_{kind}" + (f"_{direction}" if direction else "") + "_curve"
+            here = int(numbers.first[which])
+            there = here + int(numbers.pieces[which])
+            degree = numbers.coefficient.shape[1] - 1
+            arrays = [
+                table("int32_t", f"{own}_knot", list(numbers.knot[here:there])),
+                table("uint8_t", f"{own}_scale", list(numbers.scale[here:there])),
+                table("int32_t", f"{own}_coefficient", list(numbers.coefficient[here:there].ravel())),
+            ]
+            curve = f"{own}_knot, {own}_scale, {own}_coefficient, {there - here}, {degree}"
+            (low, high), (under, over) = numbers.domain[which], numbers.edge[which]
+            ends = [low, high, low - under, high + over, *numbers.argument[which]]
+            found.append(
+                {
+                    "name": own,
+                    "kind": kind,
+                    "arrays": arrays,
+                    "curve": curve,
+                    "ends": ", ".join(literal(end) for end in ends),
+                    "below": int(numbers.below[which]),
+                }
+            )
+    return found

@@ -1,0 +1,213 @@
+"""Fixed point: whole numbers that both engines agree on, errors inside their bound, and refusals."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modelfiles import FILES
+
+import hystgen
+from hystgen import compiled, fixed, fixed_tables, reference
+from hystgen.api import Model, cascade_of
+from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
+from hystgen.params import parse_parameters
+from hystgen.simulation import Session
+from hystgen.tables import FormatError
+
+ARITHMETICS = ("q31", "q15")
+
+
+def load(name: str) -> Cascade:
+    return cascade_of(parse_parameters(FILES[name], name))
+
+
+def records(low: int, high: int, seed: int) -> np.ndarray:
+    """Codes: shrinking swing, nested loops, noise, both rails."""
+    rng = np.random.default_rng(seed)
+    k = np.linspace(0, 1, 1500)
+    swing = (low + high) / 2 + (high - low) / 2 * np.sin(300 * k) * (1 - 0.9 * k)
+    loops = np.interp(np.arange(1500), np.arange(0, 1500, 12), rng.uniform(low, high, 125))
+    rails = rng.choice([low, high], 60)
+    jumps = rng.uniform(low, high, 600)
+    return np.rint(np.concatenate([swing, loops, rails, jumps, rails[::-1]])).astype(np.int64)
+
+
+@st.composite
+def models(draw: st.DrawFn) -> Cascade:
+    """Valid models of every kind, plays and weights over two decades."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    n = draw(st.integers(0, 24))
+    low = draw(st.sampled_from([-1.0, 0.0, -0.2]))
+    scale = draw(st.sampled_from([1.0, 100.0, 1e-3]))
+    r = np.concatenate([[0.0], np.cumsum(10 ** rng.uniform(-2, 0, n) * 2 / max(n, 1))]) * scale
+    p = 10 ** rng.uniform(-1, 0.5, n + 1)
+    kind = draw(st.sampled_from(["none", "none", "tanh", "branches", "dead zone"]))
+    stages: tuple[object, ...] = ()
+    if kind == "tanh":
+        stages = (TanhEnvelope((1.3 * scale, 0.9 / scale, 0.1, 0.05 * scale)),)
+    elif kind == "branches":
+        up = (1.3 * scale, 0.9 / scale, 0.1, 0.0)
+        stages = (TanhEnvelope(up, (*up[:3], 0.2 * scale)),)
+    elif kind == "dead zone":
+        stages = (DeadZone([-0.3 * scale, 0, 0.2 * scale, 0.6 * scale], [0.4, 1.0, -0.5, 0.9]),)
+    offset = float(rng.uniform(-1, 1)) * scale * draw(st.sampled_from([0, 1]))
+    return Cascade(PI(r.tolist(), p.tolist()), stages, offset, (low * scale, scale))  # type: ignore[arg-type]
+
+
+def built(model: Cascade, arithmetic: str, engine: str = "corners") -> tuple[fixed.FixedTables, fixed_tables.Format]:
+    return fixed_tables.build(model, arithmetic, engine)
+
+
+def double(model: Cascade, operator: str, form: fixed_tables.Format, codes: np.ndarray) -> np.ndarray:
+    """Answers of the double model in codes."""
+    into, out = form.drive_lsb, form.output_lsb
+    if operator == "inverse":
+        into, out = out, into
+    return Session(model, operator, clamp=True).run(codes * float(into))[0] / float(out)
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@settings(max_examples=60)
+@given(model=models(), seed=st.integers(0, 1000))
+def test_errors_stay_inside_the_bound_and_engines_agree(arithmetic: str, model: Cascade, seed: int) -> None:
+    try:
+        tables, form = built(model, arithmetic)
+    except FormatError:
+        return
+    for operator, first, bound in (
+        ("forward", reference.DRIVE_MIN, form.forward_error),
+        ("inverse", reference.OUTPUT_MIN, form.inverse_error),
+    ):
+        assert bound is not None
+        codes = records(*(int(x) for x in tables.limits[first : first + 2]), seed)
+        answers = Session(model, operator, arithmetic, "corners").run(codes)[0]
+        assert (answers == Session(model, operator, arithmetic, "loop").run(codes)[0]).all()
+        assert np.abs(answers - double(model, operator, form, codes)).max() <= bound
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_bounds_are_not_slack(arithmetic: str) -> None:
+    """Some model comes to a quarter of its bound, forward and inverse."""
+    model = Cascade(PI([0, 0.1], [0.7, 0.05]), (), 0.0, (-1.0, 1.0))
+    tables, form = built(model, arithmetic)
+    codes = records(*(int(x) for x in tables.limits[:2]), 1)
+    error = np.abs(Session(model, "forward", arithmetic).run(codes)[0] - double(model, "forward", form, codes)).max()
+    assert error >= form.forward_error / 4
+    codes = records(*(int(x) for x in tables.limits[2:4]), 1)
+    error = np.abs(Session(model, "inverse", arithmetic).run(codes)[0] - double(model, "inverse", form, codes)).max()
+    assert form.inverse_error is not None
+    assert error >= form.inverse_error / 4
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("name", FILES)
+def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
+    """Plain Python whole numbers, which cannot overflow, run the reference and every intermediate sum is looked at."""
+    model = load(name)
+    tables, form = built(model, arithmetic)
+    assert form.largest_sum < 2**62
+    plain = compiled.reference(tables, compiled=False)
+    whole = tables._replace(
+        **{
+            field: getattr(tables, field).astype(object)
+            for field in ("threshold", "weight", "slope", "lift", "reciprocal", "shift", "start", "limits", "knot",
+                          "coefficient", "scale", "domain", "edge", "argument", "below")
+        }
+    )  # fmt: skip
+    for inverse in (0, 1):
+        state = reference.new_state(whole)
+        plain.init(whole, state)
+        first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+        for code in records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7].tolist():
+            (plain.inverse_step if inverse else plain.forward_step)(whole, state, code)
+            sums = [abs(state.real[reference.BASE]), abs(state.real[reference.TAIL]), *map(abs, state.tail)]
+            assert max(sums) <= form.largest_sum
+            assert abs(state.real[reference.W]) < 2**31
+            assert abs(plain.corners_output(whole, state)) <= form.largest_sum
+
+
+@given(
+    x=st.integers(-(2**61), 2**61),
+    bits=st.integers(0, 50),
+)
+def test_nearest_rounds_ties_away_from_zero(x: int, bits: int) -> None:
+    exact = Fraction(x, 2**bits)
+    expected = math.floor(exact + Fraction(1, 2)) if exact >= 0 else -math.floor(-exact + Fraction(1, 2))
+    assert fixed.nearest(x, bits) == expected
+
+
+@given(d=st.integers(0, 2**61), seed=st.integers(0, 1000))
+def test_the_reciprocal_divides_to_the_nearest(d: int, seed: int) -> None:
+    tables, _ = built(load("plain"), "q31" if seed % 2 else "q15")
+    for k in range(1, len(tables.slope)):
+        slope = int(tables.slope[k])
+        if d // slope < 2**32:
+            allowed = Fraction(1, 2) + Fraction(d, slope * 2**31) + Fraction(1, 2**8)
+            assert abs(int(fixed.over_slope(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
+
+
+@pytest.mark.parametrize("name", ["curved", "two_branches", "mixed", "bent", "behind"])
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
+    """Every code for 16 bits, many for 32: the kernel's curve against the model's own functions."""
+    model = load(name)
+    tables, form = built(model, arithmetic)
+    low, high = (int(x) for x in tables.limits[:2])
+    codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
+    plain = compiled.reference(tables)
+    builder = fixed_tables._Builder(model, arithmetic, "corners", None, None)
+    builder.build()
+    for up in (1, 0) if tables.branches else (1,):
+        exact = np.asarray(model.front(codes * float(form.drive_lsb), bool(up)))
+        w = np.array([plain.front_forward(tables, code, up) for code in codes])
+        gap = np.abs(w * float(builder.step) - exact).max() / float(builder.step)
+        assert gap <= builder.front[1 - up].error + 1e-4
+        back = np.array([plain.front_inverse(tables, x, up)[0] for x in w])
+        slopes = np.abs(np.diff(exact)) / float(form.drive_lsb)
+        slack = (builder.front[3 - up].error / 2.0 ** int(tables.below[2])) + 0.5
+        per_code = builder.front[1 - up].error * float(builder.step) / (slopes.min() * float(form.drive_lsb))
+        assert np.abs(back - codes).max() <= slack + per_code * max(1, high - low) / len(codes) + 1
+
+
+def test_converter_formats_are_honoured() -> None:
+    text = FILES["plain"] + "\nemit: {arithmetic: q15, drive_lsb: 0.001, output_lsb: 0.002}\n"
+    model = Model(parse_parameters(text, "plain.yaml"))
+    header = hystgen.api.emitted_files(model)["plain.h"]  # type: ignore[attr-defined]
+    assert "PLAIN_DRIVE_LSB 0.001 " in header
+    assert "PLAIN_OUTPUT_LSB 0.002" in header
+    assert "PLAIN_DRIVE_MAX 4000" in header
+    y = model.simulate(np.array([1000, 4000, -4000]), arithmetic="q15")
+    assert np.abs(y * 0.002 - model.simulate(np.array([1.0, 4.0, -4.0]))).max() <= 0.003
+
+
+@pytest.mark.parametrize(
+    ("arithmetic", "pi", "ends", "lsb", "message"),
+    [
+        ("q15", ([0, 1], [1, 1]), (0, 100), (0.001, None), "emit.drive_lsb 0.001 is too small: input_range reaches"),
+        ("q15", ([0, 1], [1, 1]), (0, 100), (None, 1e-5), "emit.output_lsb 1e-05 is too small: the output range"),
+        ("q15", ([0, 0.001], [1, 1]), (0, 100), (None, None), "thresholds[1] 0.001 is narrower than one code in q15"),
+        ("q15", ([0, 1, 2], [1, 1e-7, 1]), (0, 100), (None, None), "weights[1] 1e-07 moves the output by less than"),
+        ("q15", ([0], [1]), (0, 100), (80, None), "emit.drive_lsb leaves 2 codes in range; make it smaller"),
+    ],
+)
+def test_formats_that_cannot_be_are_refused(
+    arithmetic: str, pi: tuple[list[float], list[float]], ends: tuple[float, float],
+    lsb: tuple[float | None, float | None], message: str,
+) -> None:  # fmt: skip
+    model = Cascade(PI(*pi), (), 0.0, ends)
+    with pytest.raises(FormatError) as caught:
+        fixed_tables.build(model, arithmetic, "corners", *lsb)
+    assert str(caught.value).startswith(message)
+
+
+def test_simulating_takes_codes() -> None:
+    model = Model(parse_parameters(FILES["plain"], "plain.yaml"))
+    with pytest.raises(ValueError, match="whole numbers from -32768 to 32767"):
+        model.simulate(np.array([0.5]), arithmetic="q15")
+    with pytest.raises(ValueError, match="whole numbers"):
+        model.simulate(np.array([40000]), arithmetic="q15")
