@@ -44,7 +44,8 @@ class Format:
     """What the codes of a model mean, and how exact it is.
 
     `drive_lsb`, `output_lsb`: physical units a code; `forward_error` in output codes, `inverse_error` in drive codes
-    (None: no inverse), `inverse_rounding` the part of it without taking another branch; `largest_sum`: bound of every sum that is formed, below 2^62.
+    (None: no inverse), `inverse_rounding` the part of it without taking another branch; `largest_sum`: bound of every
+    sum that is formed, below 2^62; `sum_bits`: fraction bits of an output code.
     """
 
     drive_lsb: Fraction
