@@ -1,0 +1,430 @@
+"""Instructions per sample on microcontroller cores, counted on emulated ones.
+
+    python benchmarks/targets.py [--n 16,128] [--targets cortex-m4f] [--compilers zig,gcc] [-o FOLDER] [--check]
+
+Emitted code of both engines and operators against the textbook loop (`textbook/textbook.c`: formula (35) as ternaries
+with the same care for NaN, range and status), same compiler, flags (-std=c99 -O2) and signal: a decaying multisine over
+the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
+one among them, then jumps to everywhere. Every answer that is counted has been compared with the bit reference.
+
+Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import functools
+import itertools
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import reference, tables
+from hystgen.api import Model, emit_options
+from hystgen.emission.text import operand, table
+from hystgen.params import parse_parameters
+from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
+
+HERE = Path(__file__).resolve().parent
+PLAYS = (4, 8, 16, 32, 64, 128, 256)
+SAMPLES = 4000
+RANGE = 10.0
+REALS = {"float32": "float", "float64": "double"}
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Figures:
+    """One build: instructions of a sample (mean and max over a signal), and bytes."""
+
+    target: str
+    compiler: str
+    arithmetic: str
+    operator: str
+    engine: str
+    n: int
+    signal: str
+    samples: int
+    mean: float
+    max: int
+    flash: int
+    library: int
+    ram: int
+    stack: int
+
+
+@functools.cache
+def model(n: int) -> Model:
+    """n plays over nine tenths of what a full swing reaches, weights falling, as identified ones do."""
+    thresholds = np.linspace(0.0, 0.9 * RANGE, n + 1)
+    weights = np.concatenate([[0.7], 2.4 / n * np.exp(-thresholds[1:] / 5)])
+    text = (
+        f"hystgen: 1\nname: bench\ninput_range: [-{RANGE}, {RANGE}]\nmodel: {{pi: "
+        f"{{thresholds: [{', '.join(map(repr, thresholds.tolist()))}], weights: [{', '.join(map(repr, weights.tolist()))}]}}}}\n"
+    )
+    return Model(parse_parameters(text, "bench.yaml"))
+
+
+def multisine(length: int) -> Reals:
+    """Decaying multisine in parts of the range, 160 samples a period of the middle line."""
+    t = np.arange(SAMPLES) / SAMPLES
+    lines = ((9, 0.6, 0.0), (25, 0.3, 1.0), (41, 0.1, 2.0))
+    x = np.exp(-3 * t) * sum(a * np.sin(2 * np.pi * f * t + phase) for f, a, phase in lines)
+    return np.asarray(x / np.max(np.abs(x)))[:: SAMPLES // length]
+
+
+def from_drive(n: int, operator: str, drive: Reals) -> Reals:
+    """What the operator is given so that the plays see `drive`."""
+    return drive if operator == "forward" else model(n).cascade.simulate(drive, clamp=True)
+
+
+def corner_lists(n: int) -> Iterator[Reals]:
+    """Drives that leave a corner list: full swings, which wipe the memory, then turning points of a shrinking
+    alternating swing, each of which leaves a block of 1, 2, 4 .. n plays behind."""
+    r = np.asarray(model(n).cascade.pi.thresholds)
+    block = 1
+    while block <= n:
+        at = -RANGE
+        points = [RANGE, at]
+        for turn, k in enumerate(range(n - block, 0, -block)):
+            at += (r[k] + r[k + 1]) * (1 if turn % 2 == 0 else -1)  # moves play k and not the next
+            points.append(at)
+        yield np.array(points)
+        block *= 2
+
+
+def trials(n: int) -> list[Reals]:
+    """Every corner list, then two jumps: their search for what follows is the work of the sample."""
+    everywhere = np.linspace(-1.02 * RANGE, 1.02 * RANGE, min(2 * n + 5, 129))
+    first, second = everywhere[:: max(1, len(everywhere) // 12)], everywhere[:: max(1, len(everywhere) // 24)]
+    found = []
+    for points in corner_lists(n):
+        found += [np.append(points, a) for a in everywhere]
+        found += [np.append(points, pair) for pair in itertools.product(first, second)]
+    return found
+
+
+class Bench:
+    """Builds and runs; keeps images and the worst trials found."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._number = itertools.count()
+        self._worst: dict[tuple[int, str], list[Reals]] = {}
+
+    def image(
+        self, target: targets.Target, compiler: str, files: sources.Sources
+    ) -> tuple[emulator.Image, sources.Sources]:
+        """A strict build."""
+        place = self._folder / f"build-{next(self._number)}"
+        found = cross.find(target, compiler)
+        path = found.image(files, place, compilers.STRICT, cross.Layout(), f"hystgen_harness_{files.operators[0]}")
+        return emulator.Image.load(path), files
+
+    @functools.cache
+    def emitted(self, n: int, engine: str, arithmetic: str) -> sources.Sources:
+        """Both operators."""
+        options = emit_options(model(n), "both", arithmetic, engine)
+        return sources.write(self._folder / f"{engine}-{arithmetic}-{n}", model(n), options)
+
+    @functools.cache
+    def textbook(self, n: int, operator: str, arithmetic: str) -> sources.Sources:
+        """The comparison, with the tables of one operator."""
+        folder = self._folder / f"textbook-{operator}-{arithmetic}-{n}"
+        folder.mkdir()
+        cascade = model(n).cascade
+        pi = cascade.pi if operator == "forward" else cascade.pi.inverse()
+        real, dtype = REALS[arithmetic], np.dtype(arithmetic).type
+        ends = [tables.inward(*pair, dtype) for pair in (cascade.input_range, cascade.output_range)]
+        ends = ends if operator == "forward" else ends[::-1]
+        names = ("INPUT_MIN", "INPUT_MAX", "OUTPUT_MIN", "OUTPUT_MAX")
+        text = "".join(
+            f"#define TEXTBOOK_{name} {operand(end)}\n" for name, end in zip(names, itertools.chain(*ends), strict=True)
+        )
+        for name, values in (("weight", pi.weights), ("threshold", pi.thresholds)):
+            text += table("textbook_real_t", f"textbook_{name}", [dtype(x) for x in values])
+        (folder / "textbook_tables.h").write_text(text)
+        sizes = f"#define TEXTBOOK_REAL {real}\n#define TEXTBOOK_N_PLAYS {n}\n"
+        (folder / "textbook_sizes.h").write_text(sizes)
+        for file in ("textbook.h", "textbook.c"):
+            (folder / file).write_text((HERE / "textbook" / file).read_text())
+        (folder / "hystgen_harness.c").write_text(sources.harness("textbook", ("forward",)))
+        return sources.Sources(
+            "textbook", ("forward",), (folder / "textbook.c",), (folder / "hystgen_harness.c",)
+        )
+
+    def textbook_figures(
+        self, target: targets.Target, compiler: str, n: int, operator: str, arithmetic: str, length: int
+    ) -> Figures:
+        """The textbook loop over the multisine."""
+        image, files = self.image(target, compiler, self.textbook(n, operator, arithmetic))
+        cascade = model(n).cascade
+        x = from_drive(n, operator, RANGE * multisine(length)).astype(arithmetic)
+        core = emulator.Core(target, image)
+        answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
+        exact = cascade.simulate(x, clamp=True) if operator == "forward" else cascade.inverse().simulate(x, clamp=True)
+        assert np.max(np.abs(answer - exact)) < 1e-3 * RANGE
+        return self._figures(target, compiler, n, operator, "textbook", arithmetic, "multisine", core, image, files)
+
+    def engine_figures(
+        self,
+        target: targets.Target,
+        compiler: str,
+        n: int,
+        operators: Sequence[str],
+        engine: str,
+        arithmetic: str,
+        length: int,
+        worst: bool,
+    ) -> Iterator[Figures]:
+        """Emitted code over the multisine and, where wanted, over the worst trials."""
+        image, files = self.image(target, compiler, self.emitted(n, engine, arithmetic))
+        for operator in operators:
+            x = from_drive(n, operator, RANGE * multisine(length))
+            core = self._run(target, image, n, operator, engine, arithmetic, "multisine", x)
+            yield self._figures(
+                target, compiler, n, operator, engine, arithmetic, "multisine", core, image, files
+            )
+            if worst:
+                x = np.concatenate(self._worst_trials(n, operator, arithmetic))
+                core = self._run(target, image, n, operator, engine, arithmetic, "worst case", x)
+                yield self._figures(
+                    target, compiler, n, operator, engine, arithmetic, "worst case", core, image, files
+                )
+
+    def _run(
+        self,
+        target: targets.Target,
+        image: emulator.Image,
+        n: int,
+        operator: str,
+        engine: str,
+        arithmetic: str,
+        signal: str,
+        x: Reals,
+    ) -> emulator.Core:
+        numbers = tables.build(model(n).cascade, arithmetic, engine)
+        calls = (signal, np.full(len(x), reference.OP_STEP, dtype=np.int64), x)
+        record = comparison.expected_record(numbers, operator == "inverse", calls)
+        core = emulator.Core(target, image)
+        outcome = comparison.compare(functools.partial(core.run, "bench", operator), [record])
+        assert not outcome.different, f"{target.name}, {engine}, n = {n}: {outcome}"
+        return core
+
+    def _worst_trials(self, n: int, operator: str, arithmetic: str) -> list[Reals]:
+        """The forty trials with the dearest samples on a Cortex-M4F; those of other cores differ little."""
+        if (n, operator) not in self._worst:
+            target = targets.find("cortex-m4f")
+            found = [from_drive(n, operator, trial) for trial in trials(n)]
+            image, _ = self.image(target, "zig", self.emitted(n, "corners", arithmetic))
+            counts = self._run(
+                target, image, n, operator, "corners", arithmetic, "trials", np.concatenate(found)
+            ).counts
+            ends = np.cumsum([len(trial) for trial in found])
+            dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
+            self._worst[n, operator] = [found[i] for i in np.argsort(dear)[-40:]]
+        return self._worst[n, operator]
+
+    @staticmethod
+    def _figures(
+        target: targets.Target,
+        compiler: str,
+        n: int,
+        operator: str,
+        engine: str,
+        arithmetic: str,
+        signal: str,
+        core: emulator.Core,
+        image: emulator.Image,
+        files: sources.Sources,
+    ) -> Figures:
+        counts = core.counts
+        return Figures(
+            target=target.name,
+            compiler=compiler,
+            arithmetic=arithmetic,
+            operator=operator,
+            engine=engine,
+            n=n,
+            signal=signal,
+            samples=len(counts),
+            mean=round(float(counts.mean()), 1),
+            max=int(counts.max()),
+            flash=image.sections[".module"],
+            library=image.sections.get(".library", 0),
+            ram=core.call(f"hystgen_harness_{'forward' if engine == 'textbook' else operator}_size"),
+            stack=core.stack,
+        )
+
+
+def measure(
+    plays: Sequence[int], chosen: Sequence[targets.Target], names: Sequence[str], arithmetics: Sequence[str]
+) -> list[Figures]:
+    """Everything that is asked for; compilers that are not installed are left out with a word."""
+    found: list[Figures] = []
+    with tempfile.TemporaryDirectory(prefix="hystgen-bench-") as folder:
+        bench = Bench(Path(folder))
+        for target, compiler in itertools.product(chosen, names):
+            try:
+                cross.find(target, compiler)
+            except cross.MissingError as error:
+                print(f"left out: {error}", file=sys.stderr)
+                continue
+            for n, arithmetic in itertools.product(plays, arithmetics):
+                began = time.monotonic()
+                # Whoever visits every play does so in every sample: fewer samples give the same figure sooner
+                few = SAMPLES if target.fpu else max(100, SAMPLES // n)
+                for operator in ("forward", "inverse"):
+                    found.append(bench.textbook_figures(target, compiler, n, operator, arithmetic, few))
+                both = ("forward", "inverse")
+                found += bench.engine_figures(target, compiler, n, both, "loop", arithmetic, few, False)
+                found += bench.engine_figures(target, compiler, n, both, "corners", arithmetic, SAMPLES, True)
+                seconds = time.monotonic() - began
+                print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
+    return found
+
+
+def key(f: Figures) -> tuple[Any, ...]:
+    """What a row of the table is about."""
+    return f.target, f.compiler, f.arithmetic, f.operator, f.n
+
+
+def table_text(figures: Iterable[Figures]) -> str:
+    """Mean / max over the multisine, and the worst case, a row an operator and n."""
+    rows: dict[tuple[Any, ...], dict[str, Figures]] = {}
+    for f in figures:
+        rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else "worst"] = f
+    head = ("target", "compiler", "arithmetic", "operator", "n", "textbook", "loop", "corners", "worst", "flash",
+            "library", "RAM", "stack", "textbook/corners")  # fmt: skip
+    lines = [head]
+    for about, row in rows.items():
+        text, corners = row["textbook"], row["corners"]
+        lines.append(
+            (
+                *map(str, about),
+                f"{text.mean:.0f} / {text.max}",
+                f"{row['loop'].mean:.0f} / {row['loop'].max}",
+                f"{corners.mean:.1f} / {corners.max}",
+                str(row["worst"].max),
+                str(corners.flash),
+                str(corners.library),
+                str(corners.ram),
+                str(max(corners.stack, row["worst"].stack)),
+                f"{text.mean / corners.mean:.1f}",
+            )
+        )
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(
+        "  ".join(word.ljust(w) if i < 4 else word.rjust(w) for i, (word, w) in enumerate(zip(line, widths, strict=True)))
+        for line in lines
+    )
+
+
+def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
+    """What the float32 inverse is to reach: words, figure, most allowed."""
+    found = {(f.target, f.compiler, f.engine, f.n, f.signal): f for f in figures
+             if f.operator == "inverse" and f.arithmetic == "float32"}  # fmt: skip
+    wanted = []
+    for compiler in cross.NAMES:
+        for n, most in ((16, 60), (128, 70)):
+            f = found.get(("cortex-m4f", compiler, "corners", n, "multisine"))
+            if f:
+                wanted.append((f"cortex-m4f {compiler} n = {n}: mean", f.mean, most))
+        for n in PLAYS[2:]:
+            f, text = (
+                found.get(("cortex-m4f", compiler, engine, n, signal))
+                for engine, signal in (("corners", "worst case"), ("textbook", "multisine"))
+            )
+            if f and text:
+                wanted.append((f"cortex-m4f {compiler} n = {n}: worst, textbook's is {text.max}", f.max, text.max))
+                if n == 128:
+                    wanted.append((f"cortex-m4f {compiler} n = 128: worst", f.max, 400))
+        f, text = (found.get(("cortex-m0plus", compiler, engine, 16, "multisine")) for engine in ("corners", "textbook"))
+        if f and text:
+            wanted.append((f"cortex-m0plus {compiler} n = 16: mean, textbook's is {text.mean}", f.mean, text.mean / 9))
+    return wanted
+
+
+def plot(figures: Sequence[Figures], path: Path) -> None:
+    """Instructions against n, a panel a core: textbook loop, both engines, worst case; zig's inverse."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    mpl.rcParams["svg.hashsalt"] = "hystgen"  # the same file from the same figures
+    import matplotlib.pyplot as plt
+
+    names = list(dict.fromkeys(f.target for f in figures))
+    panels, axes = plt.subplots(
+        -(-len(names) // 3), min(3, len(names)), figsize=(11, 3.6 * -(-len(names) // 3)), squeeze=False, layout="constrained"
+    )
+    lines = (
+        ("textbook", "multisine", "mean", "textbook loop", "0.45", "-"),
+        ("loop", "multisine", "mean", "engine loop", "tab:orange", "-"),
+        ("corners", "worst case", "max", "engine corners, worst sample", "tab:blue", "--"),
+        ("corners", "multisine", "mean", "engine corners, mean", "tab:blue", "-"),
+    )
+    for ax, name in zip(axes.flat, names, strict=False):
+        for engine, signal, what, label, colour, style in lines:
+            points = [
+                (f.n, getattr(f, what)) for f in figures
+                if (f.target, f.compiler, f.operator, f.engine, f.signal, f.arithmetic)
+                == (name, "zig", "inverse", engine, signal, "float32")
+            ]  # fmt: skip
+            if points:
+                ax.loglog(*zip(*points, strict=True), style, color=colour, marker="o", markersize=3, label=label)
+        ax.set_title(name)
+        ax.set_xticks(PLAYS, [str(n) for n in PLAYS], minor=False)
+        ax.minorticks_off()
+        ax.set_xlabel("plays n")
+        ax.grid(alpha=0.3)
+    for row in axes:
+        row[0].set_ylabel("instructions per sample")
+    for ax in list(axes.flat)[len(names) :]:
+        ax.set_visible(False)
+    axes.flat[0].legend(fontsize=8)
+    panels.suptitle("Inverse in float32, zig -O2, decaying multisine")
+    panels.savefig(path, metadata={"Date": None})
+    plt.close(panels)
+
+
+def main() -> int:
+    """Measure, write, print; with --check say by the exit code whether the goals are met."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--n", default=",".join(map(str, PLAYS)), help="plays, comma separated")
+    parser.add_argument("--targets", default=",".join(targets.NAMES[1:]), help="cores, comma separated")
+    parser.add_argument("--compilers", default=",".join(cross.NAMES), help="zig, gcc")
+    parser.add_argument("--arithmetics", default="float32", help="comma separated")
+    parser.add_argument("-o", "--output", type=Path, help="folder for targets.csv and targets.svg")
+    parser.add_argument("--check", action="store_true", help="exit 1 where a goal is missed")
+    wanted = parser.parse_args()
+    figures = measure(
+        [int(n) for n in wanted.n.split(",")],
+        [targets.find(name) for name in wanted.targets.split(",")],
+        wanted.compilers.split(","),
+        wanted.arithmetics.split(","),
+    )
+    print(table_text(figures))
+    missed = False
+    for words, figure, most in goals(figures):
+        missed = missed or figure > most
+        print(f"{words}: {figure:.0f}, at most {most:.0f}: {'met' if figure <= most else 'MISSED'}")
+    if wanted.output:
+        wanted.output.mkdir(parents=True, exist_ok=True)
+        with (wanted.output / "targets.csv").open("w", newline="", encoding="ascii") as file:
+            writer = csv.DictWriter(file, [field.name for field in fields(Figures)])
+            writer.writeheader()
+            writer.writerows(asdict(f) for f in figures)
+        plot(figures, wanted.output / "targets.svg")
+    return int(wanted.check and missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
