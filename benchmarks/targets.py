@@ -83,12 +83,12 @@ def multisine(length: int) -> Reals:
 
 def from_drive(n: int, operator: str, drive: Reals) -> Reals:
     """What the operator is given so that the plays see `drive`."""
-    return drive if operator == "forward" else model(n).cascade.simulate(drive, clamp=True)
+    return drive if operator == "forward" else model(n).cascade.simulate(drive)
 
 
 def corner_lists(n: int) -> Iterator[Reals]:
     """Drives that leave a corner list: full swings, which wipe the memory, then turning points of a shrinking
-    alternating swing, each of which leaves a block of 1, 2, 4 .. n plays behind."""
+    alternating swing, each of which leaves a block of 1, 2, 4 .. n plays behind; each also upside down."""
     r = np.asarray(model(n).cascade.pi.thresholds)
     block = 1
     while block <= n:
@@ -98,18 +98,30 @@ def corner_lists(n: int) -> Iterator[Reals]:
             at += (r[k] + r[k + 1]) * (1 if turn % 2 == 0 else -1)  # moves play k and not the next
             points.append(at)
         yield np.array(points)
+        yield -np.array(points)
         block *= 2
 
 
+def everywhere(n: int) -> Reals:
+    """Drives between all activation points of a few plays, or many of those of many; the outermost beyond the range."""
+    return np.linspace(-1.01 * RANGE, 1.01 * RANGE, min(4 * n + 1, 129))
+
+
 def trials(n: int) -> list[Reals]:
-    """Every corner list, then two jumps: their search for what follows is the work of the sample."""
-    everywhere = np.linspace(-1.02 * RANGE, 1.02 * RANGE, min(2 * n + 5, 129))
-    first, second = everywhere[:: max(1, len(everywhere) // 12)], everywhere[:: max(1, len(everywhere) // 24)]
-    found = []
-    for points in corner_lists(n):
-        found += [np.append(points, a) for a in everywhere]
-        found += [np.append(points, pair) for pair in itertools.product(first, second)]
-    return found
+    """Every corner list, then two jumps, since the search for what follows after a jump is the work of a sample."""
+    jumps = everywhere(n)
+    first, second = jumps[:: max(1, len(jumps) // 12)], jumps[:: max(1, len(jumps) // 24)]
+    return [
+        np.append(points, pair) for points in corner_lists(n) for pair in itertools.product(first, second)
+    ]
+
+
+def neighbours(n: int, trial: Reals) -> Iterator[Reals]:
+    """A trial with one of its jumps, or the turning point before them, moved anywhere."""
+    for place, jump in itertools.product((-3, -2, -1), everywhere(n)):
+        other = trial.copy()
+        other[place] = jump
+        yield other
 
 
 class Bench:
@@ -118,7 +130,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._number = itertools.count()
-        self._worst: dict[tuple[int, str], list[Reals]] = {}
+        self._worst: dict[tuple[int, str, str, str], Reals] = {}
 
     def image(
         self, target: targets.Target, compiler: str, files: sources.Sources
@@ -194,7 +206,7 @@ class Bench:
                 target, compiler, n, operator, engine, arithmetic, "multisine", core, image, files
             )
             if worst:
-                x = np.concatenate(self._worst_trials(n, operator, arithmetic))
+                x = self._worst_trials(n, compiler, operator, arithmetic)
                 core = self._run(target, image, n, operator, engine, arithmetic, "worst case", x)
                 yield self._figures(
                     target, compiler, n, operator, engine, arithmetic, "worst case", core, image, files
@@ -219,19 +231,26 @@ class Bench:
         assert not outcome.different, f"{target.name}, {engine}, n = {n}: {outcome}"
         return core
 
-    def _worst_trials(self, n: int, operator: str, arithmetic: str) -> list[Reals]:
-        """The forty trials with the dearest samples on a Cortex-M4F; those of other cores differ little."""
-        if (n, operator) not in self._worst:
+    def _worst_trials(self, n: int, compiler: str, operator: str, arithmetic: str) -> Reals:
+        """The trials with the dearest samples on a Cortex-M4F, after a search among their neighbours for dearer ones;
+        those of other cores differ little."""
+        about = (n, compiler, operator, arithmetic)
+        if about not in self._worst:
             target = targets.find("cortex-m4f")
-            found = [from_drive(n, operator, trial) for trial in trials(n)]
-            image, _ = self.image(target, "zig", self.emitted(n, "corners", arithmetic))
-            counts = self._run(
-                target, image, n, operator, "corners", arithmetic, "trials", np.concatenate(found)
-            ).counts
-            ends = np.cumsum([len(trial) for trial in found])
-            dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
-            self._worst[n, operator] = [found[i] for i in np.argsort(dear)[-40:]]
-        return self._worst[n, operator]
+            image, _ = self.image(target, compiler, self.emitted(n, "corners", arithmetic))
+
+            def dearest(found: list[Reals], number: int) -> list[Reals]:
+                x = from_drive(n, operator, np.concatenate(found))
+                counts = self._run(target, image, n, operator, "corners", arithmetic, "trials", x).counts
+                ends = np.cumsum([len(trial) for trial in found])
+                dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
+                return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
+
+            best = dearest(trials(n), 10)
+            for _ in range(2):
+                best = dearest([*best, *(other for trial in best for other in neighbours(n, trial))], 10)
+            self._worst[about] = from_drive(n, operator, np.concatenate(best))
+        return self._worst[about]
 
     @staticmethod
     def _figures(

@@ -30,7 +30,7 @@ def build(
 ) -> Path:
     """Compile and link the firmware in the new folder `folder`. Raises CompileError."""
     source = folder.with_name(f"{folder.name}.c")
-    values = SimpleNamespace(name=sources.name, fpu=target.fpu)
+    values = SimpleNamespace(name=sources.name, fpu=target.fpu, fault=FAULT)
     source.write_text(module.render("firmware.c.j2", values), encoding="ascii")
     layout = Layout(machine.flash, ram=machine.ram, **SIZES)
     return compiler.image(sources, folder, flags, layout, "firmware_reset", [source])
