@@ -20,7 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -67,8 +67,8 @@ def model(n: int) -> Model:
     thresholds = np.linspace(0.0, 0.9 * RANGE, n + 1)
     weights = np.concatenate([[0.7], 2.4 / n * np.exp(-thresholds[1:] / 5)])
     text = (
-        f"hystgen: 1\nname: bench\ninput_range: [-{RANGE}, {RANGE}]\nmodel: {{pi: "
-        f"{{thresholds: [{', '.join(map(repr, thresholds.tolist()))}], weights: [{', '.join(map(repr, weights.tolist()))}]}}}}\n"
+        f"hystgen: 1\nname: bench\ninput_range: [-{RANGE}, {RANGE}]\nmodel:\n  pi:\n"
+        f"    thresholds: {thresholds.tolist()}\n    weights: {weights.tolist()}\n"
     )
     return Model(parse_parameters(text, "bench.yaml"))
 
@@ -124,164 +124,136 @@ def neighbours(n: int, trial: Reals) -> Iterator[Reals]:
         yield other
 
 
+@dataclass(frozen=True)
+class Case:
+    """What a build is about."""
+
+    target: targets.Target
+    compiler: str
+    n: int
+    operator: str
+    arithmetic: str
+
+
 class Bench:
-    """Builds and runs; keeps images and the worst trials found."""
+    """Builds, runs and counts in a folder of its own; remembers the worst trials found."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._number = itertools.count()
-        self._worst: dict[tuple[int, str, str, str], Reals] = {}
+        self._emitted: dict[tuple[int, str, str], sources.Sources] = {}
+        self._worst: dict[Case, Reals] = {}
 
-    def image(
-        self, target: targets.Target, compiler: str, files: sources.Sources
-    ) -> tuple[emulator.Image, sources.Sources]:
-        """A strict build."""
+    def image(self, case: Case, engine: str) -> emulator.Image:
+        """A strict build of emitted code with both operators, or of the textbook loop with one."""
+        files = self._textbook(case) if engine == "textbook" else self._module(case, engine)
+        compiler = cross.find(case.target, case.compiler)
         place = self._folder / f"build-{next(self._number)}"
-        found = cross.find(target, compiler)
-        path = found.image(files, place, compilers.STRICT, cross.Layout(), f"hystgen_harness_{files.operators[0]}")
-        return emulator.Image.load(path), files
+        entry = f"hystgen_harness_{files.operators[0]}"
+        return emulator.Image.load(compiler.image(files, place, compilers.STRICT, cross.Layout(), entry))
 
-    @functools.cache
-    def emitted(self, n: int, engine: str, arithmetic: str) -> sources.Sources:
-        """Both operators."""
-        options = emit_options(model(n), "both", arithmetic, engine)
-        return sources.write(self._folder / f"{engine}-{arithmetic}-{n}", model(n), options)
+    def _module(self, case: Case, engine: str) -> sources.Sources:
+        about = (case.n, engine, case.arithmetic)
+        if about not in self._emitted:
+            options = emit_options(model(case.n), "both", case.arithmetic, engine)
+            folder = self._folder / f"{engine}-{case.arithmetic}-{case.n}"
+            self._emitted[about] = sources.write(folder, model(case.n), options)
+        return self._emitted[about]
 
-    @functools.cache
-    def textbook(self, n: int, operator: str, arithmetic: str) -> sources.Sources:
-        """The comparison, with the tables of one operator."""
-        folder = self._folder / f"textbook-{operator}-{arithmetic}-{n}"
+    def _textbook(self, case: Case) -> sources.Sources:
+        folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
-        cascade = model(n).cascade
-        pi = cascade.pi if operator == "forward" else cascade.pi.inverse()
-        real, dtype = REALS[arithmetic], np.dtype(arithmetic).type
+        cascade = model(case.n).cascade
+        forward = case.operator == "forward"
+        pi = cascade.pi if forward else cascade.pi.inverse()
+        dtype = np.dtype(case.arithmetic).type
         ends = [tables.inward(*pair, dtype) for pair in (cascade.input_range, cascade.output_range)]
-        ends = ends if operator == "forward" else ends[::-1]
         names = ("INPUT_MIN", "INPUT_MAX", "OUTPUT_MIN", "OUTPUT_MAX")
-        text = "".join(
-            f"#define TEXTBOOK_{name} {operand(end)}\n" for name, end in zip(names, itertools.chain(*ends), strict=True)
-        )
-        for name, values in (("weight", pi.weights), ("threshold", pi.thresholds)):
-            text += table("textbook_real_t", f"textbook_{name}", [dtype(x) for x in values])
+        values = itertools.chain(*(ends if forward else ends[::-1]))
+        text = "".join(f"#define TEXTBOOK_{name} {operand(end)}\n" for name, end in zip(names, values, strict=True))
+        for name, numbers in (("weight", pi.weights), ("threshold", pi.thresholds)):
+            text += table("textbook_real_t", f"textbook_{name}", [dtype(x) for x in numbers])
+        sizes = f"#define TEXTBOOK_REAL {REALS[case.arithmetic]}\n#define TEXTBOOK_N_PLAYS {case.n}\n"
         (folder / "textbook_tables.h").write_text(text)
-        sizes = f"#define TEXTBOOK_REAL {real}\n#define TEXTBOOK_N_PLAYS {n}\n"
         (folder / "textbook_sizes.h").write_text(sizes)
+        (folder / "hystgen_harness.c").write_text(sources.harness("textbook", ("forward",)))
         for file in ("textbook.h", "textbook.c"):
             (folder / file).write_text((HERE / "textbook" / file).read_text())
-        (folder / "hystgen_harness.c").write_text(sources.harness("textbook", ("forward",)))
-        return sources.Sources(
-            "textbook", ("forward",), (folder / "textbook.c",), (folder / "hystgen_harness.c",)
-        )
+        return sources.Sources("textbook", ("forward",), (folder / "textbook.c",), (folder / "hystgen_harness.c",))
 
-    def textbook_figures(
-        self, target: targets.Target, compiler: str, n: int, operator: str, arithmetic: str, length: int
-    ) -> Figures:
-        """The textbook loop over the multisine."""
-        image, files = self.image(target, compiler, self.textbook(n, operator, arithmetic))
-        cascade = model(n).cascade
-        x = from_drive(n, operator, RANGE * multisine(length)).astype(arithmetic)
-        core = emulator.Core(target, image)
+    def textbook(self, case: Case, length: int) -> Figures:
+        """The textbook loop over the multisine; its answers are compared with the double model."""
+        image = self.image(case, "textbook")
+        core = emulator.Core(case.target, image)
+        x = from_drive(case.n, case.operator, RANGE * multisine(length)).astype(case.arithmetic)
         answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
-        exact = cascade.simulate(x, clamp=True) if operator == "forward" else cascade.inverse().simulate(x, clamp=True)
+        cascade = model(case.n).cascade
+        exact = (cascade if case.operator == "forward" else cascade.inverse()).simulate(x, clamp=True)
         assert np.max(np.abs(answer - exact)) < 1e-3 * RANGE
-        return self._figures(target, compiler, n, operator, "textbook", arithmetic, "multisine", core, image, files)
+        return figures_of(case, "textbook", "multisine", core, image)
 
-    def engine_figures(
-        self,
-        target: targets.Target,
-        compiler: str,
-        n: int,
-        operators: Sequence[str],
-        engine: str,
-        arithmetic: str,
-        length: int,
-        worst: bool,
-    ) -> Iterator[Figures]:
-        """Emitted code over the multisine and, where wanted, over the worst trials."""
-        image, files = self.image(target, compiler, self.emitted(n, engine, arithmetic))
-        for operator in operators:
-            x = from_drive(n, operator, RANGE * multisine(length))
-            core = self._run(target, image, n, operator, engine, arithmetic, "multisine", x)
-            yield self._figures(
-                target, compiler, n, operator, engine, arithmetic, "multisine", core, image, files
-            )
-            if worst:
-                x = self._worst_trials(n, compiler, operator, arithmetic)
-                core = self._run(target, image, n, operator, engine, arithmetic, "worst case", x)
-                yield self._figures(
-                    target, compiler, n, operator, engine, arithmetic, "worst case", core, image, files
-                )
+    def engine(self, case: Case, engine: str, length: int) -> Figures:
+        """Emitted code over the multisine."""
+        image = self.image(case, engine)
+        x = from_drive(case.n, case.operator, RANGE * multisine(length))
+        return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
-    def _run(
-        self,
-        target: targets.Target,
-        image: emulator.Image,
-        n: int,
-        operator: str,
-        engine: str,
-        arithmetic: str,
-        signal: str,
-        x: Reals,
-    ) -> emulator.Core:
-        numbers = tables.build(model(n).cascade, arithmetic, engine)
-        calls = (signal, np.full(len(x), reference.OP_STEP, dtype=np.int64), x)
-        record = comparison.expected_record(numbers, operator == "inverse", calls)
-        core = emulator.Core(target, image)
-        outcome = comparison.compare(functools.partial(core.run, "bench", operator), [record])
-        assert not outcome.different, f"{target.name}, {engine}, n = {n}: {outcome}"
+    def worst(self, case: Case) -> Figures:
+        """Engine corners over the worst trials."""
+        image = self.image(case, "corners")
+        core = self.run(case, image, "corners", self._worst_trials(case))
+        return figures_of(case, "corners", "worst case", core, image)
+
+    def run(self, case: Case, image: emulator.Image, engine: str, x: Reals) -> emulator.Core:
+        """A core after the steps `x`, whose answers have been compared with the bit reference."""
+        numbers = tables.build(model(case.n).cascade, case.arithmetic, engine)
+        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.int64), x)
+        record = comparison.expected_record(numbers, case.operator == "inverse", calls)
+        core = emulator.Core(case.target, image)
+        outcome = comparison.compare(functools.partial(core.run, "bench", case.operator), [record])
+        assert not outcome.different, f"{case}, {engine}: {outcome}"
         return core
 
-    def _worst_trials(self, n: int, compiler: str, operator: str, arithmetic: str) -> Reals:
+    def _worst_trials(self, case: Case) -> Reals:
         """The trials with the dearest samples on a Cortex-M4F, after a search among their neighbours for dearer ones;
         those of other cores differ little."""
-        about = (n, compiler, operator, arithmetic)
-        if about not in self._worst:
-            target = targets.find("cortex-m4f")
-            image, _ = self.image(target, compiler, self.emitted(n, "corners", arithmetic))
+        case = replace(case, target=targets.find("cortex-m4f"))
+        if case not in self._worst:
+            image = self.image(case, "corners")
 
             def dearest(found: list[Reals], number: int) -> list[Reals]:
-                x = from_drive(n, operator, np.concatenate(found))
-                counts = self._run(target, image, n, operator, "corners", arithmetic, "trials", x).counts
+                x = from_drive(case.n, case.operator, np.concatenate(found))
+                counts = self.run(case, image, "corners", x).counts
                 ends = np.cumsum([len(trial) for trial in found])
                 dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
                 return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
 
-            best = dearest(trials(n), 10)
+            best = dearest(trials(case.n), 10)
             for _ in range(2):
-                best = dearest([*best, *(other for trial in best for other in neighbours(n, trial))], 10)
-            self._worst[about] = from_drive(n, operator, np.concatenate(best))
-        return self._worst[about]
+                best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], 10)
+            self._worst[case] = from_drive(case.n, case.operator, np.concatenate(best))
+        return self._worst[case]
 
-    @staticmethod
-    def _figures(
-        target: targets.Target,
-        compiler: str,
-        n: int,
-        operator: str,
-        engine: str,
-        arithmetic: str,
-        signal: str,
-        core: emulator.Core,
-        image: emulator.Image,
-        files: sources.Sources,
-    ) -> Figures:
-        counts = core.counts
-        return Figures(
-            target=target.name,
-            compiler=compiler,
-            arithmetic=arithmetic,
-            operator=operator,
-            engine=engine,
-            n=n,
-            signal=signal,
-            samples=len(counts),
-            mean=round(float(counts.mean()), 1),
-            max=int(counts.max()),
-            flash=image.sections[".module"],
-            library=image.sections.get(".library", 0),
-            ram=core.call(f"hystgen_harness_{'forward' if engine == 'textbook' else operator}_size"),
-            stack=core.stack,
-        )
+
+def figures_of(case: Case, engine: str, signal: str, core: emulator.Core, image: emulator.Image) -> Figures:
+    """What was counted and measured."""
+    counts = core.counts
+    return Figures(
+        target=case.target.name,
+        compiler=case.compiler,
+        arithmetic=case.arithmetic,
+        operator=case.operator,
+        engine=engine,
+        n=case.n,
+        signal=signal,
+        samples=len(counts),
+        mean=round(float(counts.mean()), 1),
+        max=int(counts.max()),
+        flash=image.sections[".module"],
+        library=image.sections.get(".library", 0),
+        ram=core.call(f"hystgen_harness_{'forward' if engine == 'textbook' else case.operator}_size"),
+        stack=core.stack,
+    )
 
 
 def measure(
@@ -302,10 +274,11 @@ def measure(
                 # Whoever visits every play does so in every sample: fewer samples give the same figure sooner
                 few = SAMPLES if target.fpu else max(100, SAMPLES // n)
                 for operator in ("forward", "inverse"):
-                    found.append(bench.textbook_figures(target, compiler, n, operator, arithmetic, few))
-                both = ("forward", "inverse")
-                found += bench.engine_figures(target, compiler, n, both, "loop", arithmetic, few, False)
-                found += bench.engine_figures(target, compiler, n, both, "corners", arithmetic, SAMPLES, True)
+                    case = Case(target, compiler, n, operator, arithmetic)
+                    found.append(bench.textbook(case, few))
+                    found.append(bench.engine(case, "loop", few))
+                    found.append(bench.engine(case, "corners", SAMPLES))
+                    found.append(bench.worst(case))
                 seconds = time.monotonic() - began
                 print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
     return found
@@ -340,35 +313,37 @@ def table_text(figures: Iterable[Figures]) -> str:
                 f"{text.mean / corners.mean:.1f}",
             )
         )
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(word.ljust(w) if i < 4 else word.rjust(w) for i, (word, w) in enumerate(zip(line, widths, strict=True)))
-        for line in lines
-    )
+    columns = []
+    for i, words in enumerate(zip(*lines, strict=True)):
+        width = max(map(len, words))
+        columns.append([word.ljust(width) if i < 4 else word.rjust(width) for word in words])
+    return "\n".join("  ".join(words) for words in zip(*columns, strict=True))
 
 
 def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
     """What the float32 inverse is to reach: words, figure, most allowed."""
     found = {(f.target, f.compiler, f.engine, f.n, f.signal): f for f in figures
              if f.operator == "inverse" and f.arithmetic == "float32"}  # fmt: skip
+
+    def get(target: str, engine: str, n: int, signal: str = "multisine") -> Figures | None:
+        return found.get((target, compiler, engine, n, signal))
+
     wanted = []
     for compiler in cross.NAMES:
+        core = f"cortex-m4f {compiler}"
         for n, most in ((16, 60), (128, 70)):
-            f = found.get(("cortex-m4f", compiler, "corners", n, "multisine"))
-            if f:
-                wanted.append((f"cortex-m4f {compiler} n = {n}: mean", f.mean, most))
-        for n in PLAYS[2:]:
-            f, text = (
-                found.get(("cortex-m4f", compiler, engine, n, signal))
-                for engine, signal in (("corners", "worst case"), ("textbook", "multisine"))
-            )
-            if f and text:
-                wanted.append((f"cortex-m4f {compiler} n = {n}: worst, textbook's is {text.max}", f.max, text.max))
+            if f := get("cortex-m4f", "corners", n):
+                wanted.append((f"{core} n = {n}: mean", f.mean, most))
+        for n in PLAYS:
+            f, text = get("cortex-m4f", "corners", n, "worst case"), get("cortex-m4f", "textbook", n)
+            if f and text and n >= 16:
+                wanted.append((f"{core} n = {n}: worst, textbook's is {text.max}", f.max, text.max))
                 if n == 128:
-                    wanted.append((f"cortex-m4f {compiler} n = 128: worst", f.max, 400))
-        f, text = (found.get(("cortex-m0plus", compiler, engine, 16, "multisine")) for engine in ("corners", "textbook"))
+                    wanted.append((f"{core} n = 128: worst", f.max, 400))
+        f, text = get("cortex-m0plus", "corners", 16), get("cortex-m0plus", "textbook", 16)
         if f and text:
-            wanted.append((f"cortex-m0plus {compiler} n = 16: mean, textbook's is {text.mean}", f.mean, text.mean / 9))
+            words = f"cortex-m0plus {compiler} n = 16: mean, a ninth of textbook's {text.mean}"
+            wanted.append((words, f.mean, text.mean / 9))
     return wanted
 
 
@@ -381,9 +356,8 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
     import matplotlib.pyplot as plt
 
     names = list(dict.fromkeys(f.target for f in figures))
-    panels, axes = plt.subplots(
-        -(-len(names) // 3), min(3, len(names)), figsize=(11, 3.6 * -(-len(names) // 3)), squeeze=False, layout="constrained"
-    )
+    high, wide = -(-len(names) // 3), min(3, len(names))
+    panels, axes = plt.subplots(high, wide, figsize=(1 + 3.3 * wide, 3.6 * high), squeeze=False, layout="constrained")
     lines = (
         ("textbook", "multisine", "mean", "textbook loop", "0.45", "-"),
         ("loop", "multisine", "mean", "engine loop", "tab:orange", "-"),

@@ -1,4 +1,4 @@
-"""Emitted C on microcontroller cores: built by cross compilers, run by emulators, counted instruction by instruction."""
+"""Emitted C on microcontroller cores: built by cross compilers, run by emulators, instructions counted."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hystgen.api import Model
 from hystgen.cli import main
 from hystgen.emission import module
 from hystgen.params import parse_parameters
-from hystgen.verification import Row, compilers, cores, cross, emulator, firmware, sources, targets
+from hystgen.verification import Row, compilers, cross, emulator, firmware, sources, targets
 
 CORES = targets.NAMES[1:]
 REQUIRED = bool(os.environ.get("CI"))  # CI installs the second compiler and emulator; elsewhere they may be absent
@@ -252,25 +252,23 @@ def test_counts_agree_with_those_known_for_the_textbook_loop(
     target = targets.find("cortex-m4f")
     if compiler == "gcc" and not shutil.which(target.gcc) and not REQUIRED:
         pytest.skip("no second compiler here")
-    made = bench.Bench(tmp_path)
-    textbook = made.textbook_figures(target, compiler, 16, "forward", "float32", 500)
+    made, case = bench.Bench(tmp_path), bench.Case(target, compiler, 16, "forward", "float32")
+    textbook = made.textbook(case, 500)
     assert known <= textbook.mean <= 1.15 * known
-    (loop,) = made.engine_figures(target, compiler, 16, ("forward",), "loop", "float32", 500, False)
+    loop = made.engine(case, "loop", 500)
     assert 0.9 * textbook.mean <= loop.mean <= 1.3 * textbook.mean
 
 
 def test_the_constructed_worst_case_is_the_worst(bench: ModuleType, tmp_path: Path) -> None:
-    """Its corner lists are as deep as they can be, and no random walk finds a sample that is dearer by more than the few
-    instructions of a status bit."""
+    """Its corner lists are as deep as they can be, and no random walk finds a sample that is dearer by more than what
+    a status bit takes."""
     lists = list(bench.corner_lists(16))[::2]  # each also upside down
     assert [len(points) for points in lists] == [17, 9, 5, 3, 2]
-    made = bench.Bench(tmp_path)
-    target = targets.find("cortex-m4f")
-    _, worst = made.engine_figures(target, "zig", 16, ("inverse",), "corners", "float32", 500, True)
+    made, case = bench.Bench(tmp_path), bench.Case(targets.find("cortex-m4f"), "zig", 16, "inverse", "float32")
+    worst = made.worst(case)
     rng = np.random.default_rng(5)
     walk = bench.from_drive(16, "inverse", rng.uniform(-10.5, 10.5, 5000) * rng.choice([1, 0.5, 0.1], 5000))
-    image, _ = made.image(target, "zig", made.emitted(16, "corners", "float32"))
-    core = made._run(target, image, 16, "inverse", "corners", "float32", "random", walk)
+    core = made.run(case, made.image(case, "corners"), "corners", walk)
     assert core.counts.max() <= worst.max + 5
 
 
@@ -305,7 +303,8 @@ def test_an_unknown_target_is_bad_usage(tmp_path: Path) -> None:
 def test_firmware_that_faults_or_hangs_is_a_failure(changed_c: Callable[..., None]) -> None:
     if not shutil.which(firmware.QEMU) and not REQUIRED:
         pytest.skip("no second emulator here")
-    changed_c("plain_selftest.c", lambda text: text.replace("int index = 0;", "int index = *(volatile int *)0x7ffffff0;"))
+    nowhere = "int index = *(volatile int *)0x7ffffff0;"
+    changed_c("plain_selftest.c", lambda text: text.replace("int index = 0;", nowhere))
     report = hystgen.verify(model("plain"), targets=["cortex-m4f"], compiler=["zig"], target_length=100)
     (row,) = [row for row in report.rows if row.build == "firmware"]
     assert row.error == "qemu-system-arm -M mps2-an386: the firmware ended in a fault"
@@ -313,8 +312,5 @@ def test_firmware_that_faults_or_hangs_is_a_failure(changed_c: Callable[..., Non
 
 def test_progress_says_what_is_being_built() -> None:
     said: list[str] = []
-    hystgen.verify(
-        model("plain"), targets=["cortex-m4f"], compiler=["zig"], target_length=100, progress=said.append
-    )
+    hystgen.verify(model("plain"), targets=["cortex-m4f"], compiler=["zig"], target_length=9, progress=said.append)
     assert "cortex-m4f, zig strict" in said
-    assert cores.rows.__doc__
