@@ -101,9 +101,12 @@ def find(target: Target, name: str) -> CrossCompiler:
 
 
 def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
-    """Names of the compilers to use: those asked for, else zig and, where it is installed, gcc."""
+    """Names of the compilers to use: those asked for, else zig and, where it is installed, gcc.
+
+    One that builds for the host alone is passed over where another is asked for too.
+    """
     if compiler:
-        return tuple(compiler)
+        return tuple(name for name in compiler if name in NAMES) or tuple(compiler)
     return NAMES if shutil.which(target.gcc) else NAMES[:1]
 
 
