@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hystgen import __version__
+from hystgen.verification.targets import NAMES as TARGETS
 
 if TYPE_CHECKING:
     from hystgen.api import Model
 
 ARITHMETICS = ("float32", "float64", "q31", "q15")
-TARGETS = ("host", "cortex-m0plus", "cortex-m4f", "cortex-m7", "cortex-m33", "rv32imac", "rv32imafc")
 
 
 class _Failed(click.ClickException):
@@ -125,6 +125,7 @@ def emit(params: str, output: str, check: bool, list_outputs: bool, **options: s
 @layout_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
+@click.option("--target-length", type=click.IntRange(min=1), help="calls of a record on emulated cores")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report for programs")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 def verify(
@@ -132,7 +133,7 @@ def verify(
 ) -> None:
     """Compile the emitted C, run it and compare it with the Python reference, bit for bit.
 
-    Example: hystgen verify stage_x.yaml --compiler gcc --compiler clang
+    Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
     """
     from hystgen import verification
     from hystgen.records import write_atomically

@@ -1,5 +1,18 @@
 """Verification: emitted files, compiled and run, give the bits of the Python reference or they do not."""
 
-from hystgen.verification.run import Report, Row, verify_model
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hystgen.verification.report import Report, Row
+    from hystgen.verification.run import verify_model
 
 __all__ = ["Report", "Row", "verify_model"]
+
+
+def __getattr__(name: str) -> Any:
+    # Late, because the command line asks this package for the names of targets whenever it starts
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from hystgen.verification import report, run
+
+    return getattr(run if name == "verify_model" else report, name)

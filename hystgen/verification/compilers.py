@@ -21,7 +21,8 @@ C_WARNINGS = [*WARNINGS, "-Wmissing-prototypes", "-Wstrict-prototypes"]
 # The strict build, and the one a user makes who passes nothing: gcc's and clang's default dialect, in which they may
 # contract a * b + c to one rounding. Where the CPU's baseline has no such instruction, its own set has to be asked for
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off"]
-DEFAULTS = ["-std=gnu11", "-O2", *(["-march=native"] if platform.machine() in ("x86_64", "AMD64") else [])]
+USER = ["-std=gnu11", "-O2"]
+DEFAULTS = [*USER, *(["-march=native"] if platform.machine() in ("x86_64", "AMD64") else [])]
 
 NAMES = ("gcc", "clang", "zig")
 

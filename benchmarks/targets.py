@@ -1,0 +1,423 @@
+"""Instructions per sample on microcontroller cores, counted on emulated ones.
+
+    python benchmarks/targets.py [--n 16,128] [--targets cortex-m4f] [--compilers zig,gcc] [-o FOLDER] [--check]
+
+Emitted code of both engines and operators against the textbook loop (`textbook/textbook.c`: formula (35) as ternaries
+with the same care for NaN, range and status), same compiler, flags (-std=c99 -O2) and signal: a decaying multisine over
+the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
+one among them, then jumps to everywhere. Every answer that is counted has been compared with the bit reference.
+
+Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import functools
+import itertools
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import reference, tables
+from hystgen.api import Model, emit_options
+from hystgen.emission.text import operand, table
+from hystgen.params import parse_parameters
+from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
+
+HERE = Path(__file__).resolve().parent
+PLAYS = (4, 8, 16, 32, 64, 128, 256)
+SAMPLES = 4000
+RANGE = 10.0
+REALS = {"float32": "float", "float64": "double"}
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Figures:
+    """One build: instructions of a sample (mean and max over a signal), and bytes."""
+
+    target: str
+    compiler: str
+    arithmetic: str
+    operator: str
+    engine: str
+    n: int
+    signal: str
+    samples: int
+    mean: float
+    max: int
+    flash: int
+    library: int
+    ram: int
+    stack: int
+
+
+@functools.cache
+def model(n: int) -> Model:
+    """n plays over nine tenths of what a full swing reaches, weights falling, as identified ones do."""
+    thresholds = np.linspace(0.0, 0.9 * RANGE, n + 1)
+    weights = np.concatenate([[0.7], 2.4 / n * np.exp(-thresholds[1:] / 5)])
+    text = (
+        f"hystgen: 1\nname: bench\ninput_range: [-{RANGE}, {RANGE}]\nmodel:\n  pi:\n"
+        f"    thresholds: {thresholds.tolist()}\n    weights: {weights.tolist()}\n"
+    )
+    return Model(parse_parameters(text, "bench.yaml"))
+
+
+def multisine(length: int) -> Reals:
+    """Decaying multisine in parts of the range, 160 samples a period of the middle line."""
+    t = np.arange(SAMPLES) / SAMPLES
+    lines = ((9, 0.6, 0.0), (25, 0.3, 1.0), (41, 0.1, 2.0))
+    x = np.exp(-3 * t) * sum(a * np.sin(2 * np.pi * f * t + phase) for f, a, phase in lines)
+    return np.asarray(x / np.max(np.abs(x)))[:: SAMPLES // length]
+
+
+def from_drive(n: int, operator: str, drive: Reals) -> Reals:
+    """What the operator is given so that the plays see `drive`."""
+    return drive if operator == "forward" else model(n).cascade.simulate(drive)
+
+
+def corner_lists(n: int) -> Iterator[Reals]:
+    """Drives that leave a corner list: full swings, which wipe the memory, then turning points of a shrinking
+    alternating swing, each of which leaves a block of 1, 2, 4 .. n plays behind; each also upside down."""
+    r = np.asarray(model(n).cascade.pi.thresholds)
+    block = 1
+    while block <= n:
+        at = -RANGE
+        points = [RANGE, at]
+        for turn, k in enumerate(range(n - block, 0, -block)):
+            at += (r[k] + r[k + 1]) * (1 if turn % 2 == 0 else -1)  # moves play k and not the next
+            points.append(at)
+        yield np.array(points)
+        yield -np.array(points)
+        block *= 2
+
+
+def everywhere(n: int) -> Reals:
+    """Drives between all activation points of a few plays, or many of those of many; the outermost beyond the range."""
+    return np.linspace(-1.01 * RANGE, 1.01 * RANGE, min(4 * n + 1, 129))
+
+
+def trials(n: int) -> list[Reals]:
+    """Every corner list, then two jumps, since the search for what follows after a jump is the work of a sample."""
+    jumps = everywhere(n)
+    first, second = jumps[:: max(1, len(jumps) // 12)], jumps[:: max(1, len(jumps) // 24)]
+    return [
+        np.append(points, pair) for points in corner_lists(n) for pair in itertools.product(first, second)
+    ]
+
+
+def neighbours(n: int, trial: Reals) -> Iterator[Reals]:
+    """A trial with one of its jumps, or the turning point before them, moved anywhere."""
+    for place, jump in itertools.product((-3, -2, -1), everywhere(n)):
+        other = trial.copy()
+        other[place] = jump
+        yield other
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a build is about."""
+
+    target: targets.Target
+    compiler: str
+    n: int
+    operator: str
+    arithmetic: str
+
+
+class Bench:
+    """Builds, runs and counts in a folder of its own; remembers the worst trials found."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._number = itertools.count()
+        self._emitted: dict[tuple[int, str, str], sources.Sources] = {}
+        self._worst: dict[Case, Reals] = {}
+
+    def image(self, case: Case, engine: str) -> emulator.Image:
+        """A strict build of emitted code with both operators, or of the textbook loop with one."""
+        files = self._textbook(case) if engine == "textbook" else self._module(case, engine)
+        compiler = cross.find(case.target, case.compiler)
+        place = self._folder / f"build-{next(self._number)}"
+        entry = f"hystgen_harness_{files.operators[0]}"
+        return emulator.Image.load(compiler.image(files, place, compilers.STRICT, cross.Layout(), entry))
+
+    def _module(self, case: Case, engine: str) -> sources.Sources:
+        about = (case.n, engine, case.arithmetic)
+        if about not in self._emitted:
+            options = emit_options(model(case.n), "both", case.arithmetic, engine)
+            folder = self._folder / f"{engine}-{case.arithmetic}-{case.n}"
+            self._emitted[about] = sources.write(folder, model(case.n), options)
+        return self._emitted[about]
+
+    def _textbook(self, case: Case) -> sources.Sources:
+        folder = self._folder / f"textbook-{next(self._number)}"
+        folder.mkdir()
+        cascade = model(case.n).cascade
+        forward = case.operator == "forward"
+        pi = cascade.pi if forward else cascade.pi.inverse()
+        dtype = np.dtype(case.arithmetic).type
+        ends = [tables.inward(*pair, dtype) for pair in (cascade.input_range, cascade.output_range)]
+        names = ("INPUT_MIN", "INPUT_MAX", "OUTPUT_MIN", "OUTPUT_MAX")
+        values = itertools.chain(*(ends if forward else ends[::-1]))
+        text = "".join(f"#define TEXTBOOK_{name} {operand(end)}\n" for name, end in zip(names, values, strict=True))
+        for name, numbers in (("weight", pi.weights), ("threshold", pi.thresholds)):
+            text += table("textbook_real_t", f"textbook_{name}", [dtype(x) for x in numbers])
+        sizes = f"#define TEXTBOOK_REAL {REALS[case.arithmetic]}\n#define TEXTBOOK_N_PLAYS {case.n}\n"
+        (folder / "textbook_tables.h").write_text(text)
+        (folder / "textbook_sizes.h").write_text(sizes)
+        (folder / "hystgen_harness.c").write_text(sources.harness("textbook", ("forward",)))
+        for file in ("textbook.h", "textbook.c"):
+            (folder / file).write_text((HERE / "textbook" / file).read_text())
+        return sources.Sources("textbook", ("forward",), (folder / "textbook.c",), (folder / "hystgen_harness.c",))
+
+    def textbook(self, case: Case, length: int) -> Figures:
+        """The textbook loop over the multisine; its answers are compared with the double model."""
+        image = self.image(case, "textbook")
+        core = emulator.Core(case.target, image)
+        x = from_drive(case.n, case.operator, RANGE * multisine(length)).astype(case.arithmetic)
+        answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
+        cascade = model(case.n).cascade
+        exact = (cascade if case.operator == "forward" else cascade.inverse()).simulate(x, clamp=True)
+        assert np.max(np.abs(answer - exact)) < 1e-3 * RANGE
+        return figures_of(case, "textbook", "multisine", core, image)
+
+    def engine(self, case: Case, engine: str, length: int) -> Figures:
+        """Emitted code over the multisine."""
+        image = self.image(case, engine)
+        x = from_drive(case.n, case.operator, RANGE * multisine(length))
+        return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
+
+    def worst(self, case: Case) -> Figures:
+        """Engine corners over the worst trials."""
+        image = self.image(case, "corners")
+        core = self.run(case, image, "corners", self._worst_trials(case))
+        return figures_of(case, "corners", "worst case", core, image)
+
+    def run(self, case: Case, image: emulator.Image, engine: str, x: Reals) -> emulator.Core:
+        """A core after the steps `x`, whose answers have been compared with the bit reference."""
+        numbers = tables.build(model(case.n).cascade, case.arithmetic, engine)
+        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.int64), x)
+        record = comparison.expected_record(numbers, case.operator == "inverse", calls)
+        core = emulator.Core(case.target, image)
+        outcome = comparison.compare(functools.partial(core.run, "bench", case.operator), [record])
+        assert not outcome.different, f"{case}, {engine}: {outcome}"
+        return core
+
+    def _worst_trials(self, case: Case) -> Reals:
+        """The trials with the dearest samples on a Cortex-M4F, after a search among their neighbours for dearer ones;
+        those of other cores differ little."""
+        case = replace(case, target=targets.find("cortex-m4f"))
+        if case not in self._worst:
+            image = self.image(case, "corners")
+
+            def dearest(found: list[Reals], number: int) -> list[Reals]:
+                x = from_drive(case.n, case.operator, np.concatenate(found))
+                counts = self.run(case, image, "corners", x).counts
+                ends = np.cumsum([len(trial) for trial in found])
+                dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
+                return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
+
+            best = dearest(trials(case.n), 10)
+            for _ in range(2):
+                best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], 10)
+            self._worst[case] = from_drive(case.n, case.operator, np.concatenate(best))
+        return self._worst[case]
+
+
+def figures_of(case: Case, engine: str, signal: str, core: emulator.Core, image: emulator.Image) -> Figures:
+    """What was counted and measured."""
+    counts = core.counts
+    return Figures(
+        target=case.target.name,
+        compiler=case.compiler,
+        arithmetic=case.arithmetic,
+        operator=case.operator,
+        engine=engine,
+        n=case.n,
+        signal=signal,
+        samples=len(counts),
+        mean=round(float(counts.mean()), 1),
+        max=int(counts.max()),
+        flash=image.sections[".module"],
+        library=image.sections.get(".library", 0),
+        ram=core.call(f"hystgen_harness_{'forward' if engine == 'textbook' else case.operator}_size"),
+        stack=core.stack,
+    )
+
+
+def measure(
+    plays: Sequence[int], chosen: Sequence[targets.Target], names: Sequence[str], arithmetics: Sequence[str]
+) -> list[Figures]:
+    """Everything that is asked for; compilers that are not installed are left out with a word."""
+    found: list[Figures] = []
+    with tempfile.TemporaryDirectory(prefix="hystgen-bench-") as folder:
+        bench = Bench(Path(folder))
+        for target, compiler in itertools.product(chosen, names):
+            try:
+                cross.find(target, compiler)
+            except cross.MissingError as error:
+                print(f"left out: {error}", file=sys.stderr)
+                continue
+            for n, arithmetic in itertools.product(plays, arithmetics):
+                began = time.monotonic()
+                # Whoever visits every play does so in every sample: fewer samples give the same figure sooner
+                few = SAMPLES if target.fpu else max(100, SAMPLES // n)
+                for operator in ("forward", "inverse"):
+                    case = Case(target, compiler, n, operator, arithmetic)
+                    found.append(bench.textbook(case, few))
+                    found.append(bench.engine(case, "loop", few))
+                    found.append(bench.engine(case, "corners", SAMPLES))
+                    found.append(bench.worst(case))
+                seconds = time.monotonic() - began
+                print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
+    return found
+
+
+def key(f: Figures) -> tuple[Any, ...]:
+    """What a row of the table is about."""
+    return f.target, f.compiler, f.arithmetic, f.operator, f.n
+
+
+def table_text(figures: Iterable[Figures]) -> str:
+    """Mean / max over the multisine, and the worst case, a row an operator and n."""
+    rows: dict[tuple[Any, ...], dict[str, Figures]] = {}
+    for f in figures:
+        rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else "worst"] = f
+    head = ("target", "compiler", "arithmetic", "operator", "n", "textbook", "loop", "corners", "worst", "flash",
+            "library", "RAM", "stack", "textbook/corners")  # fmt: skip
+    lines = [head]
+    for about, row in rows.items():
+        text, corners = row["textbook"], row["corners"]
+        lines.append(
+            (
+                *map(str, about),
+                f"{text.mean:.0f} / {text.max}",
+                f"{row['loop'].mean:.0f} / {row['loop'].max}",
+                f"{corners.mean:.1f} / {corners.max}",
+                str(row["worst"].max),
+                str(corners.flash),
+                str(corners.library),
+                str(corners.ram),
+                str(max(corners.stack, row["worst"].stack)),
+                f"{text.mean / corners.mean:.1f}",
+            )
+        )
+    columns = []
+    for i, words in enumerate(zip(*lines, strict=True)):
+        width = max(map(len, words))
+        columns.append([word.ljust(width) if i < 4 else word.rjust(width) for word in words])
+    return "\n".join("  ".join(words) for words in zip(*columns, strict=True))
+
+
+def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
+    """What the float32 inverse is to reach: words, figure, most allowed."""
+    found = {(f.target, f.compiler, f.engine, f.n, f.signal): f for f in figures
+             if f.operator == "inverse" and f.arithmetic == "float32"}  # fmt: skip
+
+    def get(target: str, engine: str, n: int, signal: str = "multisine") -> Figures | None:
+        return found.get((target, compiler, engine, n, signal))
+
+    wanted = []
+    for compiler in cross.NAMES:
+        core = f"cortex-m4f {compiler}"
+        for n, most in ((16, 60), (128, 70)):
+            if f := get("cortex-m4f", "corners", n):
+                wanted.append((f"{core} n = {n}: mean", f.mean, most))
+        for n in PLAYS:
+            f, text = get("cortex-m4f", "corners", n, "worst case"), get("cortex-m4f", "textbook", n)
+            if f and text and n >= 16:
+                wanted.append((f"{core} n = {n}: worst, textbook's is {text.max}", f.max, text.max))
+                if n == 128:
+                    wanted.append((f"{core} n = 128: worst", f.max, 400))
+        f, text = get("cortex-m0plus", "corners", 16), get("cortex-m0plus", "textbook", 16)
+        if f and text:
+            words = f"cortex-m0plus {compiler} n = 16: mean, a ninth of textbook's {text.mean}"
+            wanted.append((words, f.mean, text.mean / 9))
+    return wanted
+
+
+def plot(figures: Sequence[Figures], path: Path) -> None:
+    """Instructions against n, a panel a core: textbook loop, both engines, worst case; zig's inverse."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    mpl.rcParams["svg.hashsalt"] = "hystgen"  # the same file from the same figures
+    import matplotlib.pyplot as plt
+
+    names = list(dict.fromkeys(f.target for f in figures))
+    high, wide = -(-len(names) // 3), min(3, len(names))
+    panels, axes = plt.subplots(high, wide, figsize=(1 + 3.3 * wide, 3.6 * high), squeeze=False, layout="constrained")
+    lines = (
+        ("textbook", "multisine", "mean", "textbook loop", "0.45", "-"),
+        ("loop", "multisine", "mean", "engine loop", "tab:orange", "-"),
+        ("corners", "worst case", "max", "engine corners, worst sample", "tab:blue", "--"),
+        ("corners", "multisine", "mean", "engine corners, mean", "tab:blue", "-"),
+    )
+    for ax, name in zip(axes.flat, names, strict=False):
+        for engine, signal, what, label, colour, style in lines:
+            points = [
+                (f.n, getattr(f, what)) for f in figures
+                if (f.target, f.compiler, f.operator, f.engine, f.signal, f.arithmetic)
+                == (name, "zig", "inverse", engine, signal, "float32")
+            ]  # fmt: skip
+            if points:
+                ax.loglog(*zip(*points, strict=True), style, color=colour, marker="o", markersize=3, label=label)
+        ax.set_title(name)
+        ax.set_xticks(PLAYS, [str(n) for n in PLAYS], minor=False)
+        ax.minorticks_off()
+        ax.set_xlabel("plays n")
+        ax.grid(alpha=0.3)
+    for row in axes:
+        row[0].set_ylabel("instructions per sample")
+    for ax in list(axes.flat)[len(names) :]:
+        ax.set_visible(False)
+    axes.flat[0].legend(fontsize=8)
+    panels.suptitle("Inverse in float32, zig -O2, decaying multisine")
+    panels.savefig(path, metadata={"Date": None})
+    plt.close(panels)
+
+
+def main() -> int:
+    """Measure, write, print; with --check say by the exit code whether the goals are met."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--n", default=",".join(map(str, PLAYS)), help="plays, comma separated")
+    parser.add_argument("--targets", default=",".join(targets.NAMES[1:]), help="cores, comma separated")
+    parser.add_argument("--compilers", default=",".join(cross.NAMES), help="zig, gcc")
+    parser.add_argument("--arithmetics", default="float32", help="comma separated")
+    parser.add_argument("-o", "--output", type=Path, help="folder for targets.csv and targets.svg")
+    parser.add_argument("--check", action="store_true", help="exit 1 where a goal is missed")
+    wanted = parser.parse_args()
+    figures = measure(
+        [int(n) for n in wanted.n.split(",")],
+        [targets.find(name) for name in wanted.targets.split(",")],
+        wanted.compilers.split(","),
+        wanted.arithmetics.split(","),
+    )
+    print(table_text(figures))
+    missed = False
+    for words, figure, most in goals(figures):
+        missed = missed or figure > most
+        print(f"{words}: {figure:.0f}, at most {most:.0f}: {'met' if figure <= most else 'MISSED'}")
+    if wanted.output:
+        wanted.output.mkdir(parents=True, exist_ok=True)
+        with (wanted.output / "targets.csv").open("w", newline="", encoding="ascii") as file:
+            writer = csv.DictWriter(file, [field.name for field in fields(Figures)])
+            writer.writeheader()
+            writer.writerows(asdict(f) for f in figures)
+        plot(figures, wanted.output / "targets.svg")
+    return int(wanted.check and missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,23 @@
+#ifndef TEXTBOOK_H
+#define TEXTBOOK_H
+
+#include "textbook_sizes.h" /* written by the benchmark: TEXTBOOK_REAL, TEXTBOOK_N_PLAYS */
+
+typedef TEXTBOOK_REAL textbook_real_t;
+
+#define TEXTBOOK_STATUS_INPUT_CLAMPED 1u
+#define TEXTBOOK_STATUS_OUTPUT_CLAMPED 2u
+#define TEXTBOOK_STATUS_HELD 4u
+
+typedef struct {
+    textbook_real_t play[TEXTBOOK_N_PLAYS];
+    textbook_real_t answer;
+    unsigned int status;
+} textbook_forward_t;
+
+void textbook_forward_init(textbook_forward_t *self);
+void textbook_forward_reset(textbook_forward_t *self, textbook_real_t x);
+textbook_real_t textbook_forward_step(textbook_forward_t *self, textbook_real_t x);
+unsigned int textbook_forward_status(textbook_forward_t *self);
+
+#endif

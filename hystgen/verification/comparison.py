@@ -1,0 +1,95 @@
+"""The records that are verified, with the answers of the bit reference, and how compiled answers differ from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import compiled, reference
+from hystgen.fixed import FixedTables
+from hystgen.verification import signals
+
+Bytes = NDArray[np.uint8]
+
+# What NAME_real_t is
+REALS: dict[str, np.dtype[Any]] = {
+    "float32": np.dtype("f4"),
+    "float64": np.dtype("f8"),
+    "q31": np.dtype("i4"),
+    "q15": np.dtype("i2"),
+}
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A record and what the reference makes of it."""
+
+    name: str
+    call: Bytes
+    x: NDArray[Any]
+    answer: NDArray[Any]
+    status: Bytes
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How many samples were compared, how many differ, by how much at most (None: infinitely), and the first one."""
+
+    samples: int
+    different: int
+    max_ulp: float | None
+    first: str
+
+
+def expected_record(
+    numbers: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
+) -> Expected:
+    """A record of calls, in numbers of type `real`, with the answers of the bit reference."""
+    code = compiled.reference(numbers)
+    name, op, values = calls
+    x = values.astype(real).astype(numbers.threshold.dtype)
+    state = reference.new_state(numbers)
+    answer, status = np.zeros_like(x), np.zeros(len(x), dtype=np.int64)
+    code.init(numbers, state)
+    code.run(numbers, state, int(inverse), op, x, answer, status)
+    return Expected(name, op.astype(np.uint8), x.astype(real), answer.astype(real), status.astype(np.uint8))
+
+
+def expected_records(
+    numbers: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int
+) -> list[Expected]:
+    """The verification records of an operator with the answers of the bit reference."""
+    suite = signals.suite(numbers, real, inverse, length)
+    return [expected_record(numbers, real, inverse, calls) for calls in suite]
+
+
+def _ulps(a: NDArray[Any], b: NDArray[Any]) -> float:
+    """Largest distance in units of the last place of `b`, or in codes."""
+    if a.dtype.kind == "i":
+        return float(np.max(np.abs(a.astype(np.int64) - b.astype(np.int64)), initial=0))
+    with np.errstate(all="ignore"):
+        distance = np.abs(a.astype(np.longdouble) - b.astype(np.longdouble)) / np.spacing(np.abs(b))
+    return float(np.max(np.where(np.isfinite(distance), distance, np.inf), initial=0.0))
+
+
+def compare(
+    run: Callable[[Bytes, NDArray[Any]], tuple[NDArray[Any], Bytes]], records: Sequence[Expected]
+) -> Difference:
+    """Run every record through `run` (calls and arguments to answers and status) and compare it bit for bit."""
+    samples = different = 0
+    first = ""
+    worst = 0.0
+    for record in records:
+        answer, status = run(record.call, record.x)
+        bits = np.dtype(f"u{answer.itemsize}")
+        wrong = (answer.view(bits) != record.answer.view(bits)) | (status != record.status)
+        samples += len(answer)
+        different += int(wrong.sum())
+        if wrong.any():
+            first = first or f"sample {int(np.argmax(wrong))} of {record.name}"
+            worst = max(worst, _ulps(answer[wrong], record.answer[wrong]))
+    return Difference(samples, different, worst if np.isfinite(worst) else None, first)

@@ -1,0 +1,110 @@
+"""Verification on a microcontroller core: built for it, run on an emulated one, compared and measured."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from hystgen.verification import compilers, cross, emulator, firmware
+from hystgen.verification.comparison import Expected, compare
+from hystgen.verification.report import Row
+from hystgen.verification.sources import Sources
+from hystgen.verification.targets import Target
+
+_fresh = itertools.count()  # zig's cache answers for an output path that it knows; these are always new
+
+
+def rows(
+    target: Target,
+    sources: Sources,
+    records: Callable[[str], Sequence[Expected]],
+    compiler: Sequence[str],
+    folder: Path,
+    progress: Callable[[str], None],
+) -> Iterator[Row]:
+    """One row an operator, compiler and build.
+
+    Where the core has an FPU also as a user builds it who passes nothing, which lets compilers contract a product and a
+    sum, with a row for the self-test; where qemu is installed also the self-test as a whole firmware.
+    """
+    missing = cross.missing_wheels()
+    if missing:
+        yield Row(target.name, "-", "-", "-", error=f"{', '.join(missing)} not installed: {cross.WHEELS}")
+        return
+    for name in cross.chosen(target, compiler):
+        try:
+            found = cross.find(target, name)
+        except cross.MissingError as error:
+            yield Row(target.name, name, "-", "-", error=str(error))
+            continue
+        builds = [("strict", compilers.STRICT)] + ([("defaults", compilers.USER)] if target.fpu else [])
+        for build, flags in builds:
+            progress(f"{target.name}, {name} {build}")
+            place = folder / f"{target.name}-{name}-{build}-{next(_fresh)}"
+            yield from _emulated(target, found, build, flags, sources, records, place)
+        machine = firmware.available(target)
+        if machine:
+            progress(f"{target.name}, {name}, firmware on {machine.name}")
+            row = Row(target.name, name, "firmware", "selftest")
+            try:
+                place = folder / f"firmware-{target.name}-{name}-{next(_fresh)}"
+                image = firmware.build(found, target, machine, sources, place, compilers.USER)
+                yield _selftest(row, sources, firmware.run(machine, image))
+            except (compilers.CompileError, emulator.EmulatorError) as error:
+                yield _failed(row, error)
+
+
+def _emulated(
+    target: Target,
+    compiler: cross.CrossCompiler,
+    build: str,
+    flags: Sequence[str],
+    sources: Sources,
+    records: Callable[[str], Sequence[Expected]],
+    folder: Path,
+) -> Iterator[Row]:
+    try:
+        path = compiler.image(sources, folder, flags, cross.Layout(), f"{sources.name}_selftest")
+        image = emulator.Image.load(path)
+    except compilers.CompileError as error:
+        yield _failed(Row(target.name, compiler.name, build, "-"), error)
+        return
+    for op in sources.operators:
+        row = Row(target.name, compiler.name, build, op)
+        try:
+            core = emulator.Core(target, image)
+            size = core.call(f"hystgen_harness_{op}_size")
+            outcome = compare(functools.partial(core.run, sources.name, op), records(op))
+        except emulator.EmulatorError as error:
+            yield _failed(row, error)
+            continue
+        yield Row(
+            target.name,
+            compiler.name,
+            build,
+            op,
+            **vars(outcome),
+            mean_instructions=round(float(core.counts.mean()), 2),
+            max_instructions=int(core.counts.max()),
+            flash=image.sections[".module"],
+            library=image.sections.get(".library", 0),
+            ram=size,
+            stack=core.stack,
+        )
+    row = Row(target.name, compiler.name, build, "selftest")
+    try:
+        row = _selftest(row, sources, emulator.Core(target, image).call(f"{sources.name}_selftest"))
+    except emulator.EmulatorError as error:
+        row = _failed(row, error)
+    if build == "defaults" or not row.ok:
+        yield row
+
+
+def _selftest(row: Row, sources: Sources, result: int) -> Row:
+    return _failed(row, f"{sources.name}_selftest() returned {result}") if result else row
+
+
+def _failed(row: Row, error: object) -> Row:
+    return Row(row.target, row.compiler, row.build, row.operator, error=str(error))

@@ -1,0 +1,116 @@
+"""C compilers for the cores of `targets`: zig from its wheel, and Debian's cross gcc where it is installed."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+from hystgen.emission import module
+from hystgen.verification import compilers
+from hystgen.verification.sources import Sources
+from hystgen.verification.targets import Target
+
+WHEELS = "pip install 'hystgen[targets]'"
+NAMES = ("zig", "gcc")
+
+# Flags of every firmware: no hosted library, no unwind tables
+FREESTANDING = ["-ffreestanding", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-g0"]
+
+
+class MissingError(RuntimeError):
+    """A compiler that is asked for is not there; the message says what to install."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where an image lies in memory."""
+
+    flash: int = 0x0800_0000
+    flash_size: int = 0x0100_0000
+    ram: int = 0x2000_0000
+    ram_size: int = 0x0004_0000
+
+
+@dataclass(frozen=True)
+class CrossCompiler:
+    """A compiler with the flags that name the core."""
+
+    compiler: compilers.Compiler
+    flags: tuple[str, ...]
+    libraries: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """zig or gcc."""
+        return self.compiler.name
+
+    def image(
+        self,
+        sources: Sources,
+        folder: Path,
+        flags: Sequence[str],
+        layout: Layout,
+        entry: str,
+        more: Sequence[Path] = (),
+    ) -> Path:
+        """Compile and link a flat image in `folder`, which must be new. Raises CompileError.
+
+        The emitted files have to be clean under the warnings of the host; `more`, which is never shipped, need not be.
+        """
+        folder.mkdir(parents=True)
+        common = [*self.flags, *flags, *FREESTANDING]
+        objects = []
+        for source in (*sources.all, *more):
+            output = folder / f"{source.stem}.o"
+            warnings = compilers.C_WARNINGS if source not in more else []
+            self.compiler.run(["-c", *common, *warnings, "-o", output, source])
+            objects.append(output)
+        script = folder / "image.ld"
+        values = SimpleNamespace(
+            **vars(layout),
+            module=[f"{path.stem}.o" for path in sources.module],
+            harness=[f"{path.stem}.o" for path in (*sources.callers, *more)],
+        )
+        script.write_text(module.render("image.ld.j2", values), encoding="ascii")
+        image = folder / "image.elf"
+        linking = ["-nostartfiles", f"-Wl,-T,{script}", f"-Wl,-e,{entry}", "-Wl,--gc-sections"]
+        self.compiler.run([*common, *linking, "-o", image, *objects, *self.libraries])
+        return image
+
+
+@functools.cache
+def find(target: Target, name: str) -> CrossCompiler:
+    """The compiler 'zig' or 'gcc' for `target`. Raises MissingError."""
+    if name == "zig":
+        found = compilers.find("zig")
+        if found is None:
+            raise MissingError(f"zig is not installed: {WHEELS}")
+        return CrossCompiler(found, target.zig, ())
+    if name == "gcc":
+        path = shutil.which(target.gcc)
+        if path is None:
+            raise MissingError(f"{target.gcc} is not installed")
+        # No library but the compiler's own: emitted code needs none
+        return CrossCompiler(compilers.Compiler("gcc", (path,)), (*target.gcc_flags, "-nostdlib"), ("-lgcc",))
+    raise MissingError(f"{name} does not build for {target.name}; use {' or '.join(NAMES)}")
+
+
+def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
+    """Names of the compilers to use: those asked for, else zig and, where it is installed, gcc.
+
+    One that builds for the host alone is passed over where another is asked for too.
+    """
+    if compiler:
+        return tuple(name for name in compiler if name in NAMES) or tuple(compiler)
+    return NAMES if shutil.which(target.gcc) else NAMES[:1]
+
+
+def missing_wheels() -> list[str]:
+    """The wheels of the emulator that are not installed."""
+    wheels = {"unicorn": "unicorn", "elftools": "pyelftools"}
+    return [wheel for package, wheel in wheels.items() if importlib.util.find_spec(package) is None]

@@ -1,0 +1,244 @@
+"""An emulated core: runs functions of a flat image, counts the instructions of every step, measures its stack."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import reference
+from hystgen.emission import runtime
+from hystgen.verification import compilers
+from hystgen.verification.comparison import Bytes
+from hystgen.verification.cross import Layout
+from hystgen.verification.targets import Target
+
+RECORDS = 0x6000_0000  # where the arrays of a record are put
+STACK = 0x0000_8000  # bytes below the top of RAM that are painted
+PAINT = 0xA5
+SECONDS = 600  # after which a call is given up
+PAGE = 0x1000
+
+
+class EmulatorError(RuntimeError):
+    """The emulated core did not do what was asked for; the message says why."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """An ELF file: what is loaded where, symbols with their sizes, and bytes of each section."""
+
+    segments: tuple[tuple[int, bytes], ...]
+    symbols: dict[str, tuple[int, int]]
+    sections: dict[str, int]
+
+    @classmethod
+    def load(cls, path: Path) -> Image:
+        """Read an ELF file."""
+        from elftools.elf.elffile import ELFFile
+
+        with path.open("rb") as file:
+            elf = ELFFile(file)
+            segments = tuple(
+                (int(part["p_vaddr"]), part.data().ljust(int(part["p_memsz"]), b"\0"))
+                for part in elf.iter_segments("PT_LOAD")
+                if part["p_memsz"]
+            )
+            symbols = {
+                symbol.name: (int(symbol["st_value"]), int(symbol["st_size"]))
+                for symbol in elf.get_section_by_name(".symtab").iter_symbols()
+            }
+            sections = {section.name: int(section["sh_size"]) for section in elf.iter_sections()}
+        return cls(segments, symbols, sections)
+
+
+class _Counter(ctypes.Structure):
+    """`hystgen_counter_t` of templates/instruction_counter.c."""
+
+    _fields_ = [
+        ("entry", ctypes.c_uint64),
+        ("caller", ctypes.c_uint64),
+        ("caller_end", ctypes.c_uint64),
+        ("calls", ctypes.c_uint64),
+        ("capacity", ctypes.c_uint64),
+        ("counts", ctypes.c_void_p),
+        ("stack_pointer", ctypes.c_uint64),
+        ("read_register", ctypes.c_void_p),
+        ("stack_register", ctypes.c_int64),
+        ("last", ctypes.c_uint64),
+        ("behind", ctypes.c_uint64),
+        ("back", ctypes.c_uint64),
+        ("count", ctypes.c_uint32),
+    ]
+
+
+@functools.cache
+def _hook() -> Any:
+    """The counting hook as machine code of this machine. Raises EmulatorError."""
+    found = compilers.available()
+    if not found:
+        raise EmulatorError("no C compiler for this machine; install gcc or clang, or: pip install 'hystgen[zig]'")
+    source = runtime.data_folder("templates") / "instruction_counter.c"
+    with tempfile.TemporaryDirectory(prefix="hystgen-counter-", ignore_cleanup_errors=True) as folder:
+        library = Path(folder) / "instruction_counter.so"
+        try:
+            found[0].shared_library([source], library, compilers.STRICT)
+        except compilers.CompileError as error:
+            raise EmulatorError(f"the instruction counter: {error}") from None
+        return ctypes.CDLL(str(library)).hystgen_count_instruction
+
+
+@dataclass(frozen=True)
+class _Registers:
+    arguments: tuple[int, ...]
+    result: int
+    link: int
+    stack: int
+    program: int
+
+
+class Core:
+    """A core with an image loaded. Use it for one image; `counts` holds the instructions of every step so far."""
+
+    def __init__(self, target: Target, image: Image, layout: Layout = Layout()) -> None:  # noqa: B008  frozen
+        self._image = image
+        self._thumb = target.architecture == "arm"
+        self._top = layout.ram + layout.ram_size
+        self._return = layout.flash + layout.flash_size - PAGE
+        self._records = 0
+        self._counts: list[NDArray[np.uint32]] = []
+        self._lowest = self._top
+        self._stack_at_step = 0
+        self._registers = self._open(target)
+        self._uc.mem_map(layout.flash, layout.flash_size)
+        self._uc.mem_map(layout.ram, layout.ram_size)
+        for address, data in image.segments:
+            self._uc.mem_write(address, data)
+        self._uc.mem_write(self._top - STACK, bytes([PAINT]) * STACK)
+
+    def _open(self, target: Target) -> _Registers:
+        import unicorn
+        from unicorn import arm_const, riscv_const
+
+        self._failure: type[Exception] = unicorn.UcError
+        if self._thumb:
+            mode = unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS
+            self._uc = unicorn.Uc(unicorn.UC_ARCH_ARM, mode, getattr(arm_const, target.cpu))
+            arguments = [getattr(arm_const, f"UC_ARM_REG_R{i}") for i in range(4)]
+            return _Registers(
+                tuple(arguments), arguments[0], arm_const.UC_ARM_REG_LR, arm_const.UC_ARM_REG_SP,
+                arm_const.UC_ARM_REG_PC,
+            )  # fmt: skip
+        self._uc = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32, getattr(riscv_const, target.cpu))
+        if target.fpu:
+            self._uc.reg_write(riscv_const.UC_RISCV_REG_MSTATUS, 1 << 13)  # FS: the FPU on
+        arguments = [getattr(riscv_const, f"UC_RISCV_REG_A{i}") for i in range(8)]
+        return _Registers(
+            tuple(arguments), arguments[0], riscv_const.UC_RISCV_REG_RA, riscv_const.UC_RISCV_REG_SP,
+            riscv_const.UC_RISCV_REG_PC,
+        )  # fmt: skip
+
+    @property
+    def counts(self) -> NDArray[np.uint32]:
+        """Instructions of every call of `step` that the harness made, in order."""
+        return np.concatenate(self._counts) if self._counts else np.zeros(0, dtype=np.uint32)
+
+    @property
+    def stack(self) -> int:
+        """Bytes below the harness's frame that the deepest call used, by what is left of the paint."""
+        painted = bytes(self._uc.mem_read(self._top - STACK, STACK))
+        untouched = len(painted) - len(painted.lstrip(bytes([PAINT])))
+        return self._stack_at_step - (self._top - STACK + untouched)
+
+    def call(self, function: str, *arguments: int) -> int:
+        """Call a function of the image with integers and pointers; returns its result. Raises EmulatorError."""
+        address, _ = self._image.symbols[function]
+        uc, registers = self._uc, self._registers
+        in_registers = len(registers.arguments)
+        stack = self._top
+        if len(arguments) > in_registers:
+            rest = b"".join(word.to_bytes(4, "little") for word in arguments[in_registers:])
+            stack -= -(-len(rest) // 16) * 16
+            uc.mem_write(stack, rest)
+        for register, argument in zip(registers.arguments, arguments, strict=False):
+            uc.reg_write(register, argument)
+        uc.reg_write(registers.stack, stack)
+        uc.reg_write(registers.link, self._return | self._thumb)
+        try:
+            uc.emu_start(address, self._return, timeout=SECONDS * 1_000_000)
+        except self._failure as error:
+            where = uc.reg_read(registers.program)
+            raise EmulatorError(f"{function}: {error} at {where:#010x}, in {self._where(where)}") from None
+        if uc.reg_read(registers.program) != self._return:
+            raise EmulatorError(f"{function} did not return within {SECONDS} s")
+        return int(uc.reg_read(registers.result))
+
+    def _where(self, address: int) -> str:
+        for name, (start, size) in self._image.symbols.items():
+            if start & ~1 <= address < start + size:
+                return name
+        return "no function"
+
+    def run(self, name: str, op: str, call: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
+        """Have the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step."""
+        sizes = (len(x), x.nbytes, x.nbytes, len(x))
+        places, end = [], RECORDS
+        for size in sizes:
+            places.append(end)
+            end += -(-size // 16) * 16
+        needed = -(-(end - RECORDS) // PAGE) * PAGE
+        if needed > self._records:
+            self._uc.mem_map(RECORDS + self._records, needed - self._records)
+            self._records = needed
+        self._uc.mem_write(places[0], call.tobytes())
+        self._uc.mem_write(places[1], x.tobytes())
+        steps = int(np.count_nonzero(call == reference.OP_STEP))
+        with_counter = self._counting(name, op, steps)
+        with_counter(lambda: self.call(f"hystgen_harness_{op}", *places, len(x)))
+        answer = np.frombuffer(bytes(self._uc.mem_read(places[2], x.nbytes)), dtype=x.dtype)
+        status = np.frombuffer(bytes(self._uc.mem_read(places[3], len(x))), dtype=np.uint8)
+        return answer, status
+
+    def _counting(self, name: str, op: str, steps: int) -> Callable[[Callable[[], object]], None]:
+        """What runs an action with the hook in place."""
+        from unicorn import UC_HOOK_CODE
+        from unicorn.unicorn_py3.unicorn import uc_hook_h, uclib
+
+        counts = np.zeros(steps, dtype=np.uint32)
+        caller, size = self._image.symbols[f"hystgen_harness_{op}"]
+        counter = _Counter(
+            entry=self._image.symbols[f"{name}_{op}_step"][0] & ~1,
+            caller=caller & ~1,
+            caller_end=(caller & ~1) + size,
+            capacity=steps,
+            counts=counts.ctypes.data,
+            read_register=ctypes.cast(uclib.uc_reg_read, ctypes.c_void_p).value,
+            stack_register=self._registers.stack,
+        )
+
+        def run(action: Callable[[], object]) -> None:
+            handle = uc_hook_h()
+            hook = ctypes.cast(_hook(), ctypes.c_void_p)
+            # The binding's own hook_add would wrap a Python function; the address of compiled code goes in directly
+            failed = uclib.uc_hook_add(
+                self._uc._uch, ctypes.byref(handle), UC_HOOK_CODE, hook, ctypes.addressof(counter), 1, 0
+            )
+            if failed:
+                raise EmulatorError(f"the emulator refused the counting hook: error {failed}")
+            try:
+                action()
+            finally:
+                uclib.uc_hook_del(self._uc._uch, handle)
+            if counter.calls != steps:
+                raise EmulatorError(f"counted {counter.calls} calls of {name}_{op}_step where {steps} were made")
+            self._counts.append(counts)
+            self._stack_at_step = int(counter.stack_pointer) or self._stack_at_step
+
+        return run

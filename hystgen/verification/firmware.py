@@ -1,0 +1,55 @@
+"""A second emulator: a whole firmware image on qemu-system-arm, which runs the self-test and exits with its result."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from types import SimpleNamespace
+
+from hystgen.emission import module
+from hystgen.verification.cross import CrossCompiler, Layout
+from hystgen.verification.emulator import EmulatorError
+from hystgen.verification.sources import Sources
+from hystgen.verification.targets import Machine, Target
+
+QEMU = "qemu-system-arm"
+SECONDS = 120
+SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # what the smallest of the boards has
+FAULT = 255
+
+
+def available(target: Target) -> Machine | None:
+    """The board to run a firmware for `target` on, or None where there is none or qemu is not installed."""
+    return target.machine if shutil.which(QEMU) else None
+
+
+def build(
+    compiler: CrossCompiler, target: Target, machine: Machine, sources: Sources, folder: Path, flags: Sequence[str]
+) -> Path:
+    """Compile and link the firmware in the new folder `folder`. Raises CompileError."""
+    source = folder.with_name(f"{folder.name}.c")
+    values = SimpleNamespace(name=sources.name, fpu=target.fpu, fault=FAULT)
+    source.write_text(module.render("firmware.c.j2", values), encoding="ascii")
+    layout = Layout(machine.flash, ram=machine.ram, **SIZES)
+    return compiler.image(sources, folder, flags, layout, "firmware_reset", [source])
+
+
+def run(machine: Machine, image: Path) -> int:
+    """The self-test's result (0, or 1 + first failing index, at most 254). Raises EmulatorError."""
+    command = [
+        QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",
+        "-semihosting-config", "enable=on,target=native", "-icount", "shift=6", "-kernel", str(image),
+    ]  # fmt: skip
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise EmulatorError(f"{QEMU} -M {machine.name} did not end within {SECONDS} s") from None
+    if done.returncode < 0 or done.stderr.strip():
+        raise EmulatorError(f"{QEMU} -M {machine.name} failed ({done.returncode}):\n{done.stderr.strip()}")
+    if done.returncode == FAULT:
+        raise EmulatorError(f"{QEMU} -M {machine.name}: the firmware ended in a fault")
+    return done.returncode

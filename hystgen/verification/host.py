@@ -1,0 +1,95 @@
+"""Verification on this machine: a shared library, called through cffi."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import cffi
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.verification import compilers
+from hystgen.verification.comparison import Bytes, Expected, compare
+from hystgen.verification.report import Row
+from hystgen.verification.sources import Sources
+from hystgen.verification.targets import HOST
+
+BUILDS = (("strict", compilers.STRICT), ("defaults", compilers.DEFAULTS))
+C_TYPES = {"float32": "float", "float64": "double", "int32": "int32_t", "int16": "int16_t"}
+
+
+class _Library:
+    """The compiled harness of a model, called through its C interface."""
+
+    def __init__(self, path: Path, sources: Sources, dtype: np.dtype[Any]) -> None:
+        self._ffi = cffi.FFI()
+        self._real = C_TYPES[dtype.name]
+        self._selftest = f"{sources.name}_selftest"
+        self._ffi.cdef(f"int {self._selftest}(void);")
+        for op in sources.operators:
+            self._ffi.cdef(
+                f"size_t hystgen_harness_{op}_size(void);"
+                f"void hystgen_harness_{op}(const unsigned char *call, const {self._real} *x, {self._real} *answer,"
+                " unsigned char *status, size_t count);"
+            )
+        self._lib = self._ffi.dlopen(str(path))
+
+    def selftest(self) -> int:
+        return int(getattr(self._lib, self._selftest)())
+
+    def size(self, op: str) -> int:
+        return int(getattr(self._lib, f"hystgen_harness_{op}_size")())
+
+    def run(self, op: str, call: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
+        answer, status = np.empty_like(x), np.empty(len(x), dtype=np.uint8)
+        cast = self._ffi.cast
+        getattr(self._lib, f"hystgen_harness_{op}")(
+            cast("unsigned char *", call.ctypes.data),
+            cast(f"{self._real} *", x.ctypes.data),
+            cast(f"{self._real} *", answer.ctypes.data),
+            cast("unsigned char *", status.ctypes.data),
+            len(x),
+        )
+        return answer, status
+
+    def close(self) -> None:
+        self._ffi.dlclose(self._lib)
+
+
+def rows(
+    sources: Sources,
+    records: Callable[[str], Sequence[Expected]],
+    dtype: np.dtype[Any],
+    compiler: Sequence[str],
+    folder: Path,
+    progress: Callable[[str], None],
+) -> Iterator[Row]:
+    """One row an operator, compiler and build; compilers: those named, else all that are installed."""
+    chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
+    if not chosen:
+        message = "no C compiler found; install gcc or clang, or: pip install 'hystgen[zig]'"
+        yield Row(HOST, "-", "-", "-", error=message)
+        return
+    for number, (name, found) in enumerate(chosen):
+        for build, flags in BUILDS:
+            progress(f"{name} {build}")
+            if found is None:
+                yield Row(HOST, name, build, "-", error=f"{name} is not installed")
+                continue
+            output = folder / f"{number}-{build}.so"
+            try:
+                found.shared_library(sources.all, output, flags)
+            except compilers.CompileError as error:
+                yield Row(HOST, name, build, "-", error=str(error))
+                continue
+            library = _Library(output, sources, dtype)
+            for op in sources.operators:
+                outcome = compare(functools.partial(library.run, op), records(op))
+                yield Row(HOST, name, build, op, **vars(outcome), ram=library.size(op))
+            failed = library.selftest()
+            library.close()
+            if failed:
+                yield Row(HOST, name, build, "selftest", error=f"{sources.name}_selftest() returned {failed}")

@@ -1,0 +1,129 @@
+"""What a verification found, as a table for people, JSON for programs and JUnit XML for CI."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+
+
+@dataclass(frozen=True)
+class Row:
+    """One operator in one build: how many samples were compared, what came out, and on emulated cores what it costs.
+
+    Instructions are those of a call of `step`, from its first to its return, over the samples compared. `flash` are the
+    bytes of code and constants of the emitted module, `library` those of what the compiler linked to it (soft float,
+    and whatever else the image called), `ram` the size of an instance, `stack` the bytes below the caller's frame that
+    the deepest call used, as measured.
+    """
+
+    target: str
+    compiler: str
+    build: str
+    operator: str
+    samples: int = 0
+    different: int = 0
+    max_ulp: float | None = 0.0  # None: an answer is no finite number
+    first: str = ""
+    mean_instructions: float | None = None
+    max_instructions: int | None = None
+    flash: int | None = None
+    library: int | None = None
+    ram: int | None = None
+    stack: int | None = None
+    error: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Equal bits everywhere."""
+        return not self.error and not self.different
+
+    @property
+    def _most(self) -> str:
+        return "some not finite" if self.max_ulp is None else f"up to {self.max_ulp:.3g} ulp"
+
+    @property
+    def verdict(self) -> str:
+        """What the table says about it."""
+        if self.error:
+            return self.error.splitlines()[0]
+        if self.ok:
+            return "bits equal" if self.samples else "passed"
+        return f"{self.different} differ, {self._most}; first: {self.first}"
+
+
+def _number(value: int | None) -> str:
+    return "-" if value is None else str(value)
+
+
+_ALWAYS: list[tuple[str, Callable[[Row], str]]] = [
+    ("target", lambda row: row.target),
+    ("compiler", lambda row: row.compiler),
+    ("build", lambda row: row.build),
+    ("operator", lambda row: row.operator),
+    ("samples", lambda row: _number(row.samples or None)),
+]
+_WHERE_MEASURED: list[tuple[str, Callable[[Row], str]]] = [
+    ("instr. mean", lambda row: "-" if row.mean_instructions is None else f"{row.mean_instructions:.1f}"),
+    ("max", lambda row: _number(row.max_instructions)),
+    ("flash", lambda row: _number(row.flash)),
+    ("library", lambda row: _number(row.library)),
+    ("RAM", lambda row: _number(row.ram)),
+    ("stack", lambda row: _number(row.stack)),
+]
+_RIGHT = {"samples", *(name for name, _ in _WHERE_MEASURED)}
+
+
+@dataclass(frozen=True)
+class Report:
+    """All rows of a verification."""
+
+    name: str
+    arithmetic: str
+    engine: str
+    layout: str
+    rows: list[Row] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything that was asked for was built, run and equal."""
+        return bool(self.rows) and all(row.ok for row in self.rows)
+
+    def table(self) -> str:
+        """A table for people; columns that no row has a figure for are left out."""
+        measured = [(name, cell) for name, cell in _WHERE_MEASURED if any(cell(row) != "-" for row in self.rows)]
+        columns = [*_ALWAYS, *measured, ("result", lambda row: row.verdict)]
+        texts = []
+        for name, cell in columns:
+            words = [name, *(cell(row) for row in self.rows)]
+            width = max(map(len, words))
+            texts.append([word.rjust(width) if name in _RIGHT else word.ljust(width) for word in words])
+        lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
+        details = [f"\n{r.target} {r.compiler} {r.build}: {r.error}" for r in self.rows if "\n" in r.error]
+        return "\n".join(lines + details)
+
+    def to_json(self) -> str:
+        """The report for programs."""
+        rows = [{**asdict(row), "ok": row.ok} for row in self.rows]
+        about = {"name": self.name, "arithmetic": self.arithmetic, "engine": self.engine, "layout": self.layout}
+        return json.dumps({"hystgen": 1, **about, "ok": self.ok, "rows": rows}, indent=2) + "\n"
+
+    def to_junit(self) -> str:
+        """The report as JUnit XML, one test case a row."""
+        failures = sum(not row.ok for row in self.rows)
+        suite = ElementTree.Element(
+            "testsuite", name=f"hystgen verify {self.name}", tests=str(len(self.rows)), failures=str(failures)
+        )
+        for row in self.rows:
+            where = f"{self.name}.{self.arithmetic}.{self.engine}.{self.layout}"
+            case = ElementTree.SubElement(
+                suite, "testcase", classname=where, name=f"{row.target} {row.compiler} {row.build} {row.operator}"
+            )
+            if not row.ok:
+                ElementTree.SubElement(case, "failure", message=row.verdict).text = row.error or row.verdict
+            elif row.max_instructions is not None:
+                properties = ElementTree.SubElement(case, "properties")
+                for key in ("mean_instructions", "max_instructions", "flash", "library", "ram", "stack"):
+                    ElementTree.SubElement(properties, "property", name=key, value=str(getattr(row, key)))
+        return ElementTree.tostring(suite, encoding="unicode") + "\n"

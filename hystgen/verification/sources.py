@@ -1,0 +1,51 @@
+"""The emitted files and what calls them, on disk and ready to compile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+from hystgen import reference
+from hystgen.api import Model
+from hystgen.emission import files, module
+
+CALLS = {"init": reference.OP_INIT, "reset": reference.OP_RESET, "commit": reference.OP_COMMIT}
+
+
+@dataclass(frozen=True)
+class Sources:
+    """C files by what they are: the module with its run time, and what the verification adds."""
+
+    name: str
+    operators: tuple[str, ...]
+    module: tuple[Path, ...]
+    callers: tuple[Path, ...]  # self-test and harness
+
+    @property
+    def all(self) -> tuple[Path, ...]:
+        """Every C file."""
+        return (*self.module, *self.callers)
+
+
+def harness(name: str, operators: tuple[str, ...]) -> str:
+    """The C that runs recorded calls of NAME_OP_step and the like."""
+    return module.render("harness.c.j2", SimpleNamespace(name=name, operators=operators, calls=CALLS))
+
+
+def write(folder: Path, model: Model, options: module.Options) -> Sources:
+    """Write the emitted files and the harness into `folder`."""
+    name = model.name
+    texts = module.files(model.parameters, model.cascade, options)
+    operators = tuple(op for op in ("forward", "inverse") if getattr(options, op))
+    if options.layout == "single-header":
+        texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
+    callers = [f"{name}_selftest.c", "hystgen_harness.c"]
+    texts["hystgen_harness.c"] = harness(name, operators)
+    paths = [path for path in files.write(folder, texts) if path.suffix == ".c"]
+    return Sources(
+        name,
+        operators,
+        tuple(path for path in paths if path.name not in callers),
+        tuple(path for path in paths if path.name in callers),
+    )

@@ -1,0 +1,88 @@
+"""The microcontroller cores that emitted C is built for and run on; adding one means adding an entry to TARGETS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+HOST = "host"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A board of qemu-system-arm that a whole firmware image runs on, with its memory map."""
+
+    name: str
+    flash: int
+    ram: int
+
+
+@dataclass(frozen=True)
+class Target:
+    """A core: how compilers name it, and which processor of the emulator it is.
+
+    `fpu`: floating point in hardware, where a user's flags can contract a product and a sum to one rounding.
+    `calls`: calls of a verification record; what a core without FPU does in hundreds of instructions, others do in one.
+    """
+
+    name: str
+    architecture: str  # "arm" (M profile, Thumb) or "riscv"
+    cpu: str  # unicorn's name of the processor
+    zig: tuple[str, ...]
+    gcc: str  # the command, Debian's name
+    gcc_flags: tuple[str, ...]
+    fpu: bool
+    calls: int
+    machine: Machine | None = None
+
+
+ARM_GCC, RISCV_GCC = "arm-none-eabi-gcc", "riscv64-unknown-elf-gcc"
+
+# Without "+vfp4d16sp" and the like zig's M4, M7 and M33 have no FPU and call the soft-float library, even under eabihf
+TARGETS = (
+    Target(
+        "cortex-m0plus", "arm", "UC_CPU_ARM_CORTEX_M0",
+        ("-target", "thumb-freestanding-eabi", "-mcpu=cortex_m0plus"),
+        ARM_GCC, ("-mthumb", "-mcpu=cortex-m0plus", "-mfloat-abi=soft"),
+        fpu=False, calls=3000, machine=Machine("microbit", 0x0000_0000, 0x2000_0000),
+    ),
+    Target(
+        "cortex-m4f", "arm", "UC_CPU_ARM_CORTEX_M4",
+        ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp"),
+        ARM_GCC, ("-mthumb", "-mcpu=cortex-m4", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
+        fpu=True, calls=10_000, machine=Machine("mps2-an386", 0x0000_0000, 0x2000_0000),
+    ),
+    Target(
+        "cortex-m7", "arm", "UC_CPU_ARM_CORTEX_M7",
+        ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m7+fp_armv8d16sp"),
+        ARM_GCC, ("-mthumb", "-mcpu=cortex-m7", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"),
+        fpu=True, calls=10_000, machine=Machine("mps2-an500", 0x0000_0000, 0x2000_0000),
+    ),
+    Target(
+        "cortex-m33", "arm", "UC_CPU_ARM_CORTEX_M33",
+        ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m33+fp_armv8d16sp"),
+        ARM_GCC, ("-mthumb", "-mcpu=cortex-m33", "-mfloat-abi=hard", "-mfpu=fpv5-sp-d16"),
+        fpu=True, calls=10_000, machine=Machine("mps2-an505", 0x1000_0000, 0x3800_0000),
+    ),
+    Target(
+        "rv32imac", "riscv", "UC_CPU_RISCV32_SIFIVE_E31",
+        ("-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m+a+c"),
+        RISCV_GCC, ("-march=rv32imac", "-mabi=ilp32"),
+        fpu=False, calls=3000,
+    ),
+    Target(
+        "rv32imafc", "riscv", "UC_CPU_RISCV32_ANY",
+        ("-target", "riscv32-freestanding-none", "-mcpu=generic_rv32+m+a+f+c"),
+        RISCV_GCC, ("-march=rv32imafc", "-mabi=ilp32f"),
+        fpu=True, calls=10_000,
+    ),
+)  # fmt: skip
+
+NAMES = (HOST, *(target.name for target in TARGETS))
+
+
+def find(name: str) -> Target:
+    """The target of that name. Raises ValueError for a name that is none."""
+    for target in TARGETS:
+        if target.name == name:
+            return target
+    raise ValueError(f"unknown target {name!r}; use {', '.join(NAMES)}")
