@@ -206,9 +206,10 @@ class Bench:
 
     def run(self, case: Case, image: emulator.Image, engine: str, x: Reals) -> emulator.Core:
         """A core after the steps `x`, whose answers have been compared with the bit reference."""
-        numbers = tables.build(model(case.n).cascade, case.arithmetic, engine)
+        numbers = model(case.n).tables(case.arithmetic, engine)
         calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.int64), x)
-        record = comparison.expected_record(numbers, case.operator == "inverse", calls)
+        real = comparison.REALS[case.arithmetic]
+        record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)
         outcome = comparison.compare(functools.partial(core.run, "bench", case.operator), [record])
         assert not outcome.different, f"{case}, {engine}: {outcome}"

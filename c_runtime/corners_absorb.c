@@ -16,31 +16,35 @@ static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool risin
     return rising ? x >= level : x <= level;
 }
 
-/* What plays k and up contribute when corner c holds play k. Always from the corner's own tail, so that
-   rounding does not pile up from sample to sample. */
-static hystgen_sum_t hystgen_held(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k)
+/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
+   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
+static hystgen_sum_t hystgen_base(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
 {
-    hystgen_sum_t block = (hystgen_sum_t)c->extremum * (t->slope[c->end] - t->slope[k]);
-    if (c->side > 0) {
-        block = block + (t->lift[c->end] - t->lift[k]);
-    } else if (c->side < 0) {
-        block = block - (t->lift[c->end] - t->lift[k]);
+    hystgen_sum_t y = c->output;
+    if (c->side == 0) {
+        y = rising ? y - t->lift[k] : y + t->lift[k];
+    } else if (rising && c->side > 0) {
+        y = y - (t->lift[k] + t->lift[k]);
+    } else if (!rising && c->side < 0) {
+        y = y + (t->lift[k] + t->lift[k]);
     }
-    return c->tail + block;
+    return y - (hystgen_sum_t)c->extremum * t->slope[k];
 }
 
-/* Brings tail, base and next up to date after k, depth or the direction have changed. */
+/* Brings base and next up to date after k, depth or the direction have changed. */
 static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
     if (m->depth > 0) {
         const hystgen_corner_t *c = &corner[m->depth - 1];
-        m->tail = hystgen_held(t, c, m->k);
+        m->base = hystgen_base(t, c, m->k, m->rising);
         m->next = hystgen_activation(c, t->threshold[m->k], m->rising);
-    } else { /* every play follows */
-        m->tail = 0;
-        m->next = m->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
+    } else if (m->rising) { /* every play follows */
+        m->base = -t->lift[m->k];
+        m->next = HYSTGEN_REACH_MAX;
+    } else {
+        m->base = t->lift[m->k];
+        m->next = -HYSTGEN_REACH_MAX;
     }
-    m->base = m->rising ? m->tail - t->lift[m->k] : m->tail + t->lift[m->k];
 }
 
 /* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
@@ -96,7 +100,7 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
     m->rising = true;
     if (t->n > 0) {
         corner[0].extremum = w;
-        corner[0].tail = 0;
+        corner[0].output = (hystgen_sum_t)w * t->slope[t->n + 1u];
         corner[0].end = (uint_least16_t)(t->n + 1);
         corner[0].side = 0;
         m->depth = 1;
@@ -108,6 +112,7 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
 HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                                        const hystgen_play_t *play)
 {
+    hystgen_sum_t above = 0;
     unsigned int j;
     m->w = play[0];
     m->k = 1;
@@ -115,12 +120,29 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
     m->rising = true;
     for (j = 0; j < t->n; ++j) {
         hystgen_corner_t *c = &corner[j];
-        c->extremum = play[t->n - j];
-        c->tail = j > 0 ? hystgen_held(t, c - 1, t->n - j + 1u) : 0;
-        c->end = (uint_least16_t)(t->n - j + 1u);
+        const unsigned int k = t->n - j;
+        c->extremum = play[k];
+        c->output = (hystgen_sum_t)play[k] * t->slope[k + 1] + above;
+        above = above + (hystgen_sum_t)play[k] * (t->slope[k + 1] - t->slope[k]);
+        c->end = (uint_least16_t)(k + 1);
         c->side = 0;
     }
     hystgen_corners_settle(t, m, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
+{
+    return m->base + (hystgen_sum_t)m->w * t->slope[m->k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void hystgen_push_corner(const hystgen_tables_t *t, const hystgen_memory_t *m, hystgen_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = hystgen_corners_output(t, m);
+    c->end = m->k;
+    c->side = m->rising ? -1 : 1;
 }
 
 /* Moves the input of the plays to w. */
@@ -129,11 +151,7 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
 {
     if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
         if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            hystgen_corner_t *c = &corner[m->depth];
-            c->extremum = m->w;
-            c->tail = m->tail;
-            c->end = m->k;
-            c->side = m->rising ? -1 : 1;
+            hystgen_push_corner(t, m, &corner[m->depth]);
             m->depth = (uint_least16_t)(m->depth + 1u);
         }
         m->rising = !m->rising;
@@ -144,10 +162,4 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
     if (hystgen_reached(w, m->next, m->rising)) {
         hystgen_corners_advance(t, m, corner);
     }
-}
-
-/* Output of the play sum for the memory as it is. */
-HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
-{
-    return m->base + (hystgen_sum_t)m->w * t->slope[m->k];
 }

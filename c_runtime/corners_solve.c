@@ -1,19 +1,20 @@
 #include "hystgen_runtime.h"
 
-/* Output at the moment play k, the last of a block that is passed whole, or any play inside corner c's block,
-   starts to follow. */
+/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
+   play's threshold z_k says (36). */
 static hystgen_real_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
 {
-    const hystgen_real_t w = hystgen_activation(c, t->threshold[k], rising);
-    const hystgen_real_t tail = hystgen_held(t, c, k + 1);
-    return (rising ? tail - t->lift[k + 1] : tail + t->lift[k + 1]) + w * t->slope[k + 1];
+    const hystgen_real_t z = t->start_level[k];
+    if (rising) {
+        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
+    }
+    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
 static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, const hystgen_corner_t *corner,
                                              unsigned int left, unsigned int k, bool rising, hystgen_real_t output)
 {
-    hystgen_real_t base = 0;
     unsigned int low = 0;
     unsigned int probe = left;
     while (low < left) {
@@ -43,10 +44,9 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, const hy
                 probe = k + stride - 1;
             }
         }
-        base = hystgen_held(t, c, k);
+        return (output - hystgen_base(t, c, k, rising)) * t->inverse_slope[k];
     }
-    base = rising ? base - t->lift[k] : base + t->lift[k];
-    return (output - base) * t->inverse_slope[k];
+    return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
@@ -63,11 +63,7 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, cons
         return hystgen_corners_locate(t, corner, depth, m->k, m->rising, output);
     }
     if (m->k > 1) {
-        hystgen_corner_t *c = &corner[depth];
-        c->extremum = m->w;
-        c->tail = m->tail;
-        c->end = m->k;
-        c->side = m->rising ? -1 : 1;
+        hystgen_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
     return hystgen_corners_locate(t, corner, depth, 1, !m->rising, output);

@@ -1,13 +1,14 @@
 #include "hystgen_runtime.h"
 
-/* Output at the moment play k, the last of a block that is passed whole, or any play inside corner c's block,
-   starts to follow; `w` is the input of the plays there. */
-static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising,
-                                   hystgen_reach_t *w)
+/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
+   play's threshold z_k says (36). */
+static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
 {
-    const hystgen_sum_t tail = hystgen_held(t, c, k + 1);
-    *w = hystgen_activation(c, t->threshold[k], rising);
-    return (rising ? tail - t->lift[k + 1] : tail + t->lift[k + 1]) + (hystgen_sum_t)*w * t->slope[k + 1];
+    const hystgen_sum_t z = t->start_level[k];
+    if (rising) {
+        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
+    }
+    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
 static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
@@ -25,13 +26,12 @@ static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, const h
     hystgen_sum_t here = hystgen_corners_output(t, m);
     unsigned int low = 0;
     unsigned int probe = left;
-    hystgen_reach_t start;
     hystgen_sum_t there;
     while (low < left) {
         const hystgen_corner_t *c = &corner[probe - 1];
-        there = hystgen_level(t, c, c->end - 1u, rising, &start);
+        there = hystgen_level(t, c, c->end - 1u, rising);
         if (hystgen_passed(output, there, rising)) {
-            w = start;
+            w = hystgen_activation(c, t->threshold[c->end - 1u], rising);
             here = there;
             left = probe - 1;
             k = c->end;
@@ -46,9 +46,9 @@ static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, const h
         unsigned int stride = 1;
         probe = k;
         while (k < high) {
-            there = hystgen_level(t, c, probe, rising, &start);
+            there = hystgen_level(t, c, probe, rising);
             if (hystgen_passed(output, there, rising)) {
-                w = start;
+                w = hystgen_activation(c, t->threshold[probe], rising);
                 here = there;
                 k = probe + 1;
                 stride = stride * 2;
@@ -84,11 +84,7 @@ HYSTGEN_API hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, con
         return w > m->next + 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->k, false, output);
     }
     if (m->k > 1) {
-        hystgen_corner_t *c = &corner[depth];
-        c->extremum = m->w;
-        c->tail = m->tail;
-        c->end = m->k;
-        c->side = m->rising ? -1 : 1;
+        hystgen_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
     return hystgen_corners_locate(t, m, corner, depth, 1, !m->rising, output);

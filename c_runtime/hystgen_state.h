@@ -5,7 +5,7 @@
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
-    hystgen_sum_t tail;       /* what the plays from `end` on contribute to the output */
+    hystgen_sum_t output;     /* output at that moment; for side 0, less what a move has changed since the start */
     hystgen_play_t extremum;  /* input of the plays at which the move that left this corner ended */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
@@ -14,7 +14,6 @@ typedef struct {
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
     hystgen_sum_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    hystgen_sum_t tail;    /* what plays k .. n contribute to the output */
     hystgen_reach_t next;  /* w at which play k starts to follow */
     hystgen_play_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;

@@ -8,6 +8,7 @@ typedef struct {
     const int32_t *weight;            /* p_0 .. p_n, parts of an output code per such step */
     const int32_t *slope;             /* slope[k] = p_0 + ... + p_(k-1) */
     const hystgen_sum_t *lift;        /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const hystgen_sum_t *start_level; /* output gained by the time play k starts to follow: z_0 .. z_n */
     const uint32_t *reciprocal;       /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
     hystgen_reach_t least, most;      /* no input of the plays is asked for beyond these */

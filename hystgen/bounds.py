@@ -2,7 +2,7 @@
 
 Forward: rounded thresholds, start memory and stage constants move a play by no more than their own error, because a
 play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
-roundoffs. In the corner list a tail is computed from the corner below, so that up to n such roundings add up.
+roundoffs. In the corner list an output is computed from that of the corner below, so that up to n such roundings add up.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
 residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into
@@ -77,7 +77,7 @@ def _one(cascade: Cascade, kind: str, engine: str) -> tuple[float, float]:
 
     size = total * w + lift  # nothing that is added up for an output is larger
     states = front + eps * (4 * w + 5 * pi.thresholds[-1])
-    sums = (pi.n + 3) if engine == "loop" else 6 * (pi.n + 1)
+    sums = (pi.n + 3) if engine == "loop" else 12 * (pi.n + 1)
     forward = total * states + eps * (sums * size + 2 * (size + offset))
     solving = eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
     underflow = (8 * pi.n + 16) * float(np.finfo(kind).smallest_subnormal) * (1 + total)

@@ -49,6 +49,7 @@ class FixedTables(NamedTuple):
     weight: Reals
     slope: Reals  # of sums per least step of the plays' input
     lift: Reals
+    start_level: Reals
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals
     start: Reals
@@ -158,7 +159,7 @@ def corners_solve(t: FixedTables, s: State, output: Any) -> Any:
             return w
         return corners_locate(t, s, depth, k, rising, output)
     if k > 1:
-        push_corner(s, depth)
+        push_corner(t, s, depth)
         depth = depth + 1
     return corners_locate(t, s, depth, 1, 1 - rising, output)
 
@@ -261,7 +262,7 @@ _OWN: list[Callable[..., Any]] = [
 _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
-    "activation", "reached", "held", "corners_settle", "corners_advance", "corners_rest", "corners_start",
+    "activation", "reached", "base", "corners_settle", "corners_advance", "corners_rest", "corners_start",
     "push_corner", "corners_absorb", "corners_output", "level", "loop_rest", "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip
 

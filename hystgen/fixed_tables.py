@@ -288,6 +288,7 @@ class _Builder:
             weight=whole(self.weight),
             slope=whole(self.slope),
             lift=whole(self.lift),
+            start_level=whole([t * k - q for t, k, q in zip(self.threshold, self.slope, self.lift, strict=False)]),
             reciprocal=whole(self.reciprocal),
             shift=whole(self.shift),
             start=whole(self.start if len(set(self.start)) > 1 else self.start[:1]),

@@ -27,7 +27,7 @@ START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO = 5, 6, 7, 8, 9
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
-W, BASE, TAIL, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+W, BASE, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN = 1, 2, 4, 8
@@ -42,6 +42,7 @@ class Tables(NamedTuple):
     weight: Reals  # n + 1
     slope: Reals  # n + 2
     lift: Reals  # n + 2
+    start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 where all start at the same value
     limits: Reals  # DRIVE_MIN .. ZERO
@@ -67,6 +68,8 @@ class PlayTables(Protocol):
     @property
     def lift(self) -> Reals: ...
     @property
+    def start_level(self) -> Reals: ...
+    @property
     def limits(self) -> Reals: ...
 
 
@@ -76,7 +79,7 @@ class State(NamedTuple):
     real: Reals
     counts: Counts
     extremum: Reals
-    tail: Reals
+    output: Reals
     end: Counts
     side: Counts
     play: Reals
@@ -87,10 +90,10 @@ def new_state(t: PlayTables) -> State:
     n = len(t.threshold) - 1
     dtype = t.threshold.dtype
     return State(
-        real=np.zeros(9, dtype),
+        real=np.zeros(8, dtype),
         counts=np.zeros(9, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
-        tail=np.zeros(max(n, 1), dtype),
+        output=np.zeros(max(n, 1), dtype),
         end=np.zeros(max(n, 1), np.int64),
         side=np.zeros(max(n, 1), np.int64),
         play=np.zeros(n + 1, dtype),
@@ -124,35 +127,33 @@ def reached(x: Any, level: Any, rising: int) -> bool:
     return bool(x <= level)
 
 
-def held(t: PlayTables, s: State, c: int, k: int) -> Any:
-    """What plays k and up contribute when corner c holds play k."""
-    end = s.end[c]
-    block = s.extremum[c] * (t.slope[end] - t.slope[k])
-    if s.side[c] > 0:
-        block = block + (t.lift[end] - t.lift[k])
-    elif s.side[c] < 0:
-        block = block - (t.lift[end] - t.lift[k])
-    return s.tail[c] + block
+def base(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
+    """Output less w times slope[k] while plays 0 .. k-1 follow and corner c holds play k."""
+    y = s.output[c]
+    side = s.side[c]
+    if side == 0:
+        y = y - t.lift[k] if rising else y + t.lift[k]
+    elif rising and side > 0:
+        y = y - (t.lift[k] + t.lift[k])
+    elif not rising and side < 0:
+        y = y + (t.lift[k] + t.lift[k])
+    return y - s.extremum[c] * t.slope[k]
 
 
 def corners_settle(t: PlayTables, s: State) -> None:
-    """Bring tail, base and next up to date after k, depth or the direction have changed."""
+    """Bring base and next up to date after k, depth or the direction have changed."""
     k = s.counts[K]
     rising = s.counts[RISING]
     depth = s.counts[DEPTH]
     if depth > 0:
-        s.real[TAIL] = held(t, s, depth - 1, k)
+        s.real[BASE] = base(t, s, depth - 1, k, rising)
         s.real[NEXT] = activation(s, depth - 1, t.threshold[k], rising)
+    elif rising:
+        s.real[BASE] = -t.lift[k]
+        s.real[NEXT] = t.limits[REAL_MAX]
     else:
-        s.real[TAIL] = t.limits[ZERO]
-        if rising:
-            s.real[NEXT] = t.limits[REAL_MAX]
-        else:
-            s.real[NEXT] = -t.limits[REAL_MAX]
-    if rising:
-        s.real[BASE] = s.real[TAIL] - t.lift[k]
-    else:
-        s.real[BASE] = s.real[TAIL] + t.lift[k]
+        s.real[BASE] = t.lift[k]
+        s.real[NEXT] = -t.limits[REAL_MAX]
 
 
 def corners_advance(t: PlayTables, s: State) -> None:
@@ -199,7 +200,7 @@ def corners_rest(t: PlayTables, s: State, w: Any) -> None:
     s.counts[RISING] = 1
     if n > 0:
         s.extremum[0] = w
-        s.tail[0] = t.limits[ZERO]
+        s.output[0] = w * t.slope[n + 1]
         s.end[0] = n + 1
         s.side[0] = 0
         s.counts[DEPTH] = 1
@@ -209,25 +210,29 @@ def corners_rest(t: PlayTables, s: State, w: Any) -> None:
 def corners_start(t: PlayTables, s: State, play: Reals) -> None:
     """Memory with a state of its own for each play: one corner a play."""
     n = len(t.threshold) - 1
+    above = t.limits[ZERO]
     s.real[W] = play[0]
     s.counts[K] = 1
     s.counts[DEPTH] = n
     s.counts[RISING] = 1
     for j in range(n):
         s.extremum[j] = play[n - j]
-        if j > 0:
-            s.tail[j] = held(t, s, j - 1, n - j + 1)
-        else:
-            s.tail[j] = t.limits[ZERO]
+        s.output[j] = play[n - j] * t.slope[n - j + 1] + above
+        above = above + play[n - j] * (t.slope[n - j + 1] - t.slope[n - j])
         s.end[j] = n - j + 1
         s.side[j] = 0
     corners_settle(t, s)
 
 
-def push_corner(s: State, c: int) -> None:
+def corners_output(t: PlayTables, s: State) -> Any:
+    """Output of the play sum for the memory as it is."""
+    return s.real[BASE] + s.real[W] * t.slope[s.counts[K]]
+
+
+def push_corner(t: PlayTables, s: State, c: int) -> None:
     """Write the corner that turning back leaves into slot c."""
     s.extremum[c] = s.real[W]
-    s.tail[c] = s.real[TAIL]
+    s.output[c] = corners_output(t, s)
     s.end[c] = s.counts[K]
     if s.counts[RISING]:
         s.side[c] = -1
@@ -240,7 +245,7 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     rising = s.counts[RISING]
     if (rising and w < s.real[W]) or (not rising and w > s.real[W]):
         if s.counts[K] > 1:
-            push_corner(s, s.counts[DEPTH])
+            push_corner(t, s, s.counts[DEPTH])
             s.counts[DEPTH] += 1
         s.counts[RISING] = 1 - rising
         s.counts[K] = 1
@@ -250,26 +255,24 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
         corners_advance(t, s)
 
 
-def corners_output(t: PlayTables, s: State) -> Any:
-    """Output of the play sum for the memory as it is."""
-    return s.real[BASE] + s.real[W] * t.slope[s.counts[K]]
-
-
 # ---------------------------------------------------------------- corners_solve.c
 
 
 def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
     """Output at the moment play k of corner c's block starts to follow."""
-    w = activation(s, c, t.threshold[k], rising)
-    tail = held(t, s, c, k + 1)
-    if rising:
-        return (tail - t.lift[k + 1]) + w * t.slope[k + 1]
-    return (tail + t.lift[k + 1]) + w * t.slope[k + 1]
+    y = s.output[c]
+    side = s.side[c]
+    if side == 0:
+        return y + t.start_level[k] if rising else y - t.start_level[k]
+    if rising and side > 0:
+        return y + (t.start_level[k] + t.start_level[k])
+    if not rising and side < 0:
+        return y - (t.start_level[k] + t.start_level[k])
+    return y
 
 
 def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: Any) -> Any:
     """Input that gives `output` when plays 0 .. k-1 follow and `left` corners hold the others."""
-    base = t.limits[ZERO]
     low = 0
     probe = left
     while low < left:
@@ -294,9 +297,10 @@ def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: 
             probe = (k + high) // 2
             if probe > k + stride - 1:
                 probe = k + stride - 1
-        base = held(t, s, c, k)
-    base = base - t.lift[k] if rising else base + t.lift[k]
-    return (output - base) * t.inverse_slope[k]
+        return (output - base(t, s, c, k, rising)) * t.inverse_slope[k]
+    if rising:
+        return (output + t.lift[k]) * t.inverse_slope[k]
+    return (output - t.lift[k]) * t.inverse_slope[k]
 
 
 def corners_solve(t: Tables, s: State, output: Any) -> Any:
@@ -310,7 +314,7 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
             return w
         return corners_locate(t, s, depth, k, rising, output)
     if k > 1:
-        push_corner(s, depth)
+        push_corner(t, s, depth)
         depth = depth + 1
     return corners_locate(t, s, depth, 1, 1 - rising, output)
 
@@ -654,8 +658,8 @@ def run(t: Tables, s: State, inverse: int, op: Counts, x: Reals, answers: Reals,
 
 
 COMPILED: list[Callable[..., Any]] = [
-    activation, reached, held, corners_settle, corners_advance, corners_rest, corners_start, push_corner,
-    corners_absorb, corners_output, level, corners_locate, corners_solve, loop_rest, loop_start, loop_absorb,
+    activation, reached, base, corners_settle, corners_advance, corners_rest, corners_start, corners_output,
+    push_corner, corners_absorb, level, corners_locate, corners_solve, loop_rest, loop_start, loop_absorb,
     loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse, rest,
     absorb, output, solve, begin, init, see_drive, finite, forward_step, answer, clamp_drive, fits, choose_branch,
     inverse_step, inverse_commit, reset, run,
@@ -663,6 +667,6 @@ COMPILED: list[Callable[..., Any]] = [
 
 # What every sample goes through
 INLINED: set[Callable[..., Any]] = {
-    reached, corners_absorb, push_corner, corners_output, corners_solve, absorb, output, solve, see_drive, finite,
+    reached, corners_output, push_corner, corners_absorb, corners_solve, absorb, output, solve, see_drive, finite,
     forward_step, answer, clamp_drive,
 }  # fmt: skip

@@ -5,8 +5,10 @@ Everything a compiled operator knows comes from here, once, for the bit referenc
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -112,6 +114,12 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     products = [p * r for p, r in zip(pi.weights, pi.thresholds, strict=True)]
     slope = [math.fsum(pi.weights[:k]) for k in range(n + 2)]
     lift = [math.fsum(products[:k]) for k in range(n + 2)]
+    # the thresholds z of the inverse (36): output gained by the time play k starts to follow
+    exact = [Fraction(0), *itertools.accumulate(map(Fraction, pi.weights))]
+    rises = [Fraction(b) - Fraction(a) for a, b in itertools.pairwise(pi.thresholds)]
+    start_level = [
+        float(z) for z in itertools.accumulate((c * r for c, r in zip(exact[1:], rises, strict=False)), initial=0)
+    ]
     bounded = clamp and all(math.isfinite(end) for end in cascade.input_range)
 
     everywhere = not bounded and not inverse
@@ -154,6 +162,7 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         weight=reals(pi.weights, "weights"),
         slope=reals(slope, "sums of weights"),
         lift=reals(lift, "sums of weight times threshold"),
+        start_level=reals(start_level, "outputs at which plays start to follow"),
         inverse_slope=reals([1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights"),
         start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states"),
         limits=np.array(limits, dtype=dtype),

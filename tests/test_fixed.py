@@ -115,8 +115,8 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     whole = tables._replace(
         **{
             field: getattr(tables, field).astype(object)
-            for field in ("threshold", "weight", "slope", "lift", "reciprocal", "shift", "start", "limits", "knot",
-                          "coefficient", "scale", "domain", "edge", "argument", "below")
+            for field in ("threshold", "weight", "slope", "lift", "start_level", "reciprocal", "shift", "start",
+                          "limits", "knot", "coefficient", "scale", "domain", "edge", "argument", "below")
         }
     )  # fmt: skip
     for inverse in (0, 1):
@@ -125,7 +125,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
         for code in records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7].tolist():
             (plain.inverse_step if inverse else plain.forward_step)(whole, state, code)
-            sums = [abs(state.real[reference.BASE]), abs(state.real[reference.TAIL]), *map(abs, state.tail)]
+            sums = [abs(state.real[reference.BASE]), *map(abs, state.output)]
             assert max(sums) <= form.largest_sum
             assert abs(state.real[reference.W]) < 2**31
             assert abs(plain.corners_output(whole, state)) <= form.largest_sum

@@ -17,10 +17,10 @@ RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
 DRIVER = """
 #include "hystgen_runtime.h"
 void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_t *slope, const hystgen_real_t *lift,
-           const hystgen_real_t *inverse, unsigned short n, int loop, int invert,
+           const hystgen_real_t *start_level, const hystgen_real_t *inverse, unsigned short n, int loop, int invert,
            const hystgen_real_t *x, hystgen_real_t *y, int count);
 void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_t *slope, const hystgen_real_t *lift,
-           const hystgen_real_t *inverse, unsigned short n, int loop, int invert,
+           const hystgen_real_t *start_level, const hystgen_real_t *inverse, unsigned short n, int loop, int invert,
            const hystgen_real_t *x, hystgen_real_t *y, int count)
 {
     hystgen_tables_t t;
@@ -28,7 +28,7 @@ void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_
     hystgen_corner_t corner[64];
     hystgen_real_t play[65];
     int i;
-    t.threshold = r; t.weight = p; t.slope = slope; t.lift = lift; t.inverse_slope = inverse; t.n = n;
+    t.threshold = r; t.weight = p; t.slope = slope; t.lift = lift; t.start_level = start_level; t.inverse_slope = inverse; t.n = n;
     hystgen_corners_rest(&t, &m, corner, 0);
     hystgen_loop_rest(&t, play, 0);
     for (i = 0; i < count; ++i) {
@@ -78,8 +78,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> tuple[cffi.FFI, object]
     )  # fmt: skip
     ffi = cffi.FFI()
     ffi.cdef(
-        "void drive(const double *, const double *, const double *, const double *, const double *, unsigned short,"
-        "int, int, const double *, double *, int);"
+        "void drive(const double *, const double *, const double *, const double *, const double *, const double *,"
+        "unsigned short, int, int, const double *, double *, int);"
     )
     return ffi, ffi.dlopen(str(folder / "driver.so"))
 
@@ -102,6 +102,7 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
     p = rng.uniform(0.05, 1, n + 1)
     slope = np.concatenate([[0], np.cumsum(p)])
     lift = np.concatenate([[0], np.cumsum(p * r)])
+    z = r * slope[:-1] - lift[:-1]
     inverse = np.concatenate([[0], 1 / slope[1:]])
     walk = np.cumsum(rng.normal(0, 0.3, 3000))
     turns = np.interp(np.linspace(0, 300, 3000), np.arange(301), rng.uniform(-1, 1, 301)) * (r[-1] + 1)
@@ -109,7 +110,7 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
 
     def run(loop: int, invert: int, x: np.ndarray) -> np.ndarray:
         y = np.empty_like(x)
-        arrays = [ffi.cast("double *", a.ctypes.data) for a in (r, p, slope, lift, inverse)]
+        arrays = [ffi.cast("double *", a.ctypes.data) for a in (r, p, slope, lift, z, inverse)]
         signals = [ffi.cast("double *", a.ctypes.data) for a in (x, y)]
         lib.drive(*arrays, n, loop, invert, *signals, len(x))
         return y

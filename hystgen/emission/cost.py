@@ -33,7 +33,7 @@ def _struct(*fields: int) -> int:
 
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
-_STRUCTS = {"tables_t": 24, "dead_zone_t": 28, "curve_t": 16}  # of pointers and counts
+_STRUCTS = {"tables_t": 28, "dead_zone_t": 28, "curve_t": 16}  # of pointers and counts
 
 
 def _constants(text: str, real: int, fixed: bool) -> int:
@@ -46,7 +46,7 @@ def _constants(text: str, real: int, fixed: bool) -> int:
         elif kind.endswith("back_t"):
             own = 16 + 8 + 2 * real + 16 + 8
         elif kind.endswith("tables_t") and fixed:
-            own = 28 + 2 * real
+            own = 32 + 2 * real
         elif own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
@@ -67,7 +67,7 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         if not getattr(options, op):
             continue
         if corners:
-            memory = [_struct(sums, sums, reach, play, 2, 2, 1), max(n, 1) * _struct(sums, play, 2, 1)]
+            memory = [_struct(sums, reach, play, 2, 2, 1), max(n, 1) * _struct(sums, play, 2, 1)]
         else:
             memory = [(n + 1) * play]
         if op == "forward":

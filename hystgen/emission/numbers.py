@@ -75,6 +75,7 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
             ("weight", "weight", real_t, not corners),
             ("slope", "slope", real_t, corners),
             ("lift", "lift", real_t, corners or options.inverse),
+            ("start_level", "start_level", real_t, corners and options.inverse),
             ("inverse_slope", "reciprocal", real_t, options.inverse),
         ],
     )
@@ -147,6 +148,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
             ("weight", "weight", "int32_t", not corners),
             ("slope", "slope", "int32_t", corners or options.inverse),
             ("lift", "lift", f"{prefix}_sum_t", corners),
+            ("start_level", "start_level", f"{prefix}_sum_t", corners and options.inverse),
             ("reciprocal", "reciprocal", "uint32_t", options.inverse),
             ("shift", "shift", "uint8_t", options.inverse),
         ],

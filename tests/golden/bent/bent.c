@@ -26,6 +26,7 @@ typedef struct {
     const bent_real_t *weight;         /* p_0 .. p_n */
     const bent_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
     const bent_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const bent_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
     const bent_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
     uint_least16_t n;                     /* plays without r_0 */
 } bent_tables_t;
@@ -152,9 +153,9 @@ static const bent_real_t bent_reciprocal[8] = {
     0.3968253968253968, 0.3949447077409163
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights; plays without r_0 */
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; plays without r_0 */
 static const bent_tables_t bent_tables = {
-    bent_threshold, bent_weight, NULL, bent_lift, bent_reciprocal, 6
+    bent_threshold, bent_weight, NULL, bent_lift, NULL, bent_reciprocal, 6
 };
 
 /* the straight pieces of the dead-zone sum */

@@ -18,6 +18,7 @@ typedef struct {
     const int32_t *weight;            /* p_0 .. p_n, parts of an output code per such step */
     const int32_t *slope;             /* slope[k] = p_0 + ... + p_(k-1) */
     const curved_sum_t *lift;        /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const curved_sum_t *start_level; /* output gained by the time play k starts to follow: z_0 .. z_n */
     const uint32_t *reciprocal;       /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
     curved_reach_t least, most;      /* no input of the plays is asked for beyond these */
@@ -78,31 +79,35 @@ static bool curved_reached(curved_reach_t x, curved_reach_t level, bool rising)
     return rising ? x >= level : x <= level;
 }
 
-/* What plays k and up contribute when corner c holds play k. Always from the corner's own tail, so that
-   rounding does not pile up from sample to sample. */
-static curved_sum_t curved_held(const curved_tables_t *t, const curved_corner_t *c, unsigned int k)
+/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
+   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
+static curved_sum_t curved_base(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising)
 {
-    curved_sum_t block = (curved_sum_t)c->extremum * (t->slope[c->end] - t->slope[k]);
-    if (c->side > 0) {
-        block = block + (t->lift[c->end] - t->lift[k]);
-    } else if (c->side < 0) {
-        block = block - (t->lift[c->end] - t->lift[k]);
+    curved_sum_t y = c->output;
+    if (c->side == 0) {
+        y = rising ? y - t->lift[k] : y + t->lift[k];
+    } else if (rising && c->side > 0) {
+        y = y - (t->lift[k] + t->lift[k]);
+    } else if (!rising && c->side < 0) {
+        y = y + (t->lift[k] + t->lift[k]);
     }
-    return c->tail + block;
+    return y - (curved_sum_t)c->extremum * t->slope[k];
 }
 
-/* Brings tail, base and next up to date after k, depth or the direction have changed. */
+/* Brings base and next up to date after k, depth or the direction have changed. */
 static void curved_corners_settle(const curved_tables_t *t, curved_memory_t *m, const curved_corner_t *corner)
 {
     if (m->depth > 0) {
         const curved_corner_t *c = &corner[m->depth - 1];
-        m->tail = curved_held(t, c, m->k);
+        m->base = curved_base(t, c, m->k, m->rising);
         m->next = curved_activation(c, t->threshold[m->k], m->rising);
-    } else { /* every play follows */
-        m->tail = 0;
-        m->next = m->rising ? INT32_MAX : -INT32_MAX;
+    } else if (m->rising) { /* every play follows */
+        m->base = -t->lift[m->k];
+        m->next = INT32_MAX;
+    } else {
+        m->base = t->lift[m->k];
+        m->next = -INT32_MAX;
     }
-    m->base = m->rising ? m->tail - t->lift[m->k] : m->tail + t->lift[m->k];
 }
 
 /* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
@@ -158,12 +163,27 @@ static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, cu
     m->rising = true;
     if (t->n > 0) {
         corner[0].extremum = w;
-        corner[0].tail = 0;
+        corner[0].output = (curved_sum_t)w * t->slope[t->n + 1u];
         corner[0].end = (uint_least16_t)(t->n + 1);
         corner[0].side = 0;
         m->depth = 1;
     }
     curved_corners_settle(t, m, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved_memory_t *m)
+{
+    return m->base + (curved_sum_t)m->w * t->slope[m->k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void curved_push_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = curved_corners_output(t, m);
+    c->end = m->k;
+    c->side = m->rising ? -1 : 1;
 }
 
 /* Moves the input of the plays to w. */
@@ -172,11 +192,7 @@ static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, 
 {
     if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
         if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            curved_corner_t *c = &corner[m->depth];
-            c->extremum = m->w;
-            c->tail = m->tail;
-            c->end = m->k;
-            c->side = m->rising ? -1 : 1;
+            curved_push_corner(t, m, &corner[m->depth]);
             m->depth = (uint_least16_t)(m->depth + 1u);
         }
         m->rising = !m->rising;
@@ -189,20 +205,15 @@ static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, 
     }
 }
 
-/* Output of the play sum for the memory as it is. */
-static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved_memory_t *m)
+/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
+   play's threshold z_k says (36). */
+static curved_sum_t curved_level(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising)
 {
-    return m->base + (curved_sum_t)m->w * t->slope[m->k];
-}
-
-/* Output at the moment play k, the last of a block that is passed whole, or any play inside corner c's block,
-   starts to follow; `w` is the input of the plays there. */
-static curved_sum_t curved_level(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising,
-                                   curved_reach_t *w)
-{
-    const curved_sum_t tail = curved_held(t, c, k + 1);
-    *w = curved_activation(c, t->threshold[k], rising);
-    return (rising ? tail - t->lift[k + 1] : tail + t->lift[k + 1]) + (curved_sum_t)*w * t->slope[k + 1];
+    const curved_sum_t z = t->start_level[k];
+    if (rising) {
+        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
+    }
+    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
 static bool curved_passed(curved_sum_t output, curved_sum_t level, bool rising)
@@ -220,13 +231,12 @@ static curved_reach_t curved_corners_locate(const curved_tables_t *t, const curv
     curved_sum_t here = curved_corners_output(t, m);
     unsigned int low = 0;
     unsigned int probe = left;
-    curved_reach_t start;
     curved_sum_t there;
     while (low < left) {
         const curved_corner_t *c = &corner[probe - 1];
-        there = curved_level(t, c, c->end - 1u, rising, &start);
+        there = curved_level(t, c, c->end - 1u, rising);
         if (curved_passed(output, there, rising)) {
-            w = start;
+            w = curved_activation(c, t->threshold[c->end - 1u], rising);
             here = there;
             left = probe - 1;
             k = c->end;
@@ -241,9 +251,9 @@ static curved_reach_t curved_corners_locate(const curved_tables_t *t, const curv
         unsigned int stride = 1;
         probe = k;
         while (k < high) {
-            there = curved_level(t, c, probe, rising, &start);
+            there = curved_level(t, c, probe, rising);
             if (curved_passed(output, there, rising)) {
-                w = start;
+                w = curved_activation(c, t->threshold[probe], rising);
                 here = there;
                 k = probe + 1;
                 stride = stride * 2;
@@ -279,11 +289,7 @@ static curved_reach_t curved_corners_solve(const curved_tables_t *t, const curve
         return w > m->next + 4 ? w : curved_corners_locate(t, m, corner, depth, m->k, false, output);
     }
     if (m->k > 1) {
-        curved_corner_t *c = &corner[depth];
-        c->extremum = m->w;
-        c->tail = m->tail;
-        c->end = m->k;
-        c->side = m->rising ? -1 : 1;
+        curved_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
     return curved_corners_locate(t, m, corner, depth, 1, !m->rising, output);
@@ -353,6 +359,11 @@ static const curved_sum_t curved_lift[8] = {
     86610185158410472
 };
 
+static const curved_sum_t curved_start_level[7] = {
+    0, 14597222287639957, 41358796476613380, 77851851002392984, 121643517865312855, 170300925500845708,
+    221391203522685052
+};
+
 static const uint32_t curved_reciprocal[8] = {
     0u, 1192592096u, 1301009559u, 1908147352u, 1590122794u, 1431110514u, 1362962395u, 1356502857u
 };
@@ -361,10 +372,10 @@ static const uint8_t curved_shift[8] = {
     1, 27, 28, 29, 29, 29, 29, 29
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights and their shifts; ends of
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights and their shifts; ends of
    the input of the plays; plays without r_0 */
 static const curved_tables_t curved_tables = {
-    curved_threshold, NULL, curved_slope, curved_lift, curved_reciprocal, curved_shift, -389231414, 428259574, 6
+    curved_threshold, NULL, curved_slope, curved_lift, curved_start_level, curved_reciprocal, curved_shift, -389231414, 428259574, 6
 };
 
 static const int32_t curved_front_curve_knot[42] = {

@@ -15,8 +15,8 @@
  *     inputs of plays between -351039069 and 390067229, 44 fraction bits of an output code
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   2078 bytes
- *     inverse instance  152 bytes of RAM
+ *     constant tables   2138 bytes
+ *     inverse instance  144 bytes of RAM
  *     inverse step, worst case: 76 multiplications of 32 by 32 bits, 49 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -59,7 +59,7 @@ typedef int64_t curved_sum_t;
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
-    curved_sum_t tail;       /* what the plays from `end` on contribute to the output */
+    curved_sum_t output;     /* output at that moment; for side 0, less what a move has changed since the start */
     curved_play_t extremum;  /* input of the plays at which the move that left this corner ended */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
@@ -68,7 +68,6 @@ typedef struct {
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
     curved_sum_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    curved_sum_t tail;    /* what plays k .. n contribute to the output */
     curved_reach_t next;  /* w at which play k starts to follow */
     curved_play_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;

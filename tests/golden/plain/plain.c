@@ -26,6 +26,7 @@ typedef struct {
     const plain_real_t *weight;         /* p_0 .. p_n */
     const plain_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
     const plain_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const plain_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
     const plain_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
     uint_least16_t n;                     /* plays without r_0 */
 } plain_tables_t;
@@ -46,31 +47,35 @@ static bool plain_reached(plain_real_t x, plain_real_t level, bool rising)
     return rising ? x >= level : x <= level;
 }
 
-/* What plays k and up contribute when corner c holds play k. Always from the corner's own tail, so that
-   rounding does not pile up from sample to sample. */
-static plain_real_t plain_held(const plain_tables_t *t, const plain_corner_t *c, unsigned int k)
+/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
+   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
+static plain_real_t plain_base(const plain_tables_t *t, const plain_corner_t *c, unsigned int k, bool rising)
 {
-    plain_real_t block = c->extremum * (t->slope[c->end] - t->slope[k]);
-    if (c->side > 0) {
-        block = block + (t->lift[c->end] - t->lift[k]);
-    } else if (c->side < 0) {
-        block = block - (t->lift[c->end] - t->lift[k]);
+    plain_real_t y = c->output;
+    if (c->side == 0) {
+        y = rising ? y - t->lift[k] : y + t->lift[k];
+    } else if (rising && c->side > 0) {
+        y = y - (t->lift[k] + t->lift[k]);
+    } else if (!rising && c->side < 0) {
+        y = y + (t->lift[k] + t->lift[k]);
     }
-    return c->tail + block;
+    return y - c->extremum * t->slope[k];
 }
 
-/* Brings tail, base and next up to date after k, depth or the direction have changed. */
+/* Brings base and next up to date after k, depth or the direction have changed. */
 static void plain_corners_settle(const plain_tables_t *t, plain_memory_t *m, const plain_corner_t *corner)
 {
     if (m->depth > 0) {
         const plain_corner_t *c = &corner[m->depth - 1];
-        m->tail = plain_held(t, c, m->k);
+        m->base = plain_base(t, c, m->k, m->rising);
         m->next = plain_activation(c, t->threshold[m->k], m->rising);
-    } else { /* every play follows */
-        m->tail = 0;
-        m->next = m->rising ? FLT_MAX : -FLT_MAX;
+    } else if (m->rising) { /* every play follows */
+        m->base = -t->lift[m->k];
+        m->next = FLT_MAX;
+    } else {
+        m->base = t->lift[m->k];
+        m->next = -FLT_MAX;
     }
-    m->base = m->rising ? m->tail - t->lift[m->k] : m->tail + t->lift[m->k];
 }
 
 /* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
@@ -126,12 +131,27 @@ static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain
     m->rising = true;
     if (t->n > 0) {
         corner[0].extremum = w;
-        corner[0].tail = 0;
+        corner[0].output = w * t->slope[t->n + 1u];
         corner[0].end = (uint_least16_t)(t->n + 1);
         corner[0].side = 0;
         m->depth = 1;
     }
     plain_corners_settle(t, m, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+static plain_real_t plain_corners_output(const plain_tables_t *t, const plain_memory_t *m)
+{
+    return m->base + m->w * t->slope[m->k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void plain_push_corner(const plain_tables_t *t, const plain_memory_t *m, plain_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = plain_corners_output(t, m);
+    c->end = m->k;
+    c->side = m->rising ? -1 : 1;
 }
 
 /* Moves the input of the plays to w. */
@@ -140,11 +160,7 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
 {
     if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
         if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            plain_corner_t *c = &corner[m->depth];
-            c->extremum = m->w;
-            c->tail = m->tail;
-            c->end = m->k;
-            c->side = m->rising ? -1 : 1;
+            plain_push_corner(t, m, &corner[m->depth]);
             m->depth = (uint_least16_t)(m->depth + 1u);
         }
         m->rising = !m->rising;
@@ -157,20 +173,21 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
     }
 }
 
-/* Output at the moment play k, the last of a block that is passed whole, or any play inside corner c's block,
-   starts to follow. */
+/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
+   play's threshold z_k says (36). */
 static plain_real_t plain_level(const plain_tables_t *t, const plain_corner_t *c, unsigned int k, bool rising)
 {
-    const plain_real_t w = plain_activation(c, t->threshold[k], rising);
-    const plain_real_t tail = plain_held(t, c, k + 1);
-    return (rising ? tail - t->lift[k + 1] : tail + t->lift[k + 1]) + w * t->slope[k + 1];
+    const plain_real_t z = t->start_level[k];
+    if (rising) {
+        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
+    }
+    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
 static plain_real_t plain_corners_locate(const plain_tables_t *t, const plain_corner_t *corner,
                                              unsigned int left, unsigned int k, bool rising, plain_real_t output)
 {
-    plain_real_t base = 0;
     unsigned int low = 0;
     unsigned int probe = left;
     while (low < left) {
@@ -200,10 +217,9 @@ static plain_real_t plain_corners_locate(const plain_tables_t *t, const plain_co
                 probe = k + stride - 1;
             }
         }
-        base = plain_held(t, c, k);
+        return (output - plain_base(t, c, k, rising)) * t->inverse_slope[k];
     }
-    base = rising ? base - t->lift[k] : base + t->lift[k];
-    return (output - base) * t->inverse_slope[k];
+    return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
@@ -220,11 +236,7 @@ static plain_real_t plain_corners_solve(const plain_tables_t *t, const plain_mem
         return plain_corners_locate(t, corner, depth, m->k, m->rising, output);
     }
     if (m->k > 1) {
-        plain_corner_t *c = &corner[depth];
-        c->extremum = m->w;
-        c->tail = m->tail;
-        c->end = m->k;
-        c->side = m->rising ? -1 : 1;
+        plain_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
     return plain_corners_locate(t, corner, depth, 1, !m->rising, output);
@@ -242,13 +254,17 @@ static const plain_real_t plain_lift[8] = {
     0.0f, 0.0f, 0.27f, 0.702f, 1.188f, 1.62f, 1.89f, 1.9224f
 };
 
+static const plain_real_t plain_start_level[7] = {
+    0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
+};
+
 static const plain_real_t plain_reciprocal[8] = {
     0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights; plays without r_0 */
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; plays without r_0 */
 static const plain_tables_t plain_tables = {
-    plain_threshold, NULL, plain_slope, plain_lift, plain_reciprocal, 6
+    plain_threshold, NULL, plain_slope, plain_lift, plain_start_level, plain_reciprocal, 6
 };
 
 static bool plain_finite(plain_real_t x)

@@ -9,8 +9,8 @@
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   148 bytes
- *     inverse instance  124 bytes of RAM
+ *     constant tables   180 bytes
+ *     inverse instance  120 bytes of RAM
  *     inverse step, worst case: 33 multiplications, 33 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -46,7 +46,7 @@ typedef float plain_real_t;
 #define PLAIN_DRIVE_MAX 4.0f
 #define PLAIN_OUTPUT_MIN (-8.2056f) /* output, um, over every drive history in range */
 #define PLAIN_OUTPUT_MAX 8.2056f
-#define PLAIN_INVERSE_MAX_ERROR 0.0001037838f /* against the double model, drive, V */
+#define PLAIN_INVERSE_MAX_ERROR 0.00017638535f /* against the double model, drive, V */
 
 /* Sticky bits of the status functions */
 #define PLAIN_STATUS_INPUT_CLAMPED 1u /* the input was out of range and was limited */
@@ -59,7 +59,7 @@ typedef float plain_real_t;
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
-    plain_real_t tail;       /* what the plays from `end` on contribute to the output */
+    plain_real_t output;     /* output at that moment; for side 0, less what a move has changed since the start */
     plain_real_t extremum;  /* input of the plays at which the move that left this corner ended */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
@@ -68,7 +68,6 @@ typedef struct {
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
     plain_real_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    plain_real_t tail;    /* what plays k .. n contribute to the output */
     plain_real_t next;  /* w at which play k starts to follow */
     plain_real_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;

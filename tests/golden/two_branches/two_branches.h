@@ -9,8 +9,8 @@
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout single-header
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   360 bytes
- *     inverse instance  128 bytes of RAM
+ *     constant tables   392 bytes
+ *     inverse instance  124 bytes of RAM
  *     inverse step, worst case: 39 multiplications, 51 comparisons, 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -47,8 +47,8 @@ typedef float two_branches_real_t;
 #define TWO_BRANCHES_DRIVE_MAX 4.0f
 #define TWO_BRANCHES_OUTPUT_MIN (-11.322212f) /* output, um, over every drive history in range */
 #define TWO_BRANCHES_OUTPUT_MAX 13.554334f
-#define TWO_BRANCHES_INVERSE_MAX_ERROR 7.912489f /* against the double model, drive, V */
-#define TWO_BRANCHES_INVERSE_ROUNDING_ERROR 0.00062483986f /* the same while both take the same branch */
+#define TWO_BRANCHES_INVERSE_MAX_ERROR 7.9128385f /* against the double model, drive, V */
+#define TWO_BRANCHES_INVERSE_ROUNDING_ERROR 0.00097423466f /* the same while both take the same branch */
 
 /* Sticky bits of the status functions */
 #define TWO_BRANCHES_STATUS_INPUT_CLAMPED 1u /* the input was out of range and was limited */
@@ -61,7 +61,7 @@ typedef float two_branches_real_t;
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
-    two_branches_real_t tail;       /* what the plays from `end` on contribute to the output */
+    two_branches_real_t output;     /* output at that moment; for side 0, less what a move has changed since the start */
     two_branches_real_t extremum;  /* input of the plays at which the move that left this corner ended */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
@@ -70,7 +70,6 @@ typedef struct {
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
     two_branches_real_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    two_branches_real_t tail;    /* what plays k .. n contribute to the output */
     two_branches_real_t next;  /* w at which play k starts to follow */
     two_branches_real_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;
@@ -133,6 +132,7 @@ typedef struct {
     const two_branches_real_t *weight;         /* p_0 .. p_n */
     const two_branches_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
     const two_branches_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const two_branches_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
     const two_branches_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
     uint_least16_t n;                     /* plays without r_0 */
 } two_branches_tables_t;
@@ -307,31 +307,35 @@ static bool two_branches_reached(two_branches_real_t x, two_branches_real_t leve
     return rising ? x >= level : x <= level;
 }
 
-/* What plays k and up contribute when corner c holds play k. Always from the corner's own tail, so that
-   rounding does not pile up from sample to sample. */
-static two_branches_real_t two_branches_held(const two_branches_tables_t *t, const two_branches_corner_t *c, unsigned int k)
+/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
+   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
+static two_branches_real_t two_branches_base(const two_branches_tables_t *t, const two_branches_corner_t *c, unsigned int k, bool rising)
 {
-    two_branches_real_t block = c->extremum * (t->slope[c->end] - t->slope[k]);
-    if (c->side > 0) {
-        block = block + (t->lift[c->end] - t->lift[k]);
-    } else if (c->side < 0) {
-        block = block - (t->lift[c->end] - t->lift[k]);
+    two_branches_real_t y = c->output;
+    if (c->side == 0) {
+        y = rising ? y - t->lift[k] : y + t->lift[k];
+    } else if (rising && c->side > 0) {
+        y = y - (t->lift[k] + t->lift[k]);
+    } else if (!rising && c->side < 0) {
+        y = y + (t->lift[k] + t->lift[k]);
     }
-    return c->tail + block;
+    return y - c->extremum * t->slope[k];
 }
 
-/* Brings tail, base and next up to date after k, depth or the direction have changed. */
+/* Brings base and next up to date after k, depth or the direction have changed. */
 static void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_memory_t *m, const two_branches_corner_t *corner)
 {
     if (m->depth > 0) {
         const two_branches_corner_t *c = &corner[m->depth - 1];
-        m->tail = two_branches_held(t, c, m->k);
+        m->base = two_branches_base(t, c, m->k, m->rising);
         m->next = two_branches_activation(c, t->threshold[m->k], m->rising);
-    } else { /* every play follows */
-        m->tail = 0;
-        m->next = m->rising ? FLT_MAX : -FLT_MAX;
+    } else if (m->rising) { /* every play follows */
+        m->base = -t->lift[m->k];
+        m->next = FLT_MAX;
+    } else {
+        m->base = t->lift[m->k];
+        m->next = -FLT_MAX;
     }
-    m->base = m->rising ? m->tail - t->lift[m->k] : m->tail + t->lift[m->k];
 }
 
 /* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
@@ -387,12 +391,27 @@ static void two_branches_corners_rest(const two_branches_tables_t *t, two_branch
     m->rising = true;
     if (t->n > 0) {
         corner[0].extremum = w;
-        corner[0].tail = 0;
+        corner[0].output = w * t->slope[t->n + 1u];
         corner[0].end = (uint_least16_t)(t->n + 1);
         corner[0].side = 0;
         m->depth = 1;
     }
     two_branches_corners_settle(t, m, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+static two_branches_real_t two_branches_corners_output(const two_branches_tables_t *t, const two_branches_memory_t *m)
+{
+    return m->base + m->w * t->slope[m->k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void two_branches_push_corner(const two_branches_tables_t *t, const two_branches_memory_t *m, two_branches_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = two_branches_corners_output(t, m);
+    c->end = m->k;
+    c->side = m->rising ? -1 : 1;
 }
 
 /* Moves the input of the plays to w. */
@@ -401,11 +420,7 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
 {
     if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
         if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            two_branches_corner_t *c = &corner[m->depth];
-            c->extremum = m->w;
-            c->tail = m->tail;
-            c->end = m->k;
-            c->side = m->rising ? -1 : 1;
+            two_branches_push_corner(t, m, &corner[m->depth]);
             m->depth = (uint_least16_t)(m->depth + 1u);
         }
         m->rising = !m->rising;
@@ -418,26 +433,21 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
     }
 }
 
-/* Output of the play sum for the memory as it is. */
-static two_branches_real_t two_branches_corners_output(const two_branches_tables_t *t, const two_branches_memory_t *m)
-{
-    return m->base + m->w * t->slope[m->k];
-}
-
-/* Output at the moment play k, the last of a block that is passed whole, or any play inside corner c's block,
-   starts to follow. */
+/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
+   play's threshold z_k says (36). */
 static two_branches_real_t two_branches_level(const two_branches_tables_t *t, const two_branches_corner_t *c, unsigned int k, bool rising)
 {
-    const two_branches_real_t w = two_branches_activation(c, t->threshold[k], rising);
-    const two_branches_real_t tail = two_branches_held(t, c, k + 1);
-    return (rising ? tail - t->lift[k + 1] : tail + t->lift[k + 1]) + w * t->slope[k + 1];
+    const two_branches_real_t z = t->start_level[k];
+    if (rising) {
+        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
+    }
+    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
 static two_branches_real_t two_branches_corners_locate(const two_branches_tables_t *t, const two_branches_corner_t *corner,
                                              unsigned int left, unsigned int k, bool rising, two_branches_real_t output)
 {
-    two_branches_real_t base = 0;
     unsigned int low = 0;
     unsigned int probe = left;
     while (low < left) {
@@ -467,10 +477,9 @@ static two_branches_real_t two_branches_corners_locate(const two_branches_tables
                 probe = k + stride - 1;
             }
         }
-        base = two_branches_held(t, c, k);
+        return (output - two_branches_base(t, c, k, rising)) * t->inverse_slope[k];
     }
-    base = rising ? base - t->lift[k] : base + t->lift[k];
-    return (output - base) * t->inverse_slope[k];
+    return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
@@ -487,11 +496,7 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
         return two_branches_corners_locate(t, corner, depth, m->k, m->rising, output);
     }
     if (m->k > 1) {
-        two_branches_corner_t *c = &corner[depth];
-        c->extremum = m->w;
-        c->tail = m->tail;
-        c->end = m->k;
-        c->side = m->rising ? -1 : 1;
+        two_branches_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
     return two_branches_corners_locate(t, corner, depth, 1, !m->rising, output);
@@ -509,13 +514,17 @@ static const two_branches_real_t two_branches_lift[8] = {
     0.0f, 0.0f, 0.27f, 0.702f, 1.188f, 1.62f, 1.89f, 1.9224f
 };
 
+static const two_branches_real_t two_branches_start_level[7] = {
+    0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
+};
+
 static const two_branches_real_t two_branches_reciprocal[8] = {
     0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, 1 / sums of weights; plays without r_0 */
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; plays without r_0 */
 static const two_branches_tables_t two_branches_tables = {
-    two_branches_threshold, NULL, two_branches_slope, two_branches_lift, two_branches_reciprocal, 6
+    two_branches_threshold, NULL, two_branches_slope, two_branches_lift, two_branches_start_level, two_branches_reciprocal, 6
 };
 
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
@@ -611,7 +620,7 @@ static two_branches_real_t two_branches_inverse_choose(const two_branches_invers
         return v;
     }
     back = two_branches_clamp_drive(v) - self->applied;
-    if (up == self->ascending && back >= -0.0012496796f && back <= 0.0012496796f) {
+    if (up == self->ascending && back >= -0.0019484693f && back <= 0.0019484693f) {
         return self->applied; /* stepped back by rounding alone */
     }
     v = two_branches_front_inverse(w, !up, limited);
