@@ -73,12 +73,16 @@ def model(n: int) -> Model:
     return Model(parse_parameters(text, "bench.yaml"))
 
 
-def multisine(length: int) -> Reals:
-    """Decaying multisine in parts of the range, 160 samples a period of the middle line."""
-    t = np.arange(SAMPLES) / SAMPLES
+def multisine(samples: int, stride: int = 1) -> Reals:
+    """Decaying multisine in parts of the range, every `stride`-th of `samples`.
+
+    What a corner list costs on average depends on how finely the drive is sampled, since dear are the samples in which
+    another play begins to follow: with 4000 samples the middle line has 160 a period.
+    """
+    t = np.arange(0, samples, stride) / samples
     lines = ((9, 0.6, 0.0), (25, 0.3, 1.0), (41, 0.1, 2.0))
     x = np.exp(-3 * t) * sum(a * np.sin(2 * np.pi * f * t + phase) for f, a, phase in lines)
-    return np.asarray(x / np.max(np.abs(x)))[:: SAMPLES // length]
+    return np.asarray(x / np.max(np.abs(x)))
 
 
 def from_drive(n: int, operator: str, drive: Reals) -> Reals:
@@ -181,21 +185,21 @@ class Bench:
             (folder / file).write_text((HERE / "textbook" / file).read_text())
         return sources.Sources("textbook", ("forward",), (folder / "textbook.c",), (folder / "hystgen_harness.c",))
 
-    def textbook(self, case: Case, length: int) -> Figures:
-        """The textbook loop over the multisine; its answers are compared with the double model."""
+    def textbook(self, case: Case, drive: Reals) -> Figures:
+        """The textbook loop over a drive, the multisine; its answers are compared with the double model."""
         image = self.image(case, "textbook")
         core = emulator.Core(case.target, image)
-        x = from_drive(case.n, case.operator, RANGE * multisine(length)).astype(case.arithmetic)
+        x = from_drive(case.n, case.operator, drive).astype(case.arithmetic)
         answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
         cascade = model(case.n).cascade
         exact = (cascade if case.operator == "forward" else cascade.inverse()).simulate(x, clamp=True)
         assert np.max(np.abs(answer - exact)) < 1e-3 * RANGE
         return figures_of(case, "textbook", "multisine", core, image)
 
-    def engine(self, case: Case, engine: str, length: int) -> Figures:
-        """Emitted code over the multisine."""
+    def engine(self, case: Case, engine: str, drive: Reals) -> Figures:
+        """Emitted code over a drive, the multisine."""
         image = self.image(case, engine)
-        x = from_drive(case.n, case.operator, RANGE * multisine(length))
+        x = from_drive(case.n, case.operator, drive)
         return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
     def worst(self, case: Case) -> Figures:
@@ -258,7 +262,11 @@ def figures_of(case: Case, engine: str, signal: str, core: emulator.Core, image:
 
 
 def measure(
-    plays: Sequence[int], chosen: Sequence[targets.Target], names: Sequence[str], arithmetics: Sequence[str]
+    plays: Sequence[int],
+    chosen: Sequence[targets.Target],
+    names: Sequence[str],
+    arithmetics: Sequence[str],
+    samples: int,
 ) -> list[Figures]:
     """Everything that is asked for; compilers that are not installed are left out with a word."""
     found: list[Figures] = []
@@ -273,12 +281,13 @@ def measure(
             for n, arithmetic in itertools.product(plays, arithmetics):
                 began = time.monotonic()
                 # Whoever visits every play does so in every sample: fewer samples give the same figure sooner
-                few = SAMPLES if target.fpu else max(100, SAMPLES // n)
+                all_of_it = RANGE * multisine(samples)
+                some = all_of_it if target.fpu else RANGE * multisine(samples, stride=max(1, min(n, samples // 100)))
                 for operator in ("forward", "inverse"):
                     case = Case(target, compiler, n, operator, arithmetic)
-                    found.append(bench.textbook(case, few))
-                    found.append(bench.engine(case, "loop", few))
-                    found.append(bench.engine(case, "corners", SAMPLES))
+                    found.append(bench.textbook(case, some))
+                    found.append(bench.engine(case, "loop", some))
+                    found.append(bench.engine(case, "corners", all_of_it))
                     found.append(bench.worst(case))
                 seconds = time.monotonic() - began
                 print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
@@ -383,7 +392,7 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
         row[0].set_ylabel("instructions per sample")
     for ax in list(axes.flat)[len(names) :]:
         ax.set_visible(False)
-    axes.flat[0].legend(fontsize=8)
+    panels.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(lines), fontsize=9)
     panels.suptitle("Inverse in float32, zig -O2, decaying multisine")
     panels.savefig(path, metadata={"Date": None})
     plt.close(panels)
@@ -396,6 +405,7 @@ def main() -> int:
     parser.add_argument("--targets", default=",".join(targets.NAMES[1:]), help="cores, comma separated")
     parser.add_argument("--compilers", default=",".join(cross.NAMES), help="zig, gcc")
     parser.add_argument("--arithmetics", default="float32", help="comma separated")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="of the multisine")
     parser.add_argument("-o", "--output", type=Path, help="folder for targets.csv and targets.svg")
     parser.add_argument("--check", action="store_true", help="exit 1 where a goal is missed")
     wanted = parser.parse_args()
@@ -404,6 +414,7 @@ def main() -> int:
         [targets.find(name) for name in wanted.targets.split(",")],
         wanted.compilers.split(","),
         wanted.arithmetics.split(","),
+        wanted.samples,
     )
     print(table_text(figures))
     missed = False
