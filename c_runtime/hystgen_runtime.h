@@ -38,9 +38,10 @@ typedef hystgen_real_t hystgen_sum_t;
 #include "hystgen_tables_fixed.h"
 
 int64_t hystgen_nearest(int64_t x, unsigned int bits);
-int64_t hystgen_curve(const hystgen_curve_t *c, int32_t x);
-hystgen_reach_t hystgen_back(const hystgen_back_t *b, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
-                             bool *limited);
+int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient, unsigned int pieces,
+                      unsigned int degree, int32_t x);
+hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
+                               bool *limited);
 #else
 #include "hystgen_tables_float.h"
 

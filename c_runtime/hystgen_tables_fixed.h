@@ -15,22 +15,11 @@ typedef struct {
     uint_least16_t n;                 /* plays without r_0 */
 } hystgen_tables_t;
 
-/* A function of whole numbers as polynomials on pieces: c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along a piece. */
+/* Ends of the way back from the input of the plays to the drive, one branch. */
 typedef struct {
-    const int32_t *knot;         /* where the pieces begin, rising */
-    const uint8_t *scale;        /* left shift that stretches a piece to 2^31 */
-    const int32_t *coefficient;  /* from degree 0, piece after piece */
-    uint_least16_t pieces;
-    uint_least8_t degree;
-} hystgen_curve_t;
-
-/* The way back from the input of the plays to the drive, one branch. */
-typedef struct {
-    hystgen_curve_t curve;
-    int32_t first, last;            /* arguments that the curve covers */
-    hystgen_reach_t least, most;    /* up to here an argument beyond them is no more than rounding */
-    int64_t envelope_least, envelope_most; /* arguments that an envelope can take */
-    uint8_t below;                  /* values are parts of 2^-below drive codes */
-} hystgen_back_t;
+    int64_t envelope_least, envelope_most; /* inputs of the plays that an envelope can give */
+    hystgen_reach_t least, most;           /* up to here an input beyond the range's is no more than rounding */
+    int32_t first, last;                   /* inputs of the plays that the drive range gives */
+} hystgen_ends_t;
 
 #endif

@@ -2,7 +2,8 @@
 
 Forward: rounded thresholds, start memory and stage constants move a play by no more than their own error, because a
 play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
-roundoffs. In the corner list an output is computed from that of the corner below, so that up to n such roundings add up.
+roundoffs. In the corner list an output is computed from that of the corner below, so that up to n such
+roundings add up.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
 residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into

@@ -464,7 +464,7 @@ def up(x: np.float32) -> np.float32:
 def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
     installed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sabotage(monkeypatch, "stage_inverse_slope", up)
+    sabotage(monkeypatch, "stage_reciprocal", up)
     result = hyst("verify", "stage.yaml", "--compiler", installed, "--json", "r.json", "--junit", "r.xml", code=1)
     rows = [row for row in report()["rows"] if row["operator"] == "inverse"]
     assert len(rows) == 2

@@ -508,6 +508,9 @@ REFUSED = [
     case('tanh_no_branch', front("[{kind: tanh}]"), [
         '4:65: model.memoryless[0].ascending: is missing; add `ascending: {a0: 6.0, a1: 0.4, a2: 0.0, a3: 0.0}`',
     ]),
+    case('tanh_too_flat', front("{kind: tanh, ascending: {a0: 1.0e-200, a1: 1.0e-200, a2: 0, a3: 0}}"), [
+        "4:88: model.memoryless.ascending: a0 a1, the branch's steepest slope, is 0.0; keep to 1e-150 .. 1e150",
+    ]),
     case('tanh_key_named_tanh', front("{kind: tanh, tanh: 1, ascending: {a0: 1}}"), [
         '4:77: model.memoryless.tanh: unknown key; known here are kind, ascending, descending',
         '4:97: model.memoryless.ascending.a1: is missing; add `a1: 0.0`',
@@ -828,7 +831,8 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
         "n": draw(st.integers(1, 5)),
     }
     sizes = st.floats(0, 1e30, exclude_min=True)
-    branch = st.builds(lambda a0, a1, a2, a3, sign: {"a0": a0 * sign, "a1": a1 * sign, "a2": a2, "a3": a3}, sizes, sizes, numbers, numbers, st.sampled_from([1, -1]))
+    slopes = st.floats(1e-30, 1e30)  # their product is a slope, which is to stay in bounds
+    branch = st.builds(lambda a0, a1, a2, a3, sign: {"a0": a0 * sign, "a1": a1 * sign, "a2": a2, "a3": a3}, slopes, slopes, numbers, numbers, st.sampled_from([1, -1]))
     dead_zones = st.lists(numbers.filter(bool), unique=True, max_size=4).map(lambda r: sorted([0.0, *r]))
     dead_zone = dead_zones.flatmap(
         lambda r: st.fixed_dictionaries(

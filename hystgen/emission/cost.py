@@ -33,7 +33,7 @@ def _struct(*fields: int) -> int:
 
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
-_STRUCTS = {"tables_t": 28, "dead_zone_t": 28, "curve_t": 16}  # of pointers and counts
+_STRUCTS = {"tables_t": 28, "dead_zone_t": 28}  # of pointers and counts
 
 
 def _constants(text: str, real: int, fixed: bool) -> int:
@@ -43,8 +43,8 @@ def _constants(text: str, real: int, fixed: bool) -> int:
         own = next((width for ending, width in _STRUCTS.items() if kind.endswith(ending)), None)
         if kind.endswith("envelope_t"):
             own = 7 * real
-        elif kind.endswith("back_t"):
-            own = 16 + 8 + 2 * real + 16 + 8
+        elif kind.endswith("ends_t"):
+            own = 16 + 2 * real + 8
         elif kind.endswith("tables_t") and fixed:
             own = 32 + 2 * real
         elif own is None:

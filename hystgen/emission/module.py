@@ -237,8 +237,8 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
         if options.forward or values.branches or (options.inverse and values.fine):
             roots.add("hystgen_nearest")
         if values.fronts:
-            roots |= {"hystgen_curve", "hystgen_back"} if options.inverse else {"hystgen_curve"}
-            types |= {"hystgen_curve_t", "hystgen_back_t"} if options.inverse else {"hystgen_curve_t"}
+            roots |= {"hystgen_nearest", "hystgen_curve", "hystgen_beyond"} if options.inverse else {"hystgen_curve"}
+            types |= {"hystgen_ends_t"} if options.inverse else set()
     pieces = runtime.needed(runtime.kernel_pieces(family), sorted(roots))
     return (
         runtime.types(family.tables, types, values.rt, family)

@@ -189,7 +189,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "fine_factor": 2**fine,
         "fraction": int(limits[fixed.FRACTION]),
         "code_max": int(limits[fixed.CODE_MAX]),
-        "curves": _curves(numbers, name, options) if numbers.fronts else [],
+        "curves": _curves(numbers, name, options) if numbers.fronts else {},
         "drive_lsb": _physical(form.drive_lsb),
         "output_lsb": _physical(form.output_lsb),
         "forward_max_error": _decimal(form.forward_error),
@@ -211,15 +211,15 @@ def _decimal(x: float) -> str:
     return repr(math.ceil(x * 10**digits) / 10**digits)
 
 
-def _curves(numbers: FixedTables, name: str, options: Options) -> list[dict[str, Any]]:
+def _curves(numbers: FixedTables, name: str, options: Options) -> dict[str, dict[str, Any]]:
     """The curves of the memoryless part that are used: forward, and back where there is an inverse."""
-    found = []
-    directions = (("ascending", 0), ("descending", 1)) if numbers.branches else (("", 0),)
+    found = {}
+    directions = (("_ascending", 0), ("_descending", 1)) if numbers.branches else (("", 0),)
     kinds = (("front", fixed.FORWARD), ("back", fixed.INVERSE)) if options.inverse else (("front", fixed.FORWARD),)
     for kind, first in kinds:
         for direction, branch in directions:
             which = first + branch
-            own = f"{name}_{kind}" + (f"_{direction}" if direction else "") + "_curve"
+            own = f"{name}_{kind}{direction}"
             here = int(numbers.first[which])
             there = here + int(numbers.pieces[which])
             degree = numbers.coefficient.shape[1] - 1
@@ -228,17 +228,14 @@ def _curves(numbers: FixedTables, name: str, options: Options) -> list[dict[str,
                 table("uint8_t", f"{own}_scale", list(numbers.scale[here:there])),
                 table("int32_t", f"{own}_coefficient", list(numbers.coefficient[here:there].ravel())),
             ]
-            curve = f"{own}_knot, {own}_scale, {own}_coefficient, {there - here}, {degree}"
             (low, high), (under, over) = numbers.domain[which], numbers.edge[which]
-            ends = [low, high, low - under, high + over, *numbers.argument[which]]
-            found.append(
-                {
-                    "name": own,
-                    "kind": kind,
-                    "arrays": arrays,
-                    "curve": curve,
-                    "ends": ", ".join(literal(end) for end in ends),
-                    "below": int(numbers.below[which]),
-                }
-            )
+            ends = [*numbers.argument[which], low - under, high + over, low, high]
+            found[f"{kind}{direction}"] = {
+                "name": f"{kind}{direction}",
+                "kind": kind,
+                "arrays": arrays,
+                "curve": f"{own}_knot, {own}_scale, {own}_coefficient, {there - here}, {degree}",
+                "ends": ", ".join(literal(end) for end in ends) if kind == "back" else "",
+                "below": int(numbers.below[which]),
+            }
     return found

@@ -25,23 +25,12 @@ typedef struct {
     uint_least16_t n;                 /* plays without r_0 */
 } curved_tables_t;
 
-/* A function of whole numbers as polynomials on pieces: c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along a piece. */
+/* Ends of the way back from the input of the plays to the drive, one branch. */
 typedef struct {
-    const int32_t *knot;         /* where the pieces begin, rising */
-    const uint8_t *scale;        /* left shift that stretches a piece to 2^31 */
-    const int32_t *coefficient;  /* from degree 0, piece after piece */
-    uint_least16_t pieces;
-    uint_least8_t degree;
-} curved_curve_t;
-
-/* The way back from the input of the plays to the drive, one branch. */
-typedef struct {
-    curved_curve_t curve;
-    int32_t first, last;            /* arguments that the curve covers */
-    curved_reach_t least, most;    /* up to here an argument beyond them is no more than rounding */
-    int64_t envelope_least, envelope_most; /* arguments that an envelope can take */
-    uint8_t below;                  /* values are parts of 2^-below drive codes */
-} curved_back_t;
+    int64_t envelope_least, envelope_most; /* inputs of the plays that an envelope can give */
+    curved_reach_t least, most;           /* up to here an input beyond the range's is no more than rounding */
+    int32_t first, last;                   /* inputs of the plays that the drive range gives */
+} curved_ends_t;
 
 /* d / slope[k] to the nearest whole number, d not negative: the upper bits of d times the reciprocal. */
 static curved_sum_t curved_over_slope(const curved_tables_t *t, curved_sum_t d, unsigned int k)
@@ -304,46 +293,43 @@ static int64_t curved_nearest(int64_t x, unsigned int bits)
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
-/* Value at x of the function that the pieces describe, in parts as small as its coefficients'. */
-static int64_t curved_curve(const curved_curve_t *c, int32_t x)
+/* Value at x of a function that is given as polynomials c_0 + c_1 h + c_2 h^2 + ... on pieces, h = 0 .. 1 along each:
+   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from degree 0. */
+static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
+                                  unsigned int pieces, unsigned int degree, int32_t x)
 {
     unsigned int low = 0;
-    unsigned int high = c->pieces - 1u;
-    const int32_t *coefficient;
+    unsigned int high = pieces - 1u;
     int64_t y = 0;
     uint32_t h;
     unsigned int i;
     while (low < high) {
         const unsigned int middle = (low + high + 1u) / 2u;
-        if (x >= c->knot[middle]) {
+        if (x >= knot[middle]) {
             low = middle;
         } else {
             high = middle - 1u;
         }
     }
-    h = ((uint32_t)x - (uint32_t)c->knot[low]) << c->scale[low];
-    coefficient = &c->coefficient[low * (c->degree + 1u)];
-    for (i = c->degree + 1u; i > 0; --i) {
+    h = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
+    coefficient = &coefficient[low * (degree + 1u)];
+    for (i = degree + 1u; i > 0; --i) {
         y = coefficient[i - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
     }
     return y;
 }
 
-/* Drive code for the input w of the plays, one code beyond the range where w lies beyond what the range gives; tells
-   whether w is more than an envelope can take. */
-static curved_reach_t curved_back(const curved_back_t *b, curved_reach_t w, int32_t drive_min,
-                                         int32_t drive_max, bool *limited)
+/* Drive code for an input w of the plays that the drive range does not give: its end, and one code more where that is
+   not just rounding; tells whether w is more than an envelope can give. */
+static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w, int32_t drive_min,
+                                           int32_t drive_max, bool *limited)
 {
-    *limited = false;
-    if (w > b->last) {
-        *limited = w > b->most && w > b->envelope_most;
-        return (curved_reach_t)drive_max + (w > b->most ? 1 : 0);
+    if (w > e->last) {
+        *limited = w > e->most && w > e->envelope_most;
+        return (curved_reach_t)drive_max + (w > e->most ? 1 : 0);
     }
-    if (w < b->first) {
-        *limited = w < b->least && w < b->envelope_least;
-        return (curved_reach_t)drive_min - (w < b->least ? 1 : 0);
-    }
-    return (curved_reach_t)curved_nearest(curved_curve(&b->curve, (int32_t)w), b->below);
+    *limited = w < e->least && w < e->envelope_least;
+    return (curved_reach_t)drive_min - (w < e->least ? 1 : 0);
 }
 
 static const curved_play_t curved_threshold[7] = {
@@ -378,18 +364,19 @@ static const curved_tables_t curved_tables = {
     curved_threshold, NULL, curved_slope, curved_lift, curved_start_level, curved_reciprocal, curved_shift, -389231414, 428259574, 6
 };
 
-static const int32_t curved_front_curve_knot[42] = {
+/* w = G[v] */
+static const int32_t curved_front_knot[42] = {
     -32767, -30719, -28671, -26623, -24575, -22527, -20479, -18431, -16383, -15359, -14335, -13311, -12287,
     -11263, -10239, -9215, -8191, -7167, -6143, -4095, -2047, 1, 2049, 3073, 4097, 5121, 6145, 7169, 8193,
     9217, 10241, 11265, 12289, 14337, 16385, 18432, 20480, 22528, 24576, 26624, 28672, 30720
 };
 
-static const uint8_t curved_front_curve_scale[42] = {
+static const uint8_t curved_front_scale[42] = {
     19, 19, 19, 19, 19, 19, 19, 19, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 19, 19, 19, 19, 20, 20, 20, 20,
     20, 20, 20, 20, 20, 20, 19, 19, 20, 19, 19, 19, 19, 19, 19, 19
 };
 
-static const int32_t curved_front_curve_coefficient[168] = {
+static const int32_t curved_front_coefficient[168] = {
     -351039061, 14553352, 2629691, 298665, -343067628, 17407935, 3078269, 327352, -333553173, 20732382,
     3570389, 348768, -322250785, 24564620, 4095288, 357698, -308899937, 28927861, 4634355, 347719, -293233947,
     33821869, 5159275, 311616, -274994235, 39212682, 5630776, 242278, -253949908, 45021783, 5998721, 134176,
@@ -408,12 +395,8 @@ static const int32_t curved_front_curve_coefficient[168] = {
     14551230, -2629313, 266645, 384537333, 12120884, -2229414, 234059
 };
 
-/* w = G[v] */
-static const curved_curve_t curved_front_curve = {
-    curved_front_curve_knot, curved_front_curve_scale, curved_front_curve_coefficient, 42, 3
-};
-
-static const int32_t curved_back_curve_knot[44] = {
+/* v = G^-1[w] */
+static const int32_t curved_back_knot[44] = {
     -351039061, -345249169, -339459276, -333669383, -327879490, -322089598, -316299705, -304719919,
     -293140134, -281560348, -269980562, -258400776, -235241205, -212081633, -188922062, -165762490,
     -142602919, -119443348, -73124205, -26805062, 19514081, 65833223, 112152366, 158471509, 181631080,
@@ -422,12 +405,12 @@ static const int32_t curved_back_curve_knot[44] = {
     387172275
 };
 
-static const uint8_t curved_back_curve_scale[44] = {
+static const uint8_t curved_back_scale[44] = {
     8, 8, 8, 8, 8, 8, 7, 7, 7, 7, 7, 6, 6, 6, 6, 6, 6, 5, 5, 5, 5, 5, 5, 6, 6, 6, 6, 6, 7, 7, 7, 7, 7, 7, 8,
     8, 8, 8, 8, 8, 9, 9, 9, 9
 };
 
-static const int32_t curved_back_curve_coefficient[176] = {
+static const int32_t curved_back_coefficient[176] = {
     -1073708850, 77353430, -7978867, 954829, -1023805993, 67685042, -6027308, 642536, -979749280, 60271728,
     -4710557, 452902, -940244353, 54409155, -3780648, 331149, -904382851, 49658650, -3099752, 249426,
     -871502691, 45732763, -2586332, 192543, -841106017, 84857463, -8677260, 1087566, -786312880, 74411380,
@@ -447,9 +430,8 @@ static const int32_t curved_back_curve_coefficient[176] = {
     224875, 1003765341, 46080857, 2896766, 295618, 1037047925, 50508319, 3502422, 399452
 };
 
-/* v = G^-1[w] */
-static const curved_back_t curved_back_curve = {
-    { curved_back_curve_knot, curved_back_curve_scale, curved_back_curve_coefficient, 44, 3 }, -351039061, 390067221, -351040837, 390068450, -389231412, 416074956, 15
+static const curved_ends_t curved_back_ends = {
+    -389231412, 416074956, -351040837, 390068450, -351039061, 390067221
 };
 
 static curved_real_t curved_clamp_drive(curved_reach_t v)
@@ -460,14 +442,18 @@ static curved_real_t curved_clamp_drive(curved_reach_t v)
 /* Input of the plays: w = G[v] */
 static curved_play_t curved_front(curved_real_t v)
 {
-    return (curved_play_t)curved_curve(&curved_front_curve, v);
+    return (curved_play_t)curved_curve(curved_front_knot, curved_front_scale, curved_front_coefficient, 42, 3, v);
 }
 
 /* v = G^-1[w]; tells whether w is more than an envelope can take */
 static curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited)
 {
-    return curved_back(&curved_back_curve, w, CURVED_DRIVE_MIN,
-        CURVED_DRIVE_MAX, limited);
+    const curved_ends_t *ends = &curved_back_ends;
+    if (w < ends->first || w > ends->last) {
+        return curved_beyond(ends, w, CURVED_DRIVE_MIN, CURVED_DRIVE_MAX, limited);
+    }
+    *limited = false;
+    return (curved_reach_t)curved_nearest(curved_curve(curved_back_knot, curved_back_scale, curved_back_coefficient, 44, 3, (int32_t)w), 15u);
 }
 
 /* The actuator has seen drive v. */

@@ -15,7 +15,7 @@
  *     inputs of plays between -351039069 and 390067229, 44 fraction bits of an output code
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   2138 bytes
+ *     constant tables   2098 bytes
  *     inverse instance  144 bytes of RAM
  *     inverse step, worst case: 76 multiplications of 32 by 32 bits, 49 comparisons
  *
