@@ -477,7 +477,8 @@ def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
     model = hystgen.load("stage.yaml")
     numbers, other = (tables.build(model.cascade, "float32", "corners") for _ in range(2))
     other.inverse_slope[-1] = up(other.inverse_slope[-1])
-    for expected, found in zip(*(run.expected_records(x, True, LENGTH) for x in (numbers, other)), strict=True):
+    real = np.dtype(np.float32)
+    for expected, found in zip(*(run.expected_records(x, real, True, LENGTH) for x in (numbers, other)), strict=True):
         bits = (expected.answer.view(np.uint32) != found.answer.view(np.uint32)) | (expected.status != found.status)
         if bits.any():
             first = int(np.argmax(bits))

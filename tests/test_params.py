@@ -1007,7 +1007,7 @@ def test_schema_refuses_what_it_can_see() -> None:
         "thresholds_order", "weights_length", "weights_zero", "state_length", "state_one", "density_n_float",
         "density_unreachable", "density_formula", "density_negative", "density_singular", "density_pole",
         "density_not_finite", "density_zero", "density_huge", "table_order", "table_length", "density_state_length",
-        "tanh_sign",
+        "tanh_sign", "tanh_too_flat",
     }  # fmt: skip
     passed = set()
     for parameter in REFUSED:
