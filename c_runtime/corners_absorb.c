@@ -47,42 +47,84 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *
     }
 }
 
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
-   block, galloping away from play k because most moves take one play at a time. */
+/* How far x lies from what corner c holds, in the measure of the thresholds. */
+static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t since, int side, bool rising)
+{
+    const hystgen_sum_t d = rising ? x - since : since - x;
+    return side == 0 ? d : hystgen_half(d);
+}
+
+/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
+static bool hystgen_opposite(int side, bool rising)
+{
+    return rising ? side >= 0 : side <= 0;
+}
+
+/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
+   most moves take one play at a time. */
+static unsigned int hystgen_gallop_thresholds(const hystgen_play_t *step, unsigned int k, unsigned int high,
+                                              hystgen_sum_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner)
+{
+    const unsigned int k = m->hint_k;
+    const unsigned int left = m->hint_depth;
+    const bool rising = m->rising;
+    unsigned int owner;
+    if (k <= m->k || rising != m->hint_rising) {
+        return false;
+    }
+    if (left > 0 && hystgen_reached(m->w, hystgen_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
+        return false;
+    }
+    owner = left < m->depth && corner[left].end == k ? left : left - 1;
+    return hystgen_reached(m->w, hystgen_activation(&corner[owner], t->threshold[k - 1], rising), rising);
+}
+
+/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
 static void hystgen_corners_advance(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
     const hystgen_reach_t w = m->w;
     const bool rising = m->rising;
-    unsigned int low = 0;
     unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
     unsigned int k = m->k;
-    unsigned int probe = left;
-    while (low < left) {
-        const hystgen_corner_t *c = &corner[probe - 1];
-        if (hystgen_reached(w, hystgen_activation(c, t->threshold[c->end - 1], rising), rising)) {
-            left = probe - 1;
-            k = c->end;
-        } else {
-            low = probe;
-        }
-        probe = (low + left + 1) / 2;
-    }
-    if (left > 0) {
-        const hystgen_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u; /* not reached: the block stays */
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (hystgen_reached(w, hystgen_activation(c, t->threshold[probe], rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
+    if (hystgen_foretold(t, m, corner)) {
+        left = m->hint_depth;
+        k = m->hint_k;
+    } else {
+        unsigned int low = 0;
+        unsigned int probe = left;
+        while (low < left) {
+            const hystgen_corner_t *c = &corner[probe - 1];
+            if (hystgen_reached(w, hystgen_activation(c, t->threshold[c->end - 1], rising), rising)) {
+                left = probe - 1;
+                k = c->end;
             } else {
-                high = probe;
+                low = probe;
             }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
+            probe = (low + left + 1) / 2;
+        }
+        if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
+            const hystgen_corner_t *c = &corner[left - 1];
+            k = hystgen_gallop_thresholds(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
         }
     }
     m->depth = (uint_least16_t)left;
@@ -98,6 +140,7 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
     m->k = 1;
     m->depth = 0;
     m->rising = true;
+    m->hint_k = 0;
     if (t->n > 0) {
         corner[0].extremum = w;
         corner[0].output = (hystgen_sum_t)w * t->slope[t->n + 1u];
@@ -118,6 +161,7 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
     m->k = 1;
     m->depth = t->n;
     m->rising = true;
+    m->hint_k = 0;
     for (j = 0; j < t->n; ++j) {
         hystgen_corner_t *c = &corner[j];
         const unsigned int k = t->n - j;
@@ -162,4 +206,5 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
     if (hystgen_reached(w, m->next, m->rising)) {
         hystgen_corners_advance(t, m, corner);
     }
+    m->hint_k = 0;
 }

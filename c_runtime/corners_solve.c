@@ -11,9 +11,30 @@ static hystgen_real_t hystgen_level(const hystgen_tables_t *t, const hystgen_cor
     return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
+/* As hystgen_gallop_thresholds, over outputs. */
+static unsigned int hystgen_gallop_levels(const hystgen_sum_t *step, unsigned int k, unsigned int high, hystgen_sum_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
-static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                             unsigned int left, unsigned int k, bool rising, hystgen_real_t output)
+static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                             const hystgen_corner_t *corner, unsigned int left, unsigned int k,
+                                             bool rising, hystgen_real_t output)
 {
     unsigned int low = 0;
     unsigned int probe = left;
@@ -27,31 +48,22 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, const hy
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0) {
+    if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u;
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (hystgen_reached(output, hystgen_level(t, c, probe, rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
-            } else {
-                high = probe;
-            }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
-        }
-        return (output - hystgen_base(t, c, k, rising)) * t->inverse_slope[k];
+        k = hystgen_gallop_levels(t->start_level, k, c->end - 1u, hystgen_way(output, c->output, c->side, rising));
+    }
+    m->hint_k = (uint_least16_t)k;
+    m->hint_depth = (uint_least16_t)left;
+    m->hint_rising = rising;
+    if (left > 0) {
+        return (output - hystgen_base(t, &corner[left - 1], k, rising)) * t->inverse_slope[k];
     }
     return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
-   free slot above the corners is scratch space for the corner that turning back would leave. */
-HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, const hystgen_memory_t *m,
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                  hystgen_corner_t *corner, hystgen_real_t output)
 {
     const hystgen_real_t w = (output - m->base) * t->inverse_slope[m->k];
@@ -60,11 +72,11 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, cons
         if (!hystgen_reached(w, m->next, m->rising)) {
             return w; /* the same plays follow: the usual sample */
         }
-        return hystgen_corners_locate(t, corner, depth, m->k, m->rising, output);
+        return hystgen_corners_locate(t, m, corner, depth, m->k, m->rising, output);
     }
     if (m->k > 1) {
         hystgen_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
-    return hystgen_corners_locate(t, corner, depth, 1, !m->rising, output);
+    return hystgen_corners_locate(t, m, corner, depth, 1, !m->rising, output);
 }

@@ -16,9 +16,29 @@ static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool risin
     return rising ? output >= level : output <= level;
 }
 
+/* As hystgen_gallop_thresholds, over outputs. */
+static unsigned int hystgen_gallop_levels(const hystgen_sum_t *step, unsigned int k, unsigned int high, hystgen_sum_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners.
    Whole numbers decide which play follows last, so that every engine finds the same. */
-static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, const hystgen_memory_t *m,
+static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_memory_t *m,
                                               const hystgen_corner_t *corner, unsigned int left, unsigned int k,
                                               bool rising, hystgen_sum_t output)
 {
@@ -40,33 +60,24 @@ static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, const h
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0) {
+    if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u;
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            there = hystgen_level(t, c, probe, rising);
-            if (hystgen_passed(output, there, rising)) {
-                w = hystgen_activation(c, t->threshold[probe], rising);
-                here = there;
-                k = probe + 1;
-                stride = stride * 2;
-            } else {
-                high = probe;
-            }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
+        const unsigned int begun = k;
+        k = hystgen_gallop_levels(t->start_level, k, c->end - 1u, hystgen_way(output, c->output, c->side, rising));
+        if (k > begun) {
+            w = hystgen_activation(c, t->threshold[k - 1], rising);
+            here = hystgen_level(t, c, k - 1, rising);
         }
     }
+    m->hint_k = (uint_least16_t)k;
+    m->hint_depth = (uint_least16_t)left;
+    m->hint_rising = rising;
     return hystgen_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
-   free slot above the corners is scratch space for the corner that turning back would leave. */
-HYSTGEN_API hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, const hystgen_memory_t *m,
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+HYSTGEN_API hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                   hystgen_corner_t *corner, hystgen_sum_t output)
 {
     const hystgen_sum_t here = hystgen_corners_output(t, m);

@@ -19,6 +19,7 @@
 #include "envelope_inverse.c"
 #include "dead_zone_forward.c"
 #include "dead_zone_inverse.c"
+#include "half_float.c"
 #include "corners_absorb.c"
 #include "corners_solve.c"
 #include "loop_absorb.c"

@@ -60,8 +60,8 @@ void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystg
 void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                             hystgen_play_t w);
 hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
-hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, const hystgen_memory_t *m,
-                                     hystgen_corner_t *corner, hystgen_sum_t output);
+hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                      hystgen_corner_t *corner, hystgen_sum_t output);
 
 void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w);
 void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play, const hystgen_play_t *start);

@@ -18,6 +18,9 @@ typedef struct {
     hystgen_play_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;
     uint_least16_t depth;  /* corners held */
+    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
+    uint_least16_t hint_depth;
+    bool hint_rising;
     bool rising;           /* direction of the present move of w */
 } hystgen_memory_t;
 

@@ -4,6 +4,12 @@
 #error "right shifts of negative numbers have to keep the sign"
 #endif
 
+/* Down to a whole number: reaches the same whole numbers that x reaches twice. */
+static hystgen_sum_t hystgen_half(hystgen_sum_t x)
+{
+    return x >> 1;
+}
+
 /* d / slope[k] to the nearest whole number, d not negative: the upper bits of d times the reciprocal. */
 static hystgen_sum_t hystgen_over_slope(const hystgen_tables_t *t, hystgen_sum_t d, unsigned int k)
 {

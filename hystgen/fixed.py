@@ -18,6 +18,9 @@ from hystgen.reference import (
     DEPTH,
     DRIVE_MAX,
     DRIVE_MIN,
+    HINT_DEPTH,
+    HINT_K,
+    HINT_RISING,
     NEXT,
     OFFSET,
     RISING,
@@ -27,14 +30,17 @@ from hystgen.reference import (
     W,
     activation,
     corners_output,
+    gallop,
     level,
     loop_output,
+    opposite,
     push_corner,
     reached,
+    way,
 )
 
 # more places in `limits`, after those of `hystgen.reference`
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SLACK = 10, 11, 12, 13, 14, 15, 16
+PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SLACK = 11, 12, 13, 14, 15, 16, 17
 
 HALF = 1 << 30
 
@@ -66,6 +72,11 @@ class FixedTables(NamedTuple):
     engine: int
     branches: int
     fronts: int
+
+
+def half(t: FixedTables, x: Any) -> Any:  # noqa: ARG001  the same call in every arithmetic
+    """x / 2, down to a whole number: reaches the same whole numbers that x reaches twice."""
+    return x >> 1
 
 
 def nearest(x: Any, bits: Any) -> Any:
@@ -117,23 +128,16 @@ def corners_locate(t: FixedTables, s: State, left: int, k: int, rising: int, out
         else:
             low = probe
         probe = (low + left + 1) // 2
-    if left > 0:
-        c = left - 1
-        high = s.end[c] - 1
-        stride = 1
-        probe = k
-        while k < high:
-            there = level(t, s, c, probe, rising)
-            if reached(output, there, rising):
-                w = activation(s, c, t.threshold[probe], rising)
-                here = there
-                k = probe + 1
-                stride = stride * 2
-            else:
-                high = probe
-            probe = (k + high) // 2
-            if probe > k + stride - 1:
-                probe = k + stride - 1
+    c = left - 1
+    if left > 0 and opposite(s.side[c], rising):
+        begun = k
+        k = gallop(t.start_level, k, s.end[c] - 1, way(t, output, s.output[c], s.side[c], rising))
+        if k > begun:
+            w = activation(s, c, t.threshold[k - 1], rising)
+            here = level(t, s, c, k - 1, rising)
+    s.counts[HINT_K] = k
+    s.counts[HINT_DEPTH] = left
+    s.counts[HINT_RISING] = rising
     if rising:
         return going(t, w, output - here, k, rising)
     return going(t, w, here - output, k, rising)
@@ -256,20 +260,22 @@ def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
 
 
 _OWN: list[Callable[..., Any]] = [
-    nearest, over_slope, going, corners_locate, corners_solve, loop_solve, curve, front_forward, front_inverse, output,
-    solve, finite,
+    half, nearest, over_slope, going, corners_locate, corners_solve, loop_solve, curve, front_forward,
+    front_inverse, output, solve, finite,
 ]  # fmt: skip
 _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
-    "activation", "reached", "base", "corners_settle", "corners_advance", "corners_rest", "corners_start",
-    "push_corner", "corners_absorb", "corners_output", "level", "loop_rest", "loop_start", "loop_absorb", "loop_output",
+    "activation", "reached", "base", "corners_settle", "way", "gallop", "opposite", "foretold", "corners_advance",
+    "corners_rest", "corners_start", "push_corner", "corners_absorb", "corners_output", "level", "loop_rest",
+    "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip
 
 # Callees before callers: the memory, then what is written here, then what a step means
 COMPILED: list[Callable[..., Any]] = [
+    half,
     *(function for function in _COMMON if function.__name__ in _LOWER),
-    *_OWN,
+    *_OWN[1:],
     *(function for function in _COMMON if function.__name__ not in _LOWER),
 ]
 INLINED: set[Callable[..., Any]] = {function for function in COMPILED if function in reference.INLINED}

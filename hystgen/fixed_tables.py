@@ -264,7 +264,7 @@ class _Builder:
 
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = [0] * 17
+        limits = [0] * 18
         limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX] = self.drive
         limits[reference.OUTPUT_MIN], limits[reference.OUTPUT_MAX] = self.output
         limits[reference.OFFSET] = self.offset

@@ -22,13 +22,14 @@ Counts = NDArray[np.int64]
 
 # arithmetic-independent names for places in the arrays below
 DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
-START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO = 5, 6, 7, 8, 9
+START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO, HALF = 5, 6, 7, 8, 9, 10
 
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
 W, BASE, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+HINT_K, HINT_DEPTH, HINT_RISING = 9, 10, 11
 
 INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN = 1, 2, 4, 8
 
@@ -45,7 +46,7 @@ class Tables(NamedTuple):
     start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 where all start at the same value
-    limits: Reals  # DRIVE_MIN .. ZERO
+    limits: Reals  # DRIVE_MIN .. HALF
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # where the stage's numbers begin in stage_data
     stage_size: Counts  # break points of a dead zone
@@ -91,7 +92,7 @@ def new_state(t: PlayTables) -> State:
     dtype = t.threshold.dtype
     return State(
         real=np.zeros(8, dtype),
-        counts=np.zeros(9, np.int64),
+        counts=np.zeros(12, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         output=np.zeros(max(n, 1), dtype),
         end=np.zeros(max(n, 1), np.int64),
@@ -156,8 +157,63 @@ def corners_settle(t: PlayTables, s: State) -> None:
         s.real[NEXT] = -t.limits[REAL_MAX]
 
 
+def half(t: PlayTables, x: Any) -> Any:
+    """x / 2."""
+    return x * t.limits[HALF]
+
+
+def way(t: PlayTables, x: Any, since: Any, side: int, rising: int) -> Any:
+    """How far x lies from what a corner holds, in the measure of the thresholds."""
+    d = x - since if rising else since - x
+    if side == 0:
+        return d
+    return half(t, d)
+
+
+def gallop(steps: Reals, k: int, high: int, x: Any) -> int:
+    """First of the rising steps k .. high that x has not reached; high is known to be one."""
+    stride = 1
+    probe = k
+    while k < high:
+        if x >= steps[probe]:
+            k = probe + 1
+            stride = stride * 2
+        else:
+            high = probe
+        probe = (k + high) // 2
+        if probe > k + stride - 1:
+            probe = k + stride - 1
+    return k
+
+
+def opposite(side: int, rising: int) -> bool:
+    """Whether a corner lets go of its plays one by one, and not all of them at its extremum."""
+    return side >= 0 if rising else side <= 0
+
+
+def foretold(t: PlayTables, s: State) -> bool:
+    """Whether the place that solving found is where the move has come to."""
+    k = s.counts[HINT_K]
+    left = s.counts[HINT_DEPTH]
+    rising = s.counts[RISING]
+    if k <= s.counts[K] or rising != s.counts[HINT_RISING]:
+        return False
+    w = s.real[W]
+    if left > 0 and reached(w, activation(s, left - 1, t.threshold[k], rising), rising):
+        return False
+    owner = left - 1
+    if left < s.counts[DEPTH] and s.end[left] == k:
+        owner = left
+    return reached(w, activation(s, owner, t.threshold[k - 1], rising), rising)
+
+
 def corners_advance(t: PlayTables, s: State) -> None:
     """The move has passed `next`: find the plays that follow now."""
+    if foretold(t, s):
+        s.counts[DEPTH] = s.counts[HINT_DEPTH]
+        s.counts[K] = s.counts[HINT_K]
+        corners_settle(t, s)
+        return
     w = s.real[W]
     rising = s.counts[RISING]
     low = 0
@@ -174,18 +230,8 @@ def corners_advance(t: PlayTables, s: State) -> None:
         probe = (low + left + 1) // 2
     if left > 0:
         c = left - 1
-        high = s.end[c] - 1
-        stride = 1
-        probe = k
-        while k < high:
-            if reached(w, activation(s, c, t.threshold[probe], rising), rising):
-                k = probe + 1
-                stride = stride * 2
-            else:
-                high = probe
-            probe = (k + high) // 2
-            if probe > k + stride - 1:
-                probe = k + stride - 1
+        if opposite(s.side[c], rising):
+            k = gallop(t.threshold, k, s.end[c] - 1, way(t, w, s.extremum[c], s.side[c], rising))
     s.counts[DEPTH] = left
     s.counts[K] = k
     corners_settle(t, s)
@@ -198,6 +244,7 @@ def corners_rest(t: PlayTables, s: State, w: Any) -> None:
     s.counts[K] = 1
     s.counts[DEPTH] = 0
     s.counts[RISING] = 1
+    s.counts[HINT_K] = 0
     if n > 0:
         s.extremum[0] = w
         s.output[0] = w * t.slope[n + 1]
@@ -215,6 +262,7 @@ def corners_start(t: PlayTables, s: State, play: Reals) -> None:
     s.counts[K] = 1
     s.counts[DEPTH] = n
     s.counts[RISING] = 1
+    s.counts[HINT_K] = 0
     for j in range(n):
         s.extremum[j] = play[n - j]
         s.output[j] = play[n - j] * t.slope[n - j + 1] + above
@@ -253,6 +301,7 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     s.real[W] = w
     if reached(w, s.real[NEXT], s.counts[RISING]):
         corners_advance(t, s)
+    s.counts[HINT_K] = 0
 
 
 # ---------------------------------------------------------------- corners_solve.c
@@ -283,20 +332,13 @@ def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: 
         else:
             low = probe
         probe = (low + left + 1) // 2
+    c = left - 1
+    if left > 0 and opposite(s.side[c], rising):
+        k = gallop(t.start_level, k, s.end[c] - 1, way(t, output, s.output[c], s.side[c], rising))
+    s.counts[HINT_K] = k
+    s.counts[HINT_DEPTH] = left
+    s.counts[HINT_RISING] = rising
     if left > 0:
-        c = left - 1
-        high = s.end[c] - 1
-        stride = 1
-        probe = k
-        while k < high:
-            if reached(output, level(t, s, c, probe, rising), rising):
-                k = probe + 1
-                stride = stride * 2
-            else:
-                high = probe
-            probe = (k + high) // 2
-            if probe > k + stride - 1:
-                probe = k + stride - 1
         return (output - base(t, s, c, k, rising)) * t.inverse_slope[k]
     if rising:
         return (output + t.lift[k]) * t.inverse_slope[k]
@@ -658,11 +700,11 @@ def run(t: Tables, s: State, inverse: int, op: Counts, x: Reals, answers: Reals,
 
 
 COMPILED: list[Callable[..., Any]] = [
-    activation, reached, base, corners_settle, corners_advance, corners_rest, corners_start, corners_output,
-    push_corner, corners_absorb, level, corners_locate, corners_solve, loop_rest, loop_start, loop_absorb,
-    loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse, rest,
-    absorb, output, solve, begin, init, see_drive, finite, forward_step, answer, clamp_drive, fits, choose_branch,
-    inverse_step, inverse_commit, reset, run,
+    activation, reached, base, corners_settle, half, way, gallop, opposite, foretold, corners_advance, corners_rest,
+    corners_start, corners_output, push_corner, corners_absorb, level, corners_locate, corners_solve, loop_rest,
+    loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone, front_forward,
+    front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer, clamp_drive,
+    fits, choose_branch, inverse_step, inverse_commit, reset, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through

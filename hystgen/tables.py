@@ -136,7 +136,8 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         sizes.append(size)
         numbers += data
 
-    limits = [0.0] * 10
+    limits = [0.0] * 11
+    limits[reference.HALF] = 0.5
     if bounded:
         drive = inward(*cascade.input_range, dtype)
         outputs = inward(*cascade.output_range, dtype)

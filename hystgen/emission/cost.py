@@ -67,7 +67,7 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         if not getattr(options, op):
             continue
         if corners:
-            memory = [_struct(sums, reach, play, 2, 2, 1), max(n, 1) * _struct(sums, play, 2, 1)]
+            memory = [_struct(sums, reach, play, 2, 2, 2, 2, 1, 1), max(n, 1) * _struct(sums, play, 2, 1)]
         else:
             memory = [(n + 1) * play]
         if op == "forward":

@@ -21,6 +21,7 @@ FLOAT_KERNELS = (
     "envelope_inverse.c",
     "dead_zone_forward.c",
     "dead_zone_inverse.c",
+    "half_float.c",
     "corners_absorb.c",
     "corners_solve.c",
     "loop_absorb.c",

@@ -32,6 +32,12 @@ typedef struct {
     int32_t first, last;                   /* inputs of the plays that the drive range gives */
 } curved_ends_t;
 
+/* Down to a whole number: reaches the same whole numbers that x reaches twice. */
+static curved_sum_t curved_half(curved_sum_t x)
+{
+    return x >> 1;
+}
+
 /* d / slope[k] to the nearest whole number, d not negative: the upper bits of d times the reciprocal. */
 static curved_sum_t curved_over_slope(const curved_tables_t *t, curved_sum_t d, unsigned int k)
 {
@@ -99,42 +105,84 @@ static void curved_corners_settle(const curved_tables_t *t, curved_memory_t *m, 
     }
 }
 
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
-   block, galloping away from play k because most moves take one play at a time. */
+/* How far x lies from what corner c holds, in the measure of the thresholds. */
+static curved_sum_t curved_way(curved_sum_t x, curved_sum_t since, int side, bool rising)
+{
+    const curved_sum_t d = rising ? x - since : since - x;
+    return side == 0 ? d : curved_half(d);
+}
+
+/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
+static bool curved_opposite(int side, bool rising)
+{
+    return rising ? side >= 0 : side <= 0;
+}
+
+/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
+   most moves take one play at a time. */
+static unsigned int curved_gallop_thresholds(const curved_play_t *step, unsigned int k, unsigned int high,
+                                              curved_sum_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool curved_foretold(const curved_tables_t *t, const curved_memory_t *m, const curved_corner_t *corner)
+{
+    const unsigned int k = m->hint_k;
+    const unsigned int left = m->hint_depth;
+    const bool rising = m->rising;
+    unsigned int owner;
+    if (k <= m->k || rising != m->hint_rising) {
+        return false;
+    }
+    if (left > 0 && curved_reached(m->w, curved_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
+        return false;
+    }
+    owner = left < m->depth && corner[left].end == k ? left : left - 1;
+    return curved_reached(m->w, curved_activation(&corner[owner], t->threshold[k - 1], rising), rising);
+}
+
+/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
 static void curved_corners_advance(const curved_tables_t *t, curved_memory_t *m, const curved_corner_t *corner)
 {
     const curved_reach_t w = m->w;
     const bool rising = m->rising;
-    unsigned int low = 0;
     unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
     unsigned int k = m->k;
-    unsigned int probe = left;
-    while (low < left) {
-        const curved_corner_t *c = &corner[probe - 1];
-        if (curved_reached(w, curved_activation(c, t->threshold[c->end - 1], rising), rising)) {
-            left = probe - 1;
-            k = c->end;
-        } else {
-            low = probe;
-        }
-        probe = (low + left + 1) / 2;
-    }
-    if (left > 0) {
-        const curved_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u; /* not reached: the block stays */
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (curved_reached(w, curved_activation(c, t->threshold[probe], rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
+    if (curved_foretold(t, m, corner)) {
+        left = m->hint_depth;
+        k = m->hint_k;
+    } else {
+        unsigned int low = 0;
+        unsigned int probe = left;
+        while (low < left) {
+            const curved_corner_t *c = &corner[probe - 1];
+            if (curved_reached(w, curved_activation(c, t->threshold[c->end - 1], rising), rising)) {
+                left = probe - 1;
+                k = c->end;
             } else {
-                high = probe;
+                low = probe;
             }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
+            probe = (low + left + 1) / 2;
+        }
+        if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
+            const curved_corner_t *c = &corner[left - 1];
+            k = curved_gallop_thresholds(t->threshold, k, c->end - 1u, curved_way(w, c->extremum, c->side, rising));
         }
     }
     m->depth = (uint_least16_t)left;
@@ -150,6 +198,7 @@ static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, cu
     m->k = 1;
     m->depth = 0;
     m->rising = true;
+    m->hint_k = 0;
     if (t->n > 0) {
         corner[0].extremum = w;
         corner[0].output = (curved_sum_t)w * t->slope[t->n + 1u];
@@ -192,6 +241,7 @@ static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, 
     if (curved_reached(w, m->next, m->rising)) {
         curved_corners_advance(t, m, corner);
     }
+    m->hint_k = 0;
 }
 
 /* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
@@ -210,9 +260,29 @@ static bool curved_passed(curved_sum_t output, curved_sum_t level, bool rising)
     return rising ? output >= level : output <= level;
 }
 
+/* As curved_gallop_thresholds, over outputs. */
+static unsigned int curved_gallop_levels(const curved_sum_t *step, unsigned int k, unsigned int high, curved_sum_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners.
    Whole numbers decide which play follows last, so that every engine finds the same. */
-static curved_reach_t curved_corners_locate(const curved_tables_t *t, const curved_memory_t *m,
+static curved_reach_t curved_corners_locate(const curved_tables_t *t, curved_memory_t *m,
                                               const curved_corner_t *corner, unsigned int left, unsigned int k,
                                               bool rising, curved_sum_t output)
 {
@@ -234,33 +304,24 @@ static curved_reach_t curved_corners_locate(const curved_tables_t *t, const curv
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0) {
+    if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
         const curved_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u;
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            there = curved_level(t, c, probe, rising);
-            if (curved_passed(output, there, rising)) {
-                w = curved_activation(c, t->threshold[probe], rising);
-                here = there;
-                k = probe + 1;
-                stride = stride * 2;
-            } else {
-                high = probe;
-            }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
+        const unsigned int begun = k;
+        k = curved_gallop_levels(t->start_level, k, c->end - 1u, curved_way(output, c->output, c->side, rising));
+        if (k > begun) {
+            w = curved_activation(c, t->threshold[k - 1], rising);
+            here = curved_level(t, c, k - 1, rising);
         }
     }
+    m->hint_k = (uint_least16_t)k;
+    m->hint_depth = (uint_least16_t)left;
+    m->hint_rising = rising;
     return curved_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
-   free slot above the corners is scratch space for the corner that turning back would leave. */
-static curved_reach_t curved_corners_solve(const curved_tables_t *t, const curved_memory_t *m,
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+static curved_reach_t curved_corners_solve(const curved_tables_t *t, curved_memory_t *m,
                                                   curved_corner_t *corner, curved_sum_t output)
 {
     const curved_sum_t here = curved_corners_output(t, m);

@@ -16,7 +16,7 @@
  *
  * Cost, derived from the model (32-bit target):
  *     constant tables   2098 bytes
- *     inverse instance  144 bytes of RAM
+ *     inverse instance  152 bytes of RAM
  *     inverse step, worst case: 76 multiplications of 32 by 32 bits, 49 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -72,6 +72,9 @@ typedef struct {
     curved_play_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;
     uint_least16_t depth;  /* corners held */
+    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
+    uint_least16_t hint_depth;
+    bool hint_rising;
     bool rising;           /* direction of the present move of w */
 } curved_memory_t;
 

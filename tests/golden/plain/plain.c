@@ -31,6 +31,11 @@ typedef struct {
     uint_least16_t n;                     /* plays without r_0 */
 } plain_tables_t;
 
+static plain_real_t plain_half(plain_real_t x)
+{
+    return x * (plain_real_t)0.5f;
+}
+
 /* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
 static plain_real_t plain_activation(const plain_corner_t *c, plain_real_t threshold, bool rising)
 {
@@ -78,42 +83,84 @@ static void plain_corners_settle(const plain_tables_t *t, plain_memory_t *m, con
     }
 }
 
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
-   block, galloping away from play k because most moves take one play at a time. */
+/* How far x lies from what corner c holds, in the measure of the thresholds. */
+static plain_real_t plain_way(plain_real_t x, plain_real_t since, int side, bool rising)
+{
+    const plain_real_t d = rising ? x - since : since - x;
+    return side == 0 ? d : plain_half(d);
+}
+
+/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
+static bool plain_opposite(int side, bool rising)
+{
+    return rising ? side >= 0 : side <= 0;
+}
+
+/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
+   most moves take one play at a time. */
+static unsigned int plain_gallop_thresholds(const plain_real_t *step, unsigned int k, unsigned int high,
+                                              plain_real_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool plain_foretold(const plain_tables_t *t, const plain_memory_t *m, const plain_corner_t *corner)
+{
+    const unsigned int k = m->hint_k;
+    const unsigned int left = m->hint_depth;
+    const bool rising = m->rising;
+    unsigned int owner;
+    if (k <= m->k || rising != m->hint_rising) {
+        return false;
+    }
+    if (left > 0 && plain_reached(m->w, plain_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
+        return false;
+    }
+    owner = left < m->depth && corner[left].end == k ? left : left - 1;
+    return plain_reached(m->w, plain_activation(&corner[owner], t->threshold[k - 1], rising), rising);
+}
+
+/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
 static void plain_corners_advance(const plain_tables_t *t, plain_memory_t *m, const plain_corner_t *corner)
 {
     const plain_real_t w = m->w;
     const bool rising = m->rising;
-    unsigned int low = 0;
     unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
     unsigned int k = m->k;
-    unsigned int probe = left;
-    while (low < left) {
-        const plain_corner_t *c = &corner[probe - 1];
-        if (plain_reached(w, plain_activation(c, t->threshold[c->end - 1], rising), rising)) {
-            left = probe - 1;
-            k = c->end;
-        } else {
-            low = probe;
-        }
-        probe = (low + left + 1) / 2;
-    }
-    if (left > 0) {
-        const plain_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u; /* not reached: the block stays */
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (plain_reached(w, plain_activation(c, t->threshold[probe], rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
+    if (plain_foretold(t, m, corner)) {
+        left = m->hint_depth;
+        k = m->hint_k;
+    } else {
+        unsigned int low = 0;
+        unsigned int probe = left;
+        while (low < left) {
+            const plain_corner_t *c = &corner[probe - 1];
+            if (plain_reached(w, plain_activation(c, t->threshold[c->end - 1], rising), rising)) {
+                left = probe - 1;
+                k = c->end;
             } else {
-                high = probe;
+                low = probe;
             }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
+            probe = (low + left + 1) / 2;
+        }
+        if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
+            const plain_corner_t *c = &corner[left - 1];
+            k = plain_gallop_thresholds(t->threshold, k, c->end - 1u, plain_way(w, c->extremum, c->side, rising));
         }
     }
     m->depth = (uint_least16_t)left;
@@ -129,6 +176,7 @@ static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain
     m->k = 1;
     m->depth = 0;
     m->rising = true;
+    m->hint_k = 0;
     if (t->n > 0) {
         corner[0].extremum = w;
         corner[0].output = w * t->slope[t->n + 1u];
@@ -171,6 +219,7 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
     if (plain_reached(w, m->next, m->rising)) {
         plain_corners_advance(t, m, corner);
     }
+    m->hint_k = 0;
 }
 
 /* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
@@ -184,9 +233,30 @@ static plain_real_t plain_level(const plain_tables_t *t, const plain_corner_t *c
     return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
+/* As plain_gallop_thresholds, over outputs. */
+static unsigned int plain_gallop_levels(const plain_real_t *step, unsigned int k, unsigned int high, plain_real_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
-static plain_real_t plain_corners_locate(const plain_tables_t *t, const plain_corner_t *corner,
-                                             unsigned int left, unsigned int k, bool rising, plain_real_t output)
+static plain_real_t plain_corners_locate(const plain_tables_t *t, plain_memory_t *m,
+                                             const plain_corner_t *corner, unsigned int left, unsigned int k,
+                                             bool rising, plain_real_t output)
 {
     unsigned int low = 0;
     unsigned int probe = left;
@@ -200,31 +270,22 @@ static plain_real_t plain_corners_locate(const plain_tables_t *t, const plain_co
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0) {
+    if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
         const plain_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u;
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (plain_reached(output, plain_level(t, c, probe, rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
-            } else {
-                high = probe;
-            }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
-        }
-        return (output - plain_base(t, c, k, rising)) * t->inverse_slope[k];
+        k = plain_gallop_levels(t->start_level, k, c->end - 1u, plain_way(output, c->output, c->side, rising));
+    }
+    m->hint_k = (uint_least16_t)k;
+    m->hint_depth = (uint_least16_t)left;
+    m->hint_rising = rising;
+    if (left > 0) {
+        return (output - plain_base(t, &corner[left - 1], k, rising)) * t->inverse_slope[k];
     }
     return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
-   free slot above the corners is scratch space for the corner that turning back would leave. */
-static plain_real_t plain_corners_solve(const plain_tables_t *t, const plain_memory_t *m,
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+static plain_real_t plain_corners_solve(const plain_tables_t *t, plain_memory_t *m,
                                                  plain_corner_t *corner, plain_real_t output)
 {
     const plain_real_t w = (output - m->base) * t->inverse_slope[m->k];
@@ -233,13 +294,13 @@ static plain_real_t plain_corners_solve(const plain_tables_t *t, const plain_mem
         if (!plain_reached(w, m->next, m->rising)) {
             return w; /* the same plays follow: the usual sample */
         }
-        return plain_corners_locate(t, corner, depth, m->k, m->rising, output);
+        return plain_corners_locate(t, m, corner, depth, m->k, m->rising, output);
     }
     if (m->k > 1) {
         plain_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
-    return plain_corners_locate(t, corner, depth, 1, !m->rising, output);
+    return plain_corners_locate(t, m, corner, depth, 1, !m->rising, output);
 }
 
 static const plain_real_t plain_threshold[7] = {

@@ -10,7 +10,7 @@
  *
  * Cost, derived from the model (32-bit target):
  *     constant tables   180 bytes
- *     inverse instance  120 bytes of RAM
+ *     inverse instance  124 bytes of RAM
  *     inverse step, worst case: 33 multiplications, 33 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -72,6 +72,9 @@ typedef struct {
     plain_real_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;
     uint_least16_t depth;  /* corners held */
+    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
+    uint_least16_t hint_depth;
+    bool hint_rising;
     bool rising;           /* direction of the present move of w */
 } plain_memory_t;
 

@@ -10,7 +10,7 @@
  *
  * Cost, derived from the model (32-bit target):
  *     constant tables   392 bytes
- *     inverse instance  124 bytes of RAM
+ *     inverse instance  128 bytes of RAM
  *     inverse step, worst case: 39 multiplications, 51 comparisons, 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -74,6 +74,9 @@ typedef struct {
     two_branches_real_t w;      /* input of the plays, w = G[v] */
     uint_least16_t k;
     uint_least16_t depth;  /* corners held */
+    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
+    uint_least16_t hint_depth;
+    bool hint_rising;
     bool rising;           /* direction of the present move of w */
 } two_branches_memory_t;
 
@@ -291,6 +294,11 @@ static two_branches_real_t two_branches_envelope_inverse(const two_branches_enve
     return (two_branches_atanh(argument) - e->a2) * e->inverse_a1;
 }
 
+static two_branches_real_t two_branches_half(two_branches_real_t x)
+{
+    return x * (two_branches_real_t)0.5f;
+}
+
 /* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
 static two_branches_real_t two_branches_activation(const two_branches_corner_t *c, two_branches_real_t threshold, bool rising)
 {
@@ -338,42 +346,84 @@ static void two_branches_corners_settle(const two_branches_tables_t *t, two_bran
     }
 }
 
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one
-   block, galloping away from play k because most moves take one play at a time. */
+/* How far x lies from what corner c holds, in the measure of the thresholds. */
+static two_branches_real_t two_branches_way(two_branches_real_t x, two_branches_real_t since, int side, bool rising)
+{
+    const two_branches_real_t d = rising ? x - since : since - x;
+    return side == 0 ? d : two_branches_half(d);
+}
+
+/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
+static bool two_branches_opposite(int side, bool rising)
+{
+    return rising ? side >= 0 : side <= 0;
+}
+
+/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
+   most moves take one play at a time. */
+static unsigned int two_branches_gallop_thresholds(const two_branches_real_t *step, unsigned int k, unsigned int high,
+                                              two_branches_real_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool two_branches_foretold(const two_branches_tables_t *t, const two_branches_memory_t *m, const two_branches_corner_t *corner)
+{
+    const unsigned int k = m->hint_k;
+    const unsigned int left = m->hint_depth;
+    const bool rising = m->rising;
+    unsigned int owner;
+    if (k <= m->k || rising != m->hint_rising) {
+        return false;
+    }
+    if (left > 0 && two_branches_reached(m->w, two_branches_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
+        return false;
+    }
+    owner = left < m->depth && corner[left].end == k ? left : left - 1;
+    return two_branches_reached(m->w, two_branches_activation(&corner[owner], t->threshold[k - 1], rising), rising);
+}
+
+/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
 static void two_branches_corners_advance(const two_branches_tables_t *t, two_branches_memory_t *m, const two_branches_corner_t *corner)
 {
     const two_branches_real_t w = m->w;
     const bool rising = m->rising;
-    unsigned int low = 0;
     unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
     unsigned int k = m->k;
-    unsigned int probe = left;
-    while (low < left) {
-        const two_branches_corner_t *c = &corner[probe - 1];
-        if (two_branches_reached(w, two_branches_activation(c, t->threshold[c->end - 1], rising), rising)) {
-            left = probe - 1;
-            k = c->end;
-        } else {
-            low = probe;
-        }
-        probe = (low + left + 1) / 2;
-    }
-    if (left > 0) {
-        const two_branches_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u; /* not reached: the block stays */
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (two_branches_reached(w, two_branches_activation(c, t->threshold[probe], rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
+    if (two_branches_foretold(t, m, corner)) {
+        left = m->hint_depth;
+        k = m->hint_k;
+    } else {
+        unsigned int low = 0;
+        unsigned int probe = left;
+        while (low < left) {
+            const two_branches_corner_t *c = &corner[probe - 1];
+            if (two_branches_reached(w, two_branches_activation(c, t->threshold[c->end - 1], rising), rising)) {
+                left = probe - 1;
+                k = c->end;
             } else {
-                high = probe;
+                low = probe;
             }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
+            probe = (low + left + 1) / 2;
+        }
+        if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
+            const two_branches_corner_t *c = &corner[left - 1];
+            k = two_branches_gallop_thresholds(t->threshold, k, c->end - 1u, two_branches_way(w, c->extremum, c->side, rising));
         }
     }
     m->depth = (uint_least16_t)left;
@@ -389,6 +439,7 @@ static void two_branches_corners_rest(const two_branches_tables_t *t, two_branch
     m->k = 1;
     m->depth = 0;
     m->rising = true;
+    m->hint_k = 0;
     if (t->n > 0) {
         corner[0].extremum = w;
         corner[0].output = w * t->slope[t->n + 1u];
@@ -431,6 +482,7 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
     if (two_branches_reached(w, m->next, m->rising)) {
         two_branches_corners_advance(t, m, corner);
     }
+    m->hint_k = 0;
 }
 
 /* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
@@ -444,9 +496,30 @@ static two_branches_real_t two_branches_level(const two_branches_tables_t *t, co
     return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
 }
 
+/* As two_branches_gallop_thresholds, over outputs. */
+static unsigned int two_branches_gallop_levels(const two_branches_real_t *step, unsigned int k, unsigned int high, two_branches_real_t x)
+{
+    unsigned int stride = 1;
+    unsigned int probe = k;
+    while (k < high) {
+        if (x >= step[probe]) {
+            k = probe + 1;
+            stride = stride * 2;
+        } else {
+            high = probe;
+        }
+        probe = (k + high) / 2;
+        if (probe > k + stride - 1) {
+            probe = k + stride - 1;
+        }
+    }
+    return k;
+}
+
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
-static two_branches_real_t two_branches_corners_locate(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                             unsigned int left, unsigned int k, bool rising, two_branches_real_t output)
+static two_branches_real_t two_branches_corners_locate(const two_branches_tables_t *t, two_branches_memory_t *m,
+                                             const two_branches_corner_t *corner, unsigned int left, unsigned int k,
+                                             bool rising, two_branches_real_t output)
 {
     unsigned int low = 0;
     unsigned int probe = left;
@@ -460,31 +533,22 @@ static two_branches_real_t two_branches_corners_locate(const two_branches_tables
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0) {
+    if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
         const two_branches_corner_t *c = &corner[left - 1];
-        unsigned int high = c->end - 1u;
-        unsigned int stride = 1;
-        probe = k;
-        while (k < high) {
-            if (two_branches_reached(output, two_branches_level(t, c, probe, rising), rising)) {
-                k = probe + 1;
-                stride = stride * 2;
-            } else {
-                high = probe;
-            }
-            probe = (k + high) / 2;
-            if (probe > k + stride - 1) {
-                probe = k + stride - 1;
-            }
-        }
-        return (output - two_branches_base(t, c, k, rising)) * t->inverse_slope[k];
+        k = two_branches_gallop_levels(t->start_level, k, c->end - 1u, two_branches_way(output, c->output, c->side, rising));
+    }
+    m->hint_k = (uint_least16_t)k;
+    m->hint_depth = (uint_least16_t)left;
+    m->hint_rising = rising;
+    if (left > 0) {
+        return (output - two_branches_base(t, &corner[left - 1], k, rising)) * t->inverse_slope[k];
     }
     return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing; the
-   free slot above the corners is scratch space for the corner that turning back would leave. */
-static two_branches_real_t two_branches_corners_solve(const two_branches_tables_t *t, const two_branches_memory_t *m,
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+static two_branches_real_t two_branches_corners_solve(const two_branches_tables_t *t, two_branches_memory_t *m,
                                                  two_branches_corner_t *corner, two_branches_real_t output)
 {
     const two_branches_real_t w = (output - m->base) * t->inverse_slope[m->k];
@@ -493,13 +557,13 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
         if (!two_branches_reached(w, m->next, m->rising)) {
             return w; /* the same plays follow: the usual sample */
         }
-        return two_branches_corners_locate(t, corner, depth, m->k, m->rising, output);
+        return two_branches_corners_locate(t, m, corner, depth, m->k, m->rising, output);
     }
     if (m->k > 1) {
         two_branches_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
-    return two_branches_corners_locate(t, corner, depth, 1, !m->rising, output);
+    return two_branches_corners_locate(t, m, corner, depth, 1, !m->rising, output);
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
