@@ -33,7 +33,9 @@ class FormatError(ValueError):
 
 
 def choose_engine(engine: str, n: int) -> str:
-    """The engine that `auto` stands for with n plays; any other choice is kept."""
+    """The engine that `auto` stands for with n plays; any other choice is kept, but without plays nothing is listed."""
+    if n == 0:
+        return "loop"
     if engine != "auto":
         return engine
     return "corners" if n >= SMALLEST_CORNERS else "loop"

@@ -73,7 +73,9 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         if op == "forward":
             fields = [real] * (1 + branches) + [1] * branches + [4]
         else:
-            fields = [real] * (4 + branches) + [1] * (3 + branches) + [4, 4]
+            fast = corners and not fixed and not cascade.stages
+            fields = [real] * (4 + branches) + [1] * (3 + branches)
+            fields += [real] * 3 * fast + [1] * 2 * fast + [4, 4]
         widest = sums if corners else play
         whole = sum(memory) + _struct(*fields)
         sizes.append((op, -(-whole // widest) * widest))

@@ -356,6 +356,11 @@ static void plain_inverse_begin(plain_inverse_t *self, plain_real_t applied)
     self->repeat = false;
     self->stepped = false;
     self->bits = 0;
+    self->edge[0] = 0;
+    self->edge[1] = 0;
+    self->gain = 0;
+    self->fast = false;
+    self->falling = false;
     self->status = 0;
 }
 
@@ -369,12 +374,63 @@ static plain_real_t plain_inverse_answer(plain_inverse_t *self, plain_real_t v)
     return v;
 }
 
+/* After a step that merely went on with the move: for which references the next one does, so that it need not look.
+   Rounding keeps order: where the drive at the far end is short of the next play and of the range, all before are. */
+static void plain_inverse_enter_fast(plain_inverse_t *self, plain_real_t u)
+{
+    const plain_memory_t *m = &self->memory;
+    const bool up = m->rising;
+    const plain_real_t gain = plain_reciprocal[m->k];
+    const plain_real_t end = up ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN;
+    const plain_real_t stop = (up ? m->next < end : m->next > end) ? m->next : end;
+    const plain_real_t most = up ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN;
+    plain_real_t far = m->base + stop * plain_slope[m->k];
+    plain_real_t drive;
+    far = far - (far < 0 ? -far : far) * (up ? 4 * FLT_EPSILON : -4 * FLT_EPSILON);
+    far = (up ? far < most : far > most) ? far : most;
+    drive = (far - m->base) * gain;
+    self->gain = gain;
+    self->falling = !up;
+    self->fast = up ? drive < stop : drive > stop;
+    self->edge[up ? 0 : 1] = u;
+    self->edge[up ? 1 : 0] = self->fast ? far : u;
+}
+
+/* What the fast steps have left undone. */
+static void plain_inverse_leave_fast(plain_inverse_t *self)
+{
+    if (self->fast) {
+        self->fast = false;
+        self->reference = self->edge[self->falling ? 1 : 0];
+        self->answer = self->pending;
+    }
+    self->edge[0] = self->edge[1];
+}
+
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that the usual sample saves no registers for it */
+#endif
+static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u);
+
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
+{
+    if (u > self->edge[0] && u < self->edge[1]) { /* the usual sample; never so for NaN */
+        const plain_real_t v = (u - self->memory.base) * self->gain;
+        self->memory.w = self->pending;
+        self->edge[self->falling] = u;
+        self->pending = v;
+        return v;
+    }
+    return plain_inverse_look(self, u);
+}
+
+static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
 {
     plain_real_t w;
     plain_real_t v;
     plain_real_t inside;
     unsigned int bits = 0;
+    plain_inverse_leave_fast(self);
     if (self->has_pending) { /* what was sent last is what the actuator has seen */
         plain_inverse_see(self, self->pending);
         self->has_pending = false;
@@ -404,11 +460,15 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
     }
     self->bits = bits;
     self->status |= bits;
+    if (bits == 0 && self->memory.hint_k == 0) { /* nothing limited, nothing searched for */
+        plain_inverse_enter_fast(self, u);
+    }
     return plain_inverse_answer(self, inside);
 }
 
 void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
 {
+    plain_inverse_leave_fast(self);
     if (!plain_finite(applied)) {
         self->status |= PLAIN_STATUS_HELD;
         return;

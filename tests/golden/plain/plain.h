@@ -10,7 +10,7 @@
  *
  * Cost, derived from the model (32-bit target):
  *     constant tables   180 bytes
- *     inverse instance  124 bytes of RAM
+ *     inverse instance  140 bytes of RAM
  *     inverse step, worst case: 33 multiplications, 33 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -89,6 +89,10 @@ typedef struct {
     bool has_pending;
     bool repeat;                 /* the last answer still stands for `reference` */
     bool stepped;
+    plain_real_t edge[2];    /* references strictly between these go on with the present move, nothing limited */
+    plain_real_t gain;       /* drive per reference of that move */
+    bool fast;                   /* edge and gain hold */
+    bool falling;
     unsigned int bits;           /* status of that answer */
     unsigned int status;
 } plain_inverse_t;
