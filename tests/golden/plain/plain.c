@@ -384,16 +384,16 @@ static void plain_inverse_enter_fast(plain_inverse_t *self, plain_real_t u)
     const plain_real_t end = up ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN;
     const plain_real_t stop = (up ? m->next < end : m->next > end) ? m->next : end;
     const plain_real_t most = up ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN;
-    plain_real_t far = m->base + stop * plain_slope[m->k];
+    plain_real_t last = m->base + stop * plain_slope[m->k];
     plain_real_t drive;
-    far = far - (far < 0 ? -far : far) * (up ? 4 * FLT_EPSILON : -4 * FLT_EPSILON);
-    far = (up ? far < most : far > most) ? far : most;
-    drive = (far - m->base) * gain;
+    last = last - (last < 0 ? -last : last) * (up ? 4 * FLT_EPSILON : -4 * FLT_EPSILON);
+    last = (up ? last < most : last > most) ? last : most;
+    drive = (last - m->base) * gain;
     self->gain = gain;
     self->falling = !up;
     self->fast = up ? drive < stop : drive > stop;
     self->edge[up ? 0 : 1] = u;
-    self->edge[up ? 1 : 0] = self->fast ? far : u;
+    self->edge[up ? 1 : 0] = self->fast ? last : u;
 }
 
 /* What the fast steps have left undone. */
