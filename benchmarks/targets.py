@@ -112,17 +112,27 @@ def everywhere(n: int) -> Reals:
 
 
 def trials(n: int) -> list[Reals]:
-    """Every corner list, then two jumps, since the search for what follows after a jump is the work of a sample."""
+    """Every corner list, then two jumps, since the search for what follows after a jump is the work of a sample; also
+    with a small step on between them, after which the sample before the last was one that need not look."""
     jumps = everywhere(n)
     first, second = jumps[:: max(1, len(jumps) // 12)], jumps[:: max(1, len(jumps) // 24)]
-    return [
-        np.append(points, pair) for points in corner_lists(n) for pair in itertools.product(first, second)
-    ]
+    found = []
+    for points in corner_lists(n):
+        for a, b in itertools.product(first, second):
+            on = a + 1e-3 * np.sign(a - points[-1])
+            found += [np.append(points, (a, b)), np.append(points, (a, on, b))]
+    # and blocks of uneven sizes, which no rule makes: turning points at random, small among large
+    rng = np.random.default_rng(11)
+    for _ in range(1500):
+        size = rng.integers(4, 12)
+        turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
+        found.append(np.concatenate([[RANGE, -RANGE], turns]))
+    return found
 
 
 def neighbours(n: int, trial: Reals) -> Iterator[Reals]:
-    """A trial with one of its jumps, or the turning point before them, moved anywhere."""
-    for place, jump in itertools.product((-3, -2, -1), everywhere(n)):
+    """A trial with one of its jumps, or a turning point shortly before them, moved anywhere."""
+    for place, jump in itertools.product(range(-min(5, len(trial)), 0), everywhere(n)):
         other = trial.copy()
         other[place] = jump
         yield other
@@ -234,7 +244,7 @@ class Bench:
                 return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
 
             best = dearest(trials(case.n), 10)
-            for _ in range(2):
+            for _ in range(3):
                 best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], 10)
             self._worst[case] = from_drive(case.n, case.operator, np.concatenate(best))
         return self._worst[case]
