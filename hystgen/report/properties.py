@@ -34,6 +34,7 @@ def properties(model: Model) -> str:
     problems = c.inverse_problems()
     if problems:
         lines += ["inverse            none:", *(f"    {problem}" for problem in problems)]
+        lines += _fixed(model, drive, output)
     else:
         lines.append(
             f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} are "
@@ -62,9 +63,10 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
             lines.append(f"{arithmetic}                not available: {error}")
             continue
         a, b = float(form.drive_lsb), float(form.output_lsb)
+        back = "" if form.inverse_rounding is None else f", inverse {form.inverse_rounding * a:.3g}{drive}"
         lines.append(
-            f"error, {arithmetic}         forward {form.forward_error * b:.3g}{output}, inverse "
-            f"{(form.inverse_rounding or 0) * a:.3g}{drive}; codes of {a:.4g}{drive} and {b:.4g}{output}"
+            f"error, {arithmetic}         forward {form.forward_error * b:.3g}{output}{back} at most; a code is "
+            f"{a:.4g}{drive}, {b:.4g}{output}"
         )
     return lines
 
