@@ -256,7 +256,7 @@ def simulate(
     clamp = operator == "inverse"
     session = _shown(params, lambda: model.session(operator, arithmetic, engine, clamp))
     if visited:
-        session.visit(visited)
+        _shown(params, partial(session.visit, visited))
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
@@ -264,8 +264,8 @@ def simulate(
     for record, target in zip(read, targets, strict=True):
         columns = record.columns()
         signal = columns[column]
-        answers, status = session.run(signal)
-        for sentence in simulation.remarks(record.name, model.cascade, operator, signal, status):
+        answers, status = _shown(params, partial(session.run, signal))
+        for sentence in simulation.remarks(record.name, session, operator, signal, status):
             click.echo(f"warning: {sentence}", err=True)
         if answer in columns:
             columns[f"{answer}_measured"] = columns.pop(answer)

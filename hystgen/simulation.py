@@ -34,14 +34,23 @@ class Session:
             cascade.inverse()
         limited = clamp or arithmetic is not None
         self.tables = tables.build(cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse))
+        self._range = cascade.input_range
         self.state = reference.new_state(self.tables)
         self._code = compiled.reference(self.tables)
         self._code.init(self.tables, self.state)
 
+    @property
+    def drive_range(self) -> tuple[float, float]:
+        """`input_range` in what the operator takes: physical units, or codes in fixed point."""
+        if self.tables.threshold.dtype.kind == "i":
+            low, high = self.tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1]
+            return float(low), float(high)
+        return self._range
+
     def visit(self, drives: Iterable[float]) -> None:
         """Let the actuator see these drive values before what comes next."""
-        for drive in drives:
-            self._code.see_drive(self.tables, self.state, self.tables.threshold.dtype.type(drive))
+        for drive in self._samples(list(drives)):
+            self._code.see_drive(self.tables, self.state, drive)
         self.state.real[reference.LEVEL] = self._code.output(self.tables, self.state)
 
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], NDArray[np.int64]]:
@@ -49,12 +58,16 @@ class Session:
 
         Fixed point takes and gives codes. Raises ValueError for numbers that are none.
         """
+        samples = self._samples(x)
+        return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.int64), samples)
+
+    def _samples(self, x: ArrayLike) -> NDArray[Any]:
         samples = np.ascontiguousarray(x, dtype=self.tables.threshold.dtype)
         if samples.dtype.kind == "i":
             given, most = np.asarray(x), int(self.tables.limits[fixed.CODE_MAX])
             if np.any(given != samples) or np.any(samples < -most - 1) or np.any(samples > most):
                 raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
-        return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.int64), samples)
+        return samples
 
     def operate(self, op: NDArray[np.int64], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
         """A sequence of init, reset, step and commit with their arguments; answers are those of the steps."""
@@ -75,10 +88,10 @@ def simulate_inverse(cascade: Cascade, u: ArrayLike, clamp: bool = False) -> NDA
 
 
 def remarks(
-    name: str, cascade: Cascade, operator: str, signal: NDArray[np.float64], status: NDArray[np.int64]
+    name: str, session: Session, operator: str, signal: NDArray[np.float64], status: NDArray[np.int64]
 ) -> list[str]:
     """What a user should know about a simulated record, one sentence each."""
-    low, high = cascade.input_range
+    low, high = session.drive_range
     if operator == "forward":
         outside = int(np.count_nonzero((signal < low) | (signal > high)))
         if outside:
