@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
@@ -14,6 +16,7 @@ from modelfiles import FILES
 import hystgen
 from hystgen import compiled, fixed, fixed_tables, reference
 from hystgen.api import Model, cascade_of
+from hystgen.cli import main
 from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
 from hystgen.params import parse_parameters
 from hystgen.simulation import Session
@@ -211,3 +214,21 @@ def test_simulating_takes_codes() -> None:
         model.simulate(np.array([0.5]), arithmetic="q15")
     with pytest.raises(ValueError, match="whole numbers"):
         model.simulate(np.array([40000]), arithmetic="q15")
+
+
+def test_simulating_on_the_command_line_speaks_of_codes(tmp_path: Path) -> None:
+    (tmp_path / "plain.yaml").write_text(FILES["plain"])
+    (tmp_path / "codes.csv").write_text("t,v\n0,0\n1,32767\n2,-32768\n")
+    (tmp_path / "volts.csv").write_text("t,v\n0,0.5\n1,2\n")
+    words = ["simulate", str(tmp_path / "plain.yaml"), "--arithmetic", "q15"]
+    done = CliRunner().invoke(main, [*words, str(tmp_path / "codes.csv"), "--history", "1000,-2000"])
+    assert done.exit_code == 0, done.output
+    assert "1 of 3 samples lie outside input_range -32767 to 32767, limited to it" in done.stderr
+    answers = [int(line.split(",")[2]) for line in done.stdout.splitlines()[1:]]
+    session = Session(load("plain"), "forward", "q15")
+    session.visit([1000, -2000])
+    assert answers == session.run([0, 32767, -32768])[0].tolist()
+    for extra in ([str(tmp_path / "volts.csv")], [str(tmp_path / "codes.csv"), "--history", "0.5"]):
+        done = CliRunner().invoke(main, [*words, *extra])
+        assert done.exit_code == 2
+        assert "fixed point takes codes, whole numbers from -32768 to 32767" in done.stderr
