@@ -221,7 +221,7 @@ class Bench:
     def run(self, case: Case, image: emulator.Image, engine: str, x: Reals) -> emulator.Core:
         """A core after the steps `x`, whose answers have been compared with the bit reference."""
         numbers = model(case.n).tables(case.arithmetic, engine)
-        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.int64), x)
+        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
         real = comparison.REALS[case.arithmetic]
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)

@@ -40,7 +40,7 @@ from hystgen.reference import (
 )
 
 # more places in `limits`, after those of `hystgen.reference`
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SLACK = 11, 12, 13, 14, 15, 16, 17
+PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SLACK = 16, 17, 18, 19, 20, 21, 22
 
 HALF = 1 << 30
 
@@ -121,7 +121,7 @@ def corners_locate(t: FixedTables, s: State, left: int, k: int, rising: int, out
         c = probe - 1
         there = level(t, s, c, s.end[c] - 1, rising)
         if reached(output, there, rising):
-            w = activation(s, c, t.threshold[s.end[c] - 1], rising)
+            w = activation(t, s, c, t.threshold[s.end[c] - 1], rising)
             here = there
             left = c
             k = s.end[c]
@@ -133,7 +133,7 @@ def corners_locate(t: FixedTables, s: State, left: int, k: int, rising: int, out
         begun = k
         k = gallop(t.start_level, k, s.end[c] - 1, way(t, output, s.output[c], s.side[c], rising))
         if k > begun:
-            w = activation(s, c, t.threshold[k - 1], rising)
+            w = activation(t, s, c, t.threshold[k - 1], rising)
             here = level(t, s, c, k - 1, rising)
     s.counts[HINT_K] = k
     s.counts[HINT_DEPTH] = left
@@ -266,9 +266,9 @@ _OWN: list[Callable[..., Any]] = [
 _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
-    "activation", "reached", "base", "corners_settle", "way", "gallop", "opposite", "foretold", "corners_advance",
-    "corners_rest", "corners_start", "push_corner", "corners_absorb", "corners_output", "level", "loop_rest",
-    "loop_start", "loop_absorb", "loop_output",
+    "multiple", "activation", "reached", "base", "corners_settle", "way", "gallop", "opposite", "foretold",
+    "corners_advance", "corners_rest", "corners_start", "push_corner", "corners_absorb", "corners_output", "level",
+    "loop_rest", "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip
 
 # Callees before callers: the memory, then what is written here, then what a step means

@@ -19,10 +19,12 @@ from hystgen.kernels import AtanhTables, TanhTables, atanh, tanh
 
 Reals = NDArray[Any]
 Counts = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
 
 # arithmetic-independent names for places in the arrays below
 DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
 START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO, HALF = 5, 6, 7, 8, 9, 10
+MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
 
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
@@ -46,7 +48,7 @@ class Tables(NamedTuple):
     start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 where all start at the same value
-    limits: Reals  # DRIVE_MIN .. HALF
+    limits: Reals  # DRIVE_MIN .. MULTIPLE + 2
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # where the stage's numbers begin in stage_data
     stage_size: Counts  # break points of a dead zone
@@ -104,21 +106,16 @@ def new_state(t: PlayTables) -> State:
 # ---------------------------------------------------------------- corners_absorb.c
 
 
-def activation(s: State, c: int, r: Any, rising: int) -> Any:
+def multiple(t: PlayTables, s: State, c: int, rising: int) -> Any:
+    """Thresholds, with sign, between a corner and where the plays that it holds start to follow: two after a turn,
+    one from the start, none where the move leads back to where the corner was. A number to multiply by, which is
+    exact, because what the C decides by branches would mostly be guessed wrong here."""
+    return t.limits[MULTIPLE - 1 + s.side[c] + 2 * rising]
+
+
+def activation(t: PlayTables, s: State, c: int, r: Any, rising: int) -> Any:
     """Input at which a play of threshold r, held by corner c, starts to follow."""
-    e = s.extremum[c]
-    side = s.side[c]
-    if rising:
-        if side > 0:
-            return e + (r + r)
-        if side == 0:
-            return e + r
-        return e
-    if side < 0:
-        return e - (r + r)
-    if side == 0:
-        return e - r
-    return e
+    return s.extremum[c] + multiple(t, s, c, rising) * r
 
 
 def reached(x: Any, level: Any, rising: int) -> bool:
@@ -130,15 +127,7 @@ def reached(x: Any, level: Any, rising: int) -> bool:
 
 def base(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
     """Output less w times slope[k] while plays 0 .. k-1 follow and corner c holds play k."""
-    y = s.output[c]
-    side = s.side[c]
-    if side == 0:
-        y = y - t.lift[k] if rising else y + t.lift[k]
-    elif rising and side > 0:
-        y = y - (t.lift[k] + t.lift[k])
-    elif not rising and side < 0:
-        y = y + (t.lift[k] + t.lift[k])
-    return y - s.extremum[c] * t.slope[k]
+    return s.output[c] - multiple(t, s, c, rising) * t.lift[k] - s.extremum[c] * t.slope[k]
 
 
 def corners_settle(t: PlayTables, s: State) -> None:
@@ -148,7 +137,7 @@ def corners_settle(t: PlayTables, s: State) -> None:
     depth = s.counts[DEPTH]
     if depth > 0:
         s.real[BASE] = base(t, s, depth - 1, k, rising)
-        s.real[NEXT] = activation(s, depth - 1, t.threshold[k], rising)
+        s.real[NEXT] = activation(t, s, depth - 1, t.threshold[k], rising)
     elif rising:
         s.real[BASE] = -t.lift[k]
         s.real[NEXT] = t.limits[REAL_MAX]
@@ -199,12 +188,12 @@ def foretold(t: PlayTables, s: State) -> bool:
     if k <= s.counts[K] or rising != s.counts[HINT_RISING]:
         return False
     w = s.real[W]
-    if left > 0 and reached(w, activation(s, left - 1, t.threshold[k], rising), rising):
+    if left > 0 and reached(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
         return False
     owner = left - 1
     if left < s.counts[DEPTH] and s.end[left] == k:
         owner = left
-    return reached(w, activation(s, owner, t.threshold[k - 1], rising), rising)
+    return reached(w, activation(t, s, owner, t.threshold[k - 1], rising), rising)
 
 
 def corners_advance(t: PlayTables, s: State) -> None:
@@ -222,7 +211,7 @@ def corners_advance(t: PlayTables, s: State) -> None:
     probe = left
     while low < left:
         c = probe - 1
-        if reached(w, activation(s, c, t.threshold[s.end[c] - 1], rising), rising):
+        if reached(w, activation(t, s, c, t.threshold[s.end[c] - 1], rising), rising):
             left = c
             k = s.end[c]
         else:
@@ -309,15 +298,7 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
 
 def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
     """Output at the moment play k of corner c's block starts to follow."""
-    y = s.output[c]
-    side = s.side[c]
-    if side == 0:
-        return y + t.start_level[k] if rising else y - t.start_level[k]
-    if rising and side > 0:
-        return y + (t.start_level[k] + t.start_level[k])
-    if not rising and side < 0:
-        return y - (t.start_level[k] + t.start_level[k])
-    return y
+    return s.output[c] + multiple(t, s, c, rising) * t.start_level[k]
 
 
 def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: Any) -> Any:
@@ -680,7 +661,7 @@ def reset(t: Tables, s: State) -> None:
     begin(t, s, t.limits[RESET_APPLIED])
 
 
-def run(t: Tables, s: State, inverse: int, op: Counts, x: Reals, answers: Reals, status: Counts) -> None:
+def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
     """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
     for i in range(len(op)):
         if op[i] == OP_INIT:
@@ -700,15 +681,15 @@ def run(t: Tables, s: State, inverse: int, op: Counts, x: Reals, answers: Reals,
 
 
 COMPILED: list[Callable[..., Any]] = [
-    activation, reached, base, corners_settle, half, way, gallop, opposite, foretold, corners_advance, corners_rest,
-    corners_start, corners_output, push_corner, corners_absorb, level, corners_locate, corners_solve, loop_rest,
-    loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone, front_forward,
-    front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer, clamp_drive,
-    fits, choose_branch, inverse_step, inverse_commit, reset, run,
+    multiple, activation, reached, base, corners_settle, half, way, gallop, opposite, foretold, corners_advance,
+    corners_rest, corners_start, corners_output, push_corner, corners_absorb, level, corners_locate, corners_solve,
+    loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
+    front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer,
+    clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through
 INLINED: set[Callable[..., Any]] = {
-    reached, corners_output, push_corner, corners_absorb, corners_solve, absorb, output, solve, see_drive, finite,
-    forward_step, answer, clamp_drive,
+    multiple, reached, corners_output, push_corner, corners_absorb, corners_solve, absorb, output, solve, see_drive,
+    finite, forward_step, answer, clamp_drive,
 }  # fmt: skip

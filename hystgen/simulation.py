@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen import compiled, fixed, reference, tables
 from hystgen.models import Cascade
+from hystgen.reference import Bytes
 
 
 class Session:
@@ -53,13 +54,13 @@ class Session:
             self._code.see_drive(self.tables, self.state, drive)
         self.state.real[reference.LEVEL] = self._code.output(self.tables, self.state)
 
-    def run(self, x: ArrayLike) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
 
         Fixed point takes and gives codes. Raises ValueError for numbers that are none.
         """
         samples = self._samples(x)
-        return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.int64), samples)
+        return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.uint8), samples)
 
     def _samples(self, x: ArrayLike) -> NDArray[Any]:
         samples = np.ascontiguousarray(x, dtype=self.tables.threshold.dtype)
@@ -69,10 +70,10 @@ class Session:
                 raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
         return samples
 
-    def operate(self, op: NDArray[np.int64], x: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64]]:
+    def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
         """A sequence of init, reset, step and commit with their arguments; answers are those of the steps."""
         answers = np.zeros_like(x)
-        status = np.zeros(len(x), dtype=np.int64)
+        status = np.zeros(len(x), dtype=np.uint8)
         self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)
         return answers, status
 
@@ -88,7 +89,7 @@ def simulate_inverse(cascade: Cascade, u: ArrayLike, clamp: bool = False) -> NDA
 
 
 def remarks(
-    name: str, session: Session, operator: str, signal: NDArray[np.float64], status: NDArray[np.int64]
+    name: str, session: Session, operator: str, signal: NDArray[np.float64], status: Bytes
 ) -> list[str]:
     """What a user should know about a simulated record, one sentence each."""
     low, high = session.drive_range

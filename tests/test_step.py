@@ -182,14 +182,14 @@ def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]
     first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range
-    op = np.array([kind for kind, _ in made], dtype=np.int64)
+    op = np.array([kind for kind, _ in made], dtype=np.uint8)
     x = np.array(
         [
             drive_low + part * (drive_high - drive_low) if kind == reference.OP_COMMIT else low + part * (high - low)
             for kind, part in made
         ]
     )
-    answers, status = np.zeros(len(x)), np.zeros(len(x), np.int64)
+    answers, status = np.zeros(len(x)), np.zeros(len(x), np.uint8)
     reference.run(numbers, state, int(inverse), op, x, answers, status)
     return x, answers, status, np.array([low, high])
 

@@ -67,8 +67,8 @@ def _samples(numbers: reference.Tables | FixedTables, inverse: bool) -> list[dic
     code = compiled.reference(numbers, compiled=False)
     code.init(numbers, state)
     x = np.array(arguments, dtype=numbers.threshold.dtype)
-    answers, status = np.zeros_like(x), np.zeros(len(x), dtype=np.int64)
-    code.run(numbers, state, int(inverse), np.array(calls, dtype=np.int64), x, answers, status)
+    answers, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
+    code.run(numbers, state, int(inverse), np.array(calls, dtype=np.uint8), x, answers, status)
     return [
         {"call": CALLS[c], "argument": literal(a), "answer": literal(y), "status": int(s)}
         for c, a, y, s in zip(calls, x, answers, status, strict=True)

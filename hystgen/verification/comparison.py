@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from hystgen import compiled, reference
 from hystgen.fixed import FixedTables
+from hystgen.reference import Bytes
 from hystgen.verification import signals
-
-Bytes = NDArray[np.uint8]
 
 # What NAME_real_t is
 REALS: dict[str, np.dtype[Any]] = {
@@ -53,10 +52,10 @@ def expected_record(
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
     state = reference.new_state(numbers)
-    answer, status = np.zeros_like(x), np.zeros(len(x), dtype=np.int64)
+    answer, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
     code.init(numbers, state)
     code.run(numbers, state, int(inverse), op, x, answer, status)
-    return Expected(name, op.astype(np.uint8), x.astype(real), answer.astype(real), status.astype(np.uint8))
+    return Expected(name, op, x.astype(real), answer.astype(real), status)
 
 
 def expected_records(

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from hystgen import reference
 from hystgen.emission import runtime
+from hystgen.reference import Bytes
 from hystgen.verification import compilers
-from hystgen.verification.comparison import Bytes
 from hystgen.verification.cross import Layout
 from hystgen.verification.targets import Target
 

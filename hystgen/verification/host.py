@@ -11,8 +11,9 @@ import cffi
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.reference import Bytes
 from hystgen.verification import compilers
-from hystgen.verification.comparison import Bytes, Expected, compare
+from hystgen.verification.comparison import Expected, compare
 from hystgen.verification.report import Row
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import HOST

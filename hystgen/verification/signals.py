@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from hystgen import reference
 from hystgen.fixed import FixedTables
+from hystgen.reference import Bytes
 
-Calls = tuple[str, NDArray[np.int64], NDArray[np.float64]]
+Calls = tuple[str, Bytes, NDArray[np.float64]]
 
 
-def _steps(x: NDArray[np.float64]) -> NDArray[np.int64]:
-    return np.full(len(x), reference.OP_STEP, dtype=np.int64)
+def _steps(x: NDArray[np.float64]) -> Bytes:
+    return np.full(len(x), reference.OP_STEP, dtype=np.uint8)
 
 
 def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
@@ -83,7 +84,7 @@ def _suite(
     x[places] = rng.choice(special, int(places.sum()))
     yield record("extremes" if whole else "NaN, infinities, extremes", x)
 
-    kinds = [reference.OP_STEP, reference.OP_RESET, reference.OP_INIT]
+    kinds = np.array([reference.OP_STEP, reference.OP_RESET, reference.OP_INIT], dtype=np.uint8)
     chances = [0.995, 0.004, 0.001]
     x = middle + 1.1 * half * np.sin(walk * 2)
     x[places] = rng.choice(special, int(places.sum()))
@@ -91,7 +92,7 @@ def _suite(
     if inverse:
         drive_low, drive_high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
         for name, chance in (("commits", 0.3), ("rare commits", 0.01)):
-            op = np.where(rng.random(length) < chance, reference.OP_COMMIT, reference.OP_STEP).astype(np.int64)
+            op = np.where(rng.random(length) < chance, reference.OP_COMMIT, reference.OP_STEP).astype(np.uint8)
             spread = drive_high - drive_low
             drives = rng.uniform(drive_low - 0.05 * spread, drive_high + 0.05 * spread, length)
             odd = rng.random(length) < 0.02
