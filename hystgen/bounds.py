@@ -2,8 +2,12 @@
 
 Forward: rounded thresholds, start memory and stage constants move a play by no more than their own error, because a
 play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
-roundoffs. In the corner list an output is computed from that of the corner below, so that up to n such
-roundings add up.
+roundoffs. In the corner list an output is computed from that of the corner below it, so that the roundings of up to n
+corners and of the output itself add up. With S = sum |p_i| max |w| + sum |p_i| r_i, which no play sum exceeds, one
+such step `y - m lift_k - e slope_k + w slope_k` (m at most 2) adds at most, in unit roundoffs: 2 S from the table's
+lift, 3 S for the first difference, S from the table's slope and S for the product with e, 2 S for the second
+difference, S and S for slope and product with w, S for the last sum; together 12 S. A corner of a start memory that
+is a list adds less: 2 S from two slopes, 2 S for their difference and the product, S for the sum.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
 residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into

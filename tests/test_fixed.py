@@ -174,7 +174,7 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
         slopes = np.abs(np.diff(exact)) / float(form.drive_lsb)
         slack = (builder.front[3 - up].error / 2.0 ** int(tables.below[2])) + 0.5
         per_code = builder.front[1 - up].error * float(builder.step) / (slopes.min() * float(form.drive_lsb))
-        assert np.abs(back - codes).max() <= slack + per_code * max(1, high - low) / len(codes) + 1
+        assert np.abs(back - codes).max() <= slack + per_code * max(1, high - low) / len(codes)
 
 
 def test_converter_formats_are_honoured() -> None:

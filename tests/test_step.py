@@ -189,7 +189,7 @@ def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]
             for kind, part in made
         ]
     )
-    answers, status = np.zeros(len(x)), np.zeros(len(x), np.uint8)
+    answers, status = np.zeros(len(x)), np.zeros(len(x), np.int64)
     reference.run(numbers, state, int(inverse), op, x, answers, status)
     return x, answers, status, np.array([low, high])
 
