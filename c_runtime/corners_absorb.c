@@ -11,39 +11,34 @@ static hystgen_reach_t hystgen_activation(const hystgen_corner_t *c, hystgen_pla
     return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
 }
 
+/* The output at that moment: the corner's own, or as far from it as the inverse play's threshold z_k says (36). */
+static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
+{
+    const hystgen_sum_t z = t->start_level[k];
+    if (rising) {
+        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
+    }
+    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
+}
+
 static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
 }
 
-/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
-   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
-static hystgen_sum_t hystgen_base(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
-{
-    hystgen_sum_t y = c->output;
-    if (c->side == 0) {
-        y = rising ? y - t->lift[k] : y + t->lift[k];
-    } else if (rising && c->side > 0) {
-        y = y - (t->lift[k] + t->lift[k]);
-    } else if (!rising && c->side < 0) {
-        y = y + (t->lift[k] + t->lift[k]);
-    }
-    return y - (hystgen_sum_t)c->extremum * t->slope[k];
-}
-
-/* Brings base and next up to date after k, depth or the direction have changed. */
+/* Brings anchor and next up to date after k, depth or the direction have changed. The anchor is measured from the
+   corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
 static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
     if (m->depth > 0) {
         const hystgen_corner_t *c = &corner[m->depth - 1];
-        m->base = hystgen_base(t, c, m->k, m->rising);
+        m->anchor = hystgen_activation(c, t->threshold[m->k - 1], m->rising);
+        m->anchor_output = hystgen_level(t, c, m->k - 1u, m->rising);
         m->next = hystgen_activation(c, t->threshold[m->k], m->rising);
-    } else if (m->rising) { /* every play follows */
-        m->base = -t->lift[m->k];
-        m->next = HYSTGEN_REACH_MAX;
-    } else {
-        m->base = t->lift[m->k];
-        m->next = -HYSTGEN_REACH_MAX;
+    } else { /* every play follows */
+        m->anchor = 0;
+        m->anchor_output = m->rising ? -t->all_lift : t->all_lift;
+        m->next = m->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
     }
 }
 
@@ -82,50 +77,51 @@ static unsigned int hystgen_gallop_thresholds(const hystgen_play_t *step, unsign
     return k;
 }
 
+/* The w from which on plays 0 .. k-1 follow when a move has left `left` of `depth` corners. */
+static hystgen_reach_t hystgen_entered(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int left,
+                                       unsigned int depth, unsigned int k, bool rising)
+{
+    const unsigned int owner = left < depth && corner[left].end == k ? left : left - 1;
+    return hystgen_activation(&corner[owner], t->threshold[k - 1], rising);
+}
+
 /* Whether the place that solving found is where the move has come to. */
 static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
     const unsigned int k = m->hint_k;
     const unsigned int left = m->hint_depth;
     const bool rising = m->rising;
-    unsigned int owner;
-    if (k <= m->k || rising != m->hint_rising) {
+    if (rising != m->hint_rising) {
         return false;
     }
     if (left > 0 && hystgen_reached(m->w, hystgen_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
         return false;
     }
-    owner = left < m->depth && corner[left].end == k ? left : left - 1;
-    return hystgen_reached(m->w, hystgen_activation(&corner[owner], t->threshold[k - 1], rising), rising);
+    return hystgen_reached(m->w, hystgen_entered(t, corner, left, m->depth, k, rising), rising);
 }
 
 /* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
-static void hystgen_corners_advance(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
+static void hystgen_corners_search(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
     const hystgen_reach_t w = m->w;
     const bool rising = m->rising;
     unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
     unsigned int k = m->k;
-    if (hystgen_foretold(t, m, corner)) {
-        left = m->hint_depth;
-        k = m->hint_k;
-    } else {
-        unsigned int low = 0;
-        unsigned int probe = left;
-        while (low < left) {
-            const hystgen_corner_t *c = &corner[probe - 1];
-            if (hystgen_reached(w, hystgen_activation(c, t->threshold[c->end - 1], rising), rising)) {
-                left = probe - 1;
-                k = c->end;
-            } else {
-                low = probe;
-            }
-            probe = (low + left + 1) / 2;
+    unsigned int low = 0;
+    unsigned int probe = left;
+    while (low < left) {
+        const hystgen_corner_t *c = &corner[probe - 1];
+        if (hystgen_reached(w, hystgen_activation(c, t->threshold[c->end - 1], rising), rising)) {
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
         }
-        if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
-            const hystgen_corner_t *c = &corner[left - 1];
-            k = hystgen_gallop_thresholds(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
-        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
+        const hystgen_corner_t *c = &corner[left - 1];
+        k = hystgen_gallop_thresholds(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
     }
     m->depth = (uint_least16_t)left;
     m->k = (uint_least16_t)k;
@@ -177,7 +173,7 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
 /* Output of the play sum for the memory as it is. */
 HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
 {
-    return m->base + (hystgen_sum_t)m->w * t->slope[m->k];
+    return m->anchor_output + ((hystgen_sum_t)m->w - m->anchor) * t->slope[m->k];
 }
 
 /* Writes the corner that turning back leaves into slot c. */
@@ -193,18 +189,27 @@ static void hystgen_push_corner(const hystgen_tables_t *t, const hystgen_memory_
 HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                                         hystgen_play_t w)
 {
-    if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
-        if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
+    const bool turned = m->rising ? w < m->w : w > m->w;
+    if (turned) {       /* the plays that followed stay where they are */
+        if (m->k > 1) { /* a corner that owns no play but the input itself is none */
             hystgen_push_corner(t, m, &corner[m->depth]);
             m->depth = (uint_least16_t)(m->depth + 1u);
         }
         m->rising = !m->rising;
         m->k = 1;
-        hystgen_corners_settle(t, m, corner);
     }
     m->w = w;
-    if (hystgen_reached(w, m->next, m->rising)) {
-        hystgen_corners_advance(t, m, corner);
+    if (m->hint_k > m->k && hystgen_foretold(t, m, corner)) {
+        m->depth = m->hint_depth;
+        m->k = m->hint_k;
+        hystgen_corners_settle(t, m, corner);
+    } else {
+        if (turned) {
+            hystgen_corners_settle(t, m, corner);
+        }
+        if (hystgen_reached(w, m->next, m->rising)) {
+            hystgen_corners_search(t, m, corner);
+        }
     }
     m->hint_k = 0;
 }

@@ -1,16 +1,5 @@
 #include "hystgen_runtime.h"
 
-/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
-   play's threshold z_k says (36). */
-static hystgen_real_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
-{
-    const hystgen_real_t z = t->start_level[k];
-    if (rising) {
-        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
-    }
-    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
-}
-
 /* As hystgen_gallop_thresholds, over outputs. */
 static unsigned int hystgen_gallop_levels(const hystgen_sum_t *step, unsigned int k, unsigned int high, hystgen_sum_t x)
 {
@@ -31,13 +20,16 @@ static unsigned int hystgen_gallop_levels(const hystgen_sum_t *step, unsigned in
     return k;
 }
 
-/* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
+/* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `depth` corners.
+   Rounding is kept from leading out of the place that was found: then the plays that follow are those that will. */
 static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_memory_t *m,
-                                             const hystgen_corner_t *corner, unsigned int left, unsigned int k,
+                                             const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
                                              bool rising, hystgen_real_t output)
 {
     unsigned int low = 0;
+    unsigned int left = depth;
     unsigned int probe = left;
+    hystgen_real_t w;
     while (low < left) {
         const hystgen_corner_t *c = &corner[probe - 1];
         if (hystgen_reached(output, hystgen_level(t, c, c->end - 1u, rising), rising)) {
@@ -56,17 +48,32 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_
     m->hint_depth = (uint_least16_t)left;
     m->hint_rising = rising;
     if (left > 0) {
-        return (output - hystgen_base(t, &corner[left - 1], k, rising)) * t->inverse_slope[k];
+        const hystgen_corner_t *c = &corner[left - 1];
+        const hystgen_real_t last = hystgen_activation(c, t->threshold[k], rising);
+        w = hystgen_activation(c, t->threshold[k - 1], rising);
+        w = w + (output - hystgen_level(t, c, k - 1, rising)) * t->inverse_slope[k];
+        if (hystgen_reached(w, last, rising)) {
+            return last;
+        }
+    } else {
+        w = (rising ? output + t->all_lift : output - t->all_lift) * t->inverse_slope[k];
     }
-    return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
+    if (k > 1) {
+        const hystgen_real_t first = hystgen_entered(t, corner, left, depth, k, rising);
+        if (!hystgen_reached(w, first, rising)) {
+            return first;
+        }
+    }
+    return w;
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
+   that turning back would leave. */
 HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                  hystgen_corner_t *corner, hystgen_real_t output)
 {
-    const hystgen_real_t w = (output - m->base) * t->inverse_slope[m->k];
+    const hystgen_real_t w = m->anchor + (output - m->anchor_output) * t->inverse_slope[m->k];
     unsigned int depth = m->depth;
     if (m->rising ? w >= m->w : w <= m->w) {
         if (!hystgen_reached(w, m->next, m->rising)) {

@@ -1,16 +1,5 @@
 #include "hystgen_runtime.h"
 
-/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
-   play's threshold z_k says (36). */
-static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
-{
-    const hystgen_sum_t z = t->start_level[k];
-    if (rising) {
-        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
-    }
-    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
-}
-
 static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
 {
     return rising ? output >= level : output <= level;
@@ -76,7 +65,8 @@ static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
+   that turning back would leave. */
 HYSTGEN_API hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                   hystgen_corner_t *corner, hystgen_sum_t output)
 {

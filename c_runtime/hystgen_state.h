@@ -13,15 +13,16 @@ typedef struct {
 
 /* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
 typedef struct {
-    hystgen_sum_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    hystgen_reach_t next;  /* w at which play k starts to follow */
-    hystgen_play_t w;      /* input of the plays, w = G[v] */
+    hystgen_sum_t anchor_output; /* while the same plays follow, output = anchor_output + (w - anchor) slope[k] */
+    hystgen_reach_t anchor;
+    hystgen_reach_t next;        /* w at which play k starts to follow */
+    hystgen_play_t w;            /* input of the plays, w = G[v] */
     uint_least16_t k;
-    uint_least16_t depth;  /* corners held */
-    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
+    uint_least16_t depth;        /* corners held */
+    uint_least16_t hint_k;       /* k and depth where the last answer lies, and on which way; 0 where that is not known */
     uint_least16_t hint_depth;
     bool hint_rising;
-    bool rising;           /* direction of the present move of w */
+    bool rising;                 /* direction of the present move of w */
 } hystgen_memory_t;
 
 #endif

@@ -29,7 +29,7 @@ MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
-W, BASE, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7
+W, ANCHOR, ANCHOR_OUTPUT, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7, 8
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 HINT_K, HINT_DEPTH, HINT_RISING = 9, 10, 11
 
@@ -93,7 +93,7 @@ def new_state(t: PlayTables) -> State:
     n = len(t.threshold) - 1
     dtype = t.threshold.dtype
     return State(
-        real=np.zeros(8, dtype),
+        real=np.zeros(9, dtype),
         counts=np.zeros(12, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         output=np.zeros(max(n, 1), dtype),
@@ -118,6 +118,17 @@ def activation(t: PlayTables, s: State, c: int, r: Any, rising: int) -> Any:
     return s.extremum[c] + multiple(t, s, c, rising) * r
 
 
+def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
+    """Output at the moment that play k, held by corner c, starts to follow."""
+    return s.output[c] + multiple(t, s, c, rising) * t.start_level[k]
+
+
+def all_follow(t: PlayTables, rising: int) -> Any:
+    """Output at w = 0 where every play follows."""
+    lift = t.lift[len(t.lift) - 1]
+    return -lift if rising else lift
+
+
 def reached(x: Any, level: Any, rising: int) -> bool:
     """Whether a move has come as far as `level`."""
     if rising:
@@ -125,25 +136,19 @@ def reached(x: Any, level: Any, rising: int) -> bool:
     return bool(x <= level)
 
 
-def base(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
-    """Output less w times slope[k] while plays 0 .. k-1 follow and corner c holds play k."""
-    return s.output[c] - multiple(t, s, c, rising) * t.lift[k] - s.extremum[c] * t.slope[k]
-
-
 def corners_settle(t: PlayTables, s: State) -> None:
-    """Bring base and next up to date after k, depth or the direction have changed."""
+    """Bring anchor and next up to date after k, depth or the direction have changed."""
     k = s.counts[K]
     rising = s.counts[RISING]
-    depth = s.counts[DEPTH]
-    if depth > 0:
-        s.real[BASE] = base(t, s, depth - 1, k, rising)
-        s.real[NEXT] = activation(t, s, depth - 1, t.threshold[k], rising)
-    elif rising:
-        s.real[BASE] = -t.lift[k]
-        s.real[NEXT] = t.limits[REAL_MAX]
+    c = s.counts[DEPTH] - 1
+    if c >= 0:
+        s.real[ANCHOR] = activation(t, s, c, t.threshold[k - 1], rising)
+        s.real[ANCHOR_OUTPUT] = level(t, s, c, k - 1, rising)
+        s.real[NEXT] = activation(t, s, c, t.threshold[k], rising)
     else:
-        s.real[BASE] = t.lift[k]
-        s.real[NEXT] = -t.limits[REAL_MAX]
+        s.real[ANCHOR] = t.limits[ZERO]
+        s.real[ANCHOR_OUTPUT] = all_follow(t, rising)
+        s.real[NEXT] = t.limits[REAL_MAX] if rising else -t.limits[REAL_MAX]
 
 
 def half(t: PlayTables, x: Any) -> Any:
@@ -180,29 +185,29 @@ def opposite(side: int, rising: int) -> bool:
     return side >= 0 if rising else side <= 0
 
 
+def entered(t: PlayTables, s: State, left: int, depth: int, k: int, rising: int) -> Any:
+    """Input from which on plays 0 .. k-1 follow when a move has left `left` of `depth` corners."""
+    owner = left - 1
+    if left < depth and s.end[left] == k:
+        owner = left
+    return activation(t, s, owner, t.threshold[k - 1], rising)
+
+
 def foretold(t: PlayTables, s: State) -> bool:
     """Whether the place that solving found is where the move has come to."""
     k = s.counts[HINT_K]
     left = s.counts[HINT_DEPTH]
     rising = s.counts[RISING]
-    if k <= s.counts[K] or rising != s.counts[HINT_RISING]:
+    if rising != s.counts[HINT_RISING]:
         return False
     w = s.real[W]
     if left > 0 and reached(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
         return False
-    owner = left - 1
-    if left < s.counts[DEPTH] and s.end[left] == k:
-        owner = left
-    return reached(w, activation(t, s, owner, t.threshold[k - 1], rising), rising)
+    return reached(w, entered(t, s, left, s.counts[DEPTH], k, rising), rising)
 
 
-def corners_advance(t: PlayTables, s: State) -> None:
+def corners_search(t: PlayTables, s: State) -> None:
     """The move has passed `next`: find the plays that follow now."""
-    if foretold(t, s):
-        s.counts[DEPTH] = s.counts[HINT_DEPTH]
-        s.counts[K] = s.counts[HINT_K]
-        corners_settle(t, s)
-        return
     w = s.real[W]
     rising = s.counts[RISING]
     low = 0
@@ -263,7 +268,7 @@ def corners_start(t: PlayTables, s: State, play: Reals) -> None:
 
 def corners_output(t: PlayTables, s: State) -> Any:
     """Output of the play sum for the memory as it is."""
-    return s.real[BASE] + s.real[W] * t.slope[s.counts[K]]
+    return s.real[ANCHOR_OUTPUT] + (s.real[W] - s.real[ANCHOR]) * t.slope[s.counts[K]]
 
 
 def push_corner(t: PlayTables, s: State, c: int) -> None:
@@ -280,30 +285,36 @@ def push_corner(t: PlayTables, s: State, c: int) -> None:
 def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     """Move the input of the plays to w."""
     rising = s.counts[RISING]
-    if (rising and w < s.real[W]) or (not rising and w > s.real[W]):
+    turned = (rising and w < s.real[W]) or (not rising and w > s.real[W])
+    if turned:
         if s.counts[K] > 1:
             push_corner(t, s, s.counts[DEPTH])
             s.counts[DEPTH] += 1
         s.counts[RISING] = 1 - rising
         s.counts[K] = 1
-        corners_settle(t, s)
     s.real[W] = w
-    if reached(w, s.real[NEXT], s.counts[RISING]):
-        corners_advance(t, s)
+    if s.counts[HINT_K] > s.counts[K] and foretold(t, s):
+        s.counts[DEPTH] = s.counts[HINT_DEPTH]
+        s.counts[K] = s.counts[HINT_K]
+        corners_settle(t, s)
+    else:
+        if turned:
+            corners_settle(t, s)
+        if reached(w, s.real[NEXT], s.counts[RISING]):
+            corners_search(t, s)
     s.counts[HINT_K] = 0
 
 
 # ---------------------------------------------------------------- corners_solve.c
 
 
-def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
-    """Output at the moment play k of corner c's block starts to follow."""
-    return s.output[c] + multiple(t, s, c, rising) * t.start_level[k]
+def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> Any:
+    """Input that gives `output` when plays 0 .. k-1 follow and `depth` corners hold the others.
 
-
-def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: Any) -> Any:
-    """Input that gives `output` when plays 0 .. k-1 follow and `left` corners hold the others."""
+    Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
+    """
     low = 0
+    left = depth
     probe = left
     while low < left:
         c = probe - 1
@@ -320,10 +331,18 @@ def corners_locate(t: Tables, s: State, left: int, k: int, rising: int, output: 
     s.counts[HINT_DEPTH] = left
     s.counts[HINT_RISING] = rising
     if left > 0:
-        return (output - base(t, s, c, k, rising)) * t.inverse_slope[k]
-    if rising:
-        return (output + t.lift[k]) * t.inverse_slope[k]
-    return (output - t.lift[k]) * t.inverse_slope[k]
+        w = activation(t, s, c, t.threshold[k - 1], rising)
+        w = w + (output - level(t, s, c, k - 1, rising)) * t.inverse_slope[k]
+        last = activation(t, s, c, t.threshold[k], rising)
+        if reached(w, last, rising):
+            return last
+    else:
+        w = (output - all_follow(t, rising)) * t.inverse_slope[k]
+    if k > 1:
+        first = entered(t, s, left, depth, k, rising)
+        if not reached(w, first, rising):
+            return first
+    return w
 
 
 def corners_solve(t: Tables, s: State, output: Any) -> Any:
@@ -331,7 +350,7 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
     k = s.counts[K]
     rising = s.counts[RISING]
     depth = s.counts[DEPTH]
-    w = (output - s.real[BASE]) * t.inverse_slope[k]
+    w = s.real[ANCHOR] + (output - s.real[ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if (rising and w >= s.real[W]) or (not rising and w <= s.real[W]):
         if not reached(w, s.real[NEXT], rising):
             return w
@@ -681,8 +700,9 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 
 
 COMPILED: list[Callable[..., Any]] = [
-    multiple, activation, reached, base, corners_settle, half, way, gallop, opposite, foretold, corners_advance,
-    corners_rest, corners_start, corners_output, push_corner, corners_absorb, level, corners_locate, corners_solve,
+    multiple, activation, level, all_follow, reached, corners_settle, half, way, gallop, opposite, entered, foretold,
+    corners_search, corners_rest, corners_start, corners_output, push_corner, corners_absorb, corners_locate,
+    corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
     front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer,
     clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,

@@ -128,7 +128,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
         for code in records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7].tolist():
             (plain.inverse_step if inverse else plain.forward_step)(whole, state, code)
-            sums = [abs(state.real[reference.BASE]), *map(abs, state.output)]
+            sums = [abs(state.real[reference.ANCHOR_OUTPUT]), *map(abs, state.output)]
             assert max(sums) <= form.largest_sum
             assert abs(state.real[reference.W]) < 2**31
             assert abs(plain.corners_output(whole, state)) <= form.largest_sum

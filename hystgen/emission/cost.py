@@ -33,7 +33,7 @@ def _struct(*fields: int) -> int:
 
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
-_STRUCTS = {"tables_t": 28, "dead_zone_t": 28}  # of pointers and counts
+_STRUCTS = {"dead_zone_t": 28}  # of pointers and counts
 
 
 def _constants(text: str, real: int, fixed: bool) -> int:
@@ -45,8 +45,8 @@ def _constants(text: str, real: int, fixed: bool) -> int:
             own = 7 * real
         elif kind.endswith("ends_t"):
             own = 16 + 2 * real + 8
-        elif kind.endswith("tables_t") and fixed:
-            own = 32 + 2 * real
+        elif kind.endswith("tables_t"):
+            own = 40 + 2 * real if fixed else 24 + 2 * real
         elif own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
@@ -67,7 +67,7 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         if not getattr(options, op):
             continue
         if corners:
-            memory = [_struct(sums, reach, play, 2, 2, 2, 2, 1, 1), max(n, 1) * _struct(sums, play, 2, 1)]
+            memory = [_struct(sums, reach, reach, play, 2, 2, 2, 2, 1, 1), max(n, 1) * _struct(sums, play, 2, 1)]
         else:
             memory = [(n + 1) * play]
         if op == "forward":

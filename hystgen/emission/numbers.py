@@ -74,11 +74,12 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
             ("threshold", "threshold", real_t, True),
             ("weight", "weight", real_t, not corners),
             ("slope", "slope", real_t, corners),
-            ("lift", "lift", real_t, corners or options.inverse),
-            ("start_level", "start_level", real_t, corners and options.inverse),
+            ("lift", "lift", real_t, options.inverse and not corners),
+            ("start_level", "start_level", real_t, corners),
             ("inverse_slope", "reciprocal", real_t, options.inverse),
         ],
     )
+    pointers.append(literal(numbers.lift[-1]))
     if len(numbers.start) > 1:
         arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
@@ -149,8 +150,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
             ("threshold", "threshold", f"{prefix}_play_t", True),
             ("weight", "weight", "int32_t", not corners),
             ("slope", "slope", "int32_t", corners or options.inverse),
-            ("lift", "lift", f"{prefix}_sum_t", corners),
-            ("start_level", "start_level", f"{prefix}_sum_t", corners and options.inverse),
+            ("start_level", "start_level", f"{prefix}_sum_t", corners),
             ("reciprocal", "reciprocal", "uint32_t", options.inverse),
             ("shift", "shift", "uint8_t", options.inverse),
         ],
@@ -158,7 +158,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     if len(numbers.start) > 1:
         arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
     margin = limits[fixed.MARGIN]
-    pointers += [literal(limits[fixed.PLAY_MIN] - margin), literal(limits[fixed.PLAY_MAX] + margin)]
+    pointers += [literal(numbers.lift[-1]), literal(limits[fixed.PLAY_MIN] - margin), literal(limits[fixed.PLAY_MAX] + margin)]
     fine = int(limits[fixed.FINE])
     units = parameters.units
     drive, output = (f" {unit}" if unit else "" for unit in (units.input, units.output))
