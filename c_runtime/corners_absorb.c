@@ -26,19 +26,19 @@ static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool risin
     return rising ? x >= level : x <= level;
 }
 
-/* Brings anchor and next up to date after k, depth or the direction have changed. The anchor is measured from the
-   corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
+   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p, const hystgen_corner_t *corner)
 {
-    if (m->depth > 0) {
-        const hystgen_corner_t *c = &corner[m->depth - 1];
-        m->anchor = hystgen_activation(c, t->threshold[m->k - 1], m->rising);
-        m->anchor_output = hystgen_level(t, c, m->k - 1u, m->rising);
-        m->next = hystgen_activation(c, t->threshold[m->k], m->rising);
+    if (p->depth > 0) {
+        const hystgen_corner_t *c = &corner[p->depth - 1];
+        p->anchor = hystgen_activation(c, t->threshold[p->k - 1], p->rising);
+        p->anchor_output = hystgen_level(t, c, p->k - 1u, p->rising);
+        p->next = hystgen_activation(c, t->threshold[p->k], p->rising);
     } else { /* every play follows */
-        m->anchor = 0;
-        m->anchor_output = m->rising ? -t->all_lift : t->all_lift;
-        m->next = m->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
+        p->anchor = 0;
+        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
+        p->next = p->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
     }
 }
 
@@ -88,25 +88,19 @@ static hystgen_reach_t hystgen_entered(const hystgen_tables_t *t, const hystgen_
 /* Whether the place that solving found is where the move has come to. */
 static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
-    const unsigned int k = m->hint_k;
-    const unsigned int left = m->hint_depth;
-    const bool rising = m->rising;
-    if (rising != m->hint_rising) {
-        return false;
-    }
-    if (left > 0 && hystgen_reached(m->w, hystgen_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
-        return false;
-    }
-    return hystgen_reached(m->w, hystgen_entered(t, corner, left, m->depth, k, rising), rising);
+    const hystgen_place_t *there = &m->there;
+    return there->rising == m->here.rising && !hystgen_reached(m->w, there->next, there->rising)
+        && hystgen_reached(m->w, hystgen_entered(t, corner, there->depth, m->here.depth, there->k, there->rising),
+                           there->rising);
 }
 
 /* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
 static void hystgen_corners_search(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
 {
     const hystgen_reach_t w = m->w;
-    const bool rising = m->rising;
-    unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
-    unsigned int k = m->k;
+    const bool rising = m->here.rising;
+    unsigned int left = m->here.depth; /* corners that stay; those from here on have been passed whole */
+    unsigned int k = m->here.k;
     unsigned int low = 0;
     unsigned int probe = left;
     while (low < left) {
@@ -123,9 +117,9 @@ static void hystgen_corners_search(const hystgen_tables_t *t, hystgen_memory_t *
         const hystgen_corner_t *c = &corner[left - 1];
         k = hystgen_gallop_thresholds(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
     }
-    m->depth = (uint_least16_t)left;
-    m->k = (uint_least16_t)k;
-    hystgen_corners_settle(t, m, corner);
+    m->here.depth = (uint_least16_t)left;
+    m->here.k = (uint_least16_t)k;
+    hystgen_corners_settle(t, &m->here, corner);
 }
 
 /* Memory at rest: every play holds w, nothing has moved yet. */
@@ -133,18 +127,18 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
                                       hystgen_play_t w)
 {
     m->w = w;
-    m->k = 1;
-    m->depth = 0;
-    m->rising = true;
-    m->hint_k = 0;
+    m->here.k = 1;
+    m->here.depth = 0;
+    m->here.rising = true;
+    m->there.k = 0;
     if (t->n > 0) {
         corner[0].extremum = w;
         corner[0].output = (hystgen_sum_t)w * t->slope[t->n + 1u];
         corner[0].end = (uint_least16_t)(t->n + 1);
         corner[0].side = 0;
-        m->depth = 1;
+        m->here.depth = 1;
     }
-    hystgen_corners_settle(t, m, corner);
+    hystgen_corners_settle(t, &m->here, corner);
 }
 
 /* Memory with a state of its own for each play: one corner a play. */
@@ -154,10 +148,10 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
     hystgen_sum_t above = 0;
     unsigned int j;
     m->w = play[0];
-    m->k = 1;
-    m->depth = t->n;
-    m->rising = true;
-    m->hint_k = 0;
+    m->here.k = 1;
+    m->here.depth = t->n;
+    m->here.rising = true;
+    m->there.k = 0;
     for (j = 0; j < t->n; ++j) {
         hystgen_corner_t *c = &corner[j];
         const unsigned int k = t->n - j;
@@ -167,13 +161,13 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
         c->end = (uint_least16_t)(k + 1);
         c->side = 0;
     }
-    hystgen_corners_settle(t, m, corner);
+    hystgen_corners_settle(t, &m->here, corner);
 }
 
 /* Output of the play sum for the memory as it is. */
 HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m)
 {
-    return m->anchor_output + ((hystgen_sum_t)m->w - m->anchor) * t->slope[m->k];
+    return m->here.anchor_output + ((hystgen_sum_t)m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
 /* Writes the corner that turning back leaves into slot c. */
@@ -181,35 +175,33 @@ static void hystgen_push_corner(const hystgen_tables_t *t, const hystgen_memory_
 {
     c->extremum = m->w;
     c->output = hystgen_corners_output(t, m);
-    c->end = m->k;
-    c->side = m->rising ? -1 : 1;
+    c->end = m->here.k;
+    c->side = m->here.rising ? -1 : 1;
 }
 
 /* Moves the input of the plays to w. */
 HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                                         hystgen_play_t w)
 {
-    const bool turned = m->rising ? w < m->w : w > m->w;
+    const bool turned = m->here.rising ? w < m->w : w > m->w;
     if (turned) {       /* the plays that followed stay where they are */
-        if (m->k > 1) { /* a corner that owns no play but the input itself is none */
-            hystgen_push_corner(t, m, &corner[m->depth]);
-            m->depth = (uint_least16_t)(m->depth + 1u);
+        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
+            hystgen_push_corner(t, m, &corner[m->here.depth]);
+            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         }
-        m->rising = !m->rising;
-        m->k = 1;
+        m->here.rising = !m->here.rising;
+        m->here.k = 1;
     }
     m->w = w;
-    if (m->hint_k > m->k && hystgen_foretold(t, m, corner)) {
-        m->depth = m->hint_depth;
-        m->k = m->hint_k;
-        hystgen_corners_settle(t, m, corner);
+    if (m->there.k > m->here.k && hystgen_foretold(t, m, corner)) {
+        m->here = m->there;
     } else {
         if (turned) {
-            hystgen_corners_settle(t, m, corner);
+            hystgen_corners_settle(t, &m->here, corner);
         }
-        if (hystgen_reached(w, m->next, m->rising)) {
+        if (hystgen_reached(w, m->here.next, m->here.rising)) {
             hystgen_corners_search(t, m, corner);
         }
     }
-    m->hint_k = 0;
+    m->there.k = 0;
 }

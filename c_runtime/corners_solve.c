@@ -26,6 +26,7 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_
                                              const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
                                              bool rising, hystgen_real_t output)
 {
+    hystgen_place_t *there = &m->there;
     unsigned int low = 0;
     unsigned int left = depth;
     unsigned int probe = left;
@@ -44,23 +45,19 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_
         const hystgen_corner_t *c = &corner[left - 1];
         k = hystgen_gallop_levels(t->start_level, k, c->end - 1u, hystgen_way(output, c->output, c->side, rising));
     }
-    m->hint_k = (uint_least16_t)k;
-    m->hint_depth = (uint_least16_t)left;
-    m->hint_rising = rising;
-    if (left > 0) {
-        const hystgen_corner_t *c = &corner[left - 1];
-        const hystgen_real_t last = hystgen_activation(c, t->threshold[k], rising);
-        w = hystgen_activation(c, t->threshold[k - 1], rising);
-        w = w + (output - hystgen_level(t, c, k - 1, rising)) * t->inverse_slope[k];
-        if (hystgen_reached(w, last, rising)) {
-            return last;
-        }
-    } else {
-        w = (rising ? output + t->all_lift : output - t->all_lift) * t->inverse_slope[k];
+    there->k = (uint_least16_t)k;
+    there->depth = (uint_least16_t)left;
+    there->rising = rising;
+    hystgen_corners_settle(t, there, corner);
+    w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
+    if (hystgen_reached(w, there->next, rising)) {
+        there->k = 0;
+        return there->next;
     }
     if (k > 1) {
         const hystgen_real_t first = hystgen_entered(t, corner, left, depth, k, rising);
         if (!hystgen_reached(w, first, rising)) {
+            there->k = 0;
             return first;
         }
     }
@@ -73,17 +70,19 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_
 HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                  hystgen_corner_t *corner, hystgen_real_t output)
 {
-    const hystgen_real_t w = m->anchor + (output - m->anchor_output) * t->inverse_slope[m->k];
-    unsigned int depth = m->depth;
-    if (m->rising ? w >= m->w : w <= m->w) {
-        if (!hystgen_reached(w, m->next, m->rising)) {
+    const hystgen_place_t *p = &m->here;
+    const hystgen_real_t w = p->anchor + (output - p->anchor_output) * t->inverse_slope[p->k];
+    unsigned int depth = p->depth;
+    if (p->rising ? w >= m->w : w <= m->w) {
+        if (!hystgen_reached(w, p->next, p->rising)) {
+            m->there = *p;
             return w; /* the same plays follow: the usual sample */
         }
-        return hystgen_corners_locate(t, m, corner, depth, m->k, m->rising, output);
+        return hystgen_corners_locate(t, m, corner, depth, p->k, p->rising, output);
     }
-    if (m->k > 1) {
+    if (p->k > 1) {
         hystgen_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
-    return hystgen_corners_locate(t, m, corner, depth, 1, !m->rising, output);
+    return hystgen_corners_locate(t, m, corner, depth, 1, !p->rising, output);
 }

@@ -58,9 +58,10 @@ static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen
             here = hystgen_level(t, c, k - 1, rising);
         }
     }
-    m->hint_k = (uint_least16_t)k;
-    m->hint_depth = (uint_least16_t)left;
-    m->hint_rising = rising;
+    m->there.k = (uint_least16_t)k;
+    m->there.depth = (uint_least16_t)left;
+    m->there.rising = rising;
+    hystgen_corners_settle(t, &m->there, corner);
     return hystgen_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
@@ -71,22 +72,22 @@ HYSTGEN_API hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hys
                                                   hystgen_corner_t *corner, hystgen_sum_t output)
 {
     const hystgen_sum_t here = hystgen_corners_output(t, m);
-    unsigned int depth = m->depth;
+    unsigned int depth = m->here.depth;
     if (output == here) {
         return m->w;
     }
-    if (m->rising && output > here) {
-        const hystgen_reach_t w = hystgen_going(t, m->w, output - here, m->k, true);
+    if (m->here.rising && output > here) {
+        const hystgen_reach_t w = hystgen_going(t, m->w, output - here, m->here.k, true);
         /* the reciprocal is off by less than 4 steps: short of that the same plays follow, the usual sample */
-        return w < m->next - 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->k, true, output);
+        return w < m->here.next - 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->here.k, true, output);
     }
-    if (!m->rising && output < here) {
-        const hystgen_reach_t w = hystgen_going(t, m->w, here - output, m->k, false);
-        return w > m->next + 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->k, false, output);
+    if (!m->here.rising && output < here) {
+        const hystgen_reach_t w = hystgen_going(t, m->w, here - output, m->here.k, false);
+        return w > m->here.next + 4 ? w : hystgen_corners_locate(t, m, corner, depth, m->here.k, false, output);
     }
-    if (m->k > 1) {
+    if (m->here.k > 1) {
         hystgen_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
-    return hystgen_corners_locate(t, m, corner, depth, 1, !m->rising, output);
+    return hystgen_corners_locate(t, m, corner, depth, 1, !m->here.rising, output);
 }

@@ -11,18 +11,21 @@ typedef struct {
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } hystgen_corner_t;
 
-/* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
+/* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
     hystgen_sum_t anchor_output; /* while the same plays follow, output = anchor_output + (w - anchor) slope[k] */
     hystgen_reach_t anchor;
     hystgen_reach_t next;        /* w at which play k starts to follow */
-    hystgen_play_t w;            /* input of the plays, w = G[v] */
     uint_least16_t k;
-    uint_least16_t depth;        /* corners held */
-    uint_least16_t hint_k;       /* k and depth where the last answer lies, and on which way; 0 where that is not known */
-    uint_least16_t hint_depth;
-    bool hint_rising;
-    bool rising;                 /* direction of the present move of w */
+    uint_least16_t depth;
+    bool rising;                 /* direction of w */
+} hystgen_place_t;
+
+/* The plays of one instance, with its corners. */
+typedef struct {
+    hystgen_place_t here;
+    hystgen_place_t there; /* where the answer that solving found last lies; k = 0 where it did not have to search */
+    hystgen_play_t w;      /* input of the plays, w = G[v] */
 } hystgen_memory_t;
 
 #endif

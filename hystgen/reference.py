@@ -335,12 +335,14 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
         w = w + (output - level(t, s, c, k - 1, rising)) * t.inverse_slope[k]
         last = activation(t, s, c, t.threshold[k], rising)
         if reached(w, last, rising):
+            s.counts[HINT_K] = 0
             return last
     else:
-        w = (output - all_follow(t, rising)) * t.inverse_slope[k]
+        w = t.limits[ZERO] + (output - all_follow(t, rising)) * t.inverse_slope[k]
     if k > 1:
         first = entered(t, s, left, depth, k, rising)
         if not reached(w, first, rising):
+            s.counts[HINT_K] = 0
             return first
     return w
 

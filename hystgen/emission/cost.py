@@ -67,7 +67,8 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         if not getattr(options, op):
             continue
         if corners:
-            memory = [_struct(sums, reach, reach, play, 2, 2, 2, 2, 1, 1), max(n, 1) * _struct(sums, play, 2, 1)]
+            place = _struct(sums, reach, reach, 2, 2, 1)
+            memory = [-(-(2 * place + play) // sums) * sums, max(n, 1) * _struct(sums, play, 2, 1)]
         else:
             memory = [(n + 1) * play]
         if op == "forward":
@@ -75,7 +76,7 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         else:
             fast = corners and not fixed and not cascade.stages
             fields = [real] * (4 + branches) + [1] * (3 + branches)
-            fields += [real] * 3 * fast + [1] * 2 * fast + [4, 4]
+            fields += [real] * 4 * fast + [1] * 2 * fast + [4, 4]
         widest = sums if corners else play
         whole = sum(memory) + _struct(*fields)
         sizes.append((op, -(-whole // widest) * widest))
