@@ -1,29 +1,36 @@
 #include "hystgen_runtime.h"
 
-/* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static hystgen_reach_t hystgen_activation(const hystgen_corner_t *c, hystgen_play_t threshold, bool rising)
+static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool rising)
 {
-    const hystgen_reach_t e = c->extremum;
-    const hystgen_reach_t r = threshold;
+    return rising ? x >= level : x <= level;
+}
+
+static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
+{
+    return rising ? output >= level : output <= level;
+}
+
+/* `steps`, a threshold or an output gained, gone on from what a corner holds to where its plays start to follow: two
+   after a turn, one from the start, none where the move leads back to where the corner was. */
+static hystgen_sum_t hystgen_from(hystgen_sum_t held, int side, hystgen_sum_t steps, bool rising)
+{
     if (rising) {
-        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
+        return side > 0 ? held + (steps + steps) : side == 0 ? held + steps : held;
     }
-    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
+    return side < 0 ? held - (steps + steps) : side == 0 ? held - steps : held;
+}
+
+/* The w at which play k, held by corner c, starts to follow a rising (falling) move. */
+static hystgen_reach_t hystgen_activation(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k,
+                                          bool rising)
+{
+    return (hystgen_reach_t)hystgen_from(c->extremum, c->side, t->threshold[k], rising);
 }
 
 /* The output at that moment: the corner's own, or as far from it as the inverse play's threshold z_k says (36). */
 static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
 {
-    const hystgen_sum_t z = t->start_level[k];
-    if (rising) {
-        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
-    }
-    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
-}
-
-static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool rising)
-{
-    return rising ? x >= level : x <= level;
+    return hystgen_from(c->output, c->side, t->start_level[k], rising);
 }
 
 /* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
@@ -32,17 +39,48 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p
 {
     if (p->depth > 0) {
         const hystgen_corner_t *c = &corner[p->depth - 1];
-        p->anchor = hystgen_activation(c, t->threshold[p->k - 1], p->rising);
-        p->anchor_output = hystgen_level(t, c, p->k - 1u, p->rising);
-        p->next = hystgen_activation(c, t->threshold[p->k], p->rising);
+        const hystgen_reach_t e = c->extremum;
+        const hystgen_sum_t y = c->output;
+        const hystgen_play_t *r = &t->threshold[p->k];
+        const hystgen_sum_t *z = &t->start_level[p->k];
+        const int side = c->side;
+        if (p->rising ? side < 0 : side > 0) {
+            p->anchor = e;
+            p->anchor_output = y;
+            p->next = e;
+            p->next_output = y;
+        } else {
+            hystgen_reach_t to_anchor = r[-1];
+            hystgen_reach_t to_next = r[0];
+            hystgen_sum_t to_anchor_output = z[-1];
+            hystgen_sum_t to_next_output = z[0];
+            if (side != 0) {
+                to_anchor = to_anchor + to_anchor;
+                to_next = to_next + to_next;
+                to_anchor_output = to_anchor_output + to_anchor_output;
+                to_next_output = to_next_output + to_next_output;
+            }
+            if (p->rising) {
+                p->anchor = e + to_anchor;
+                p->anchor_output = y + to_anchor_output;
+                p->next = e + to_next;
+                p->next_output = y + to_next_output;
+            } else {
+                p->anchor = e - to_anchor;
+                p->anchor_output = y - to_anchor_output;
+                p->next = e - to_next;
+                p->next_output = y - to_next_output;
+            }
+        }
     } else { /* every play follows */
         p->anchor = 0;
         p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
         p->next = p->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
+        p->next_output = p->rising ? HYSTGEN_SUM_MAX : -HYSTGEN_SUM_MAX;
     }
 }
 
-/* How far x lies from what corner c holds, in the measure of the thresholds. */
+/* How far x lies from what a corner holds, in the measure of the thresholds. */
 static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t since, int side, bool rising)
 {
     const hystgen_sum_t d = rising ? x - since : since - x;
@@ -55,57 +93,52 @@ static bool hystgen_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
-   most moves take one play at a time. */
-static unsigned int hystgen_gallop_thresholds(const hystgen_play_t *step, unsigned int k, unsigned int high,
-                                              hystgen_sum_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
+static unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, unsigned int k, unsigned int high,
+                                                  hystgen_sum_t x)
 {
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
+            }
         }
     }
     return k;
 }
 
-/* The w from which on plays 0 .. k-1 follow when a move has left `left` of `depth` corners. */
-static hystgen_reach_t hystgen_entered(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int left,
-                                       unsigned int depth, unsigned int k, bool rising)
+/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. Blocks
+   are passed whole or in part; the last one left is looked at first. */
+static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
+                                  unsigned int k, hystgen_reach_t w, hystgen_place_t *p)
 {
-    const unsigned int owner = left < depth && corner[left].end == k ? left : left - 1;
-    return hystgen_activation(&corner[owner], t->threshold[k - 1], rising);
-}
-
-/* Whether the place that solving found is where the move has come to. */
-static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner)
-{
-    const hystgen_place_t *there = &m->there;
-    return there->rising == m->here.rising && !hystgen_reached(m->w, there->next, there->rising)
-        && hystgen_reached(m->w, hystgen_entered(t, corner, there->depth, m->here.depth, there->k, there->rising),
-                           there->rising);
-}
-
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
-static void hystgen_corners_search(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner)
-{
-    const hystgen_reach_t w = m->w;
-    const bool rising = m->here.rising;
-    unsigned int left = m->here.depth; /* corners that stay; those from here on have been passed whole */
-    unsigned int k = m->here.k;
+    const bool rising = p->rising;
+    const hystgen_corner_t *c = &corner[depth - 1];
     unsigned int low = 0;
+    unsigned int left = depth - 1;
     unsigned int probe = left;
+    p->depth = (uint_least16_t)depth;
+    if (hystgen_opposite(c->side, rising)) {
+        k = hystgen_threshold_not_reached(t->threshold, k, c->end, hystgen_way(w, c->extremum, c->side, rising));
+        p->k = (uint_least16_t)k;
+        if (k < c->end) {
+            return;
+        }
+    } else if (!hystgen_reached(w, c->extremum, rising)) {
+        p->k = (uint_least16_t)k;
+        return;
+    }
+    k = c->end;
     while (low < left) {
-        const hystgen_corner_t *c = &corner[probe - 1];
-        if (hystgen_reached(w, hystgen_activation(c, t->threshold[c->end - 1], rising), rising)) {
+        c = &corner[probe - 1];
+        if (hystgen_reached(w, hystgen_activation(t, c, c->end - 1u, rising), rising)) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -114,12 +147,31 @@ static void hystgen_corners_search(const hystgen_tables_t *t, hystgen_memory_t *
         probe = (low + left + 1) / 2;
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
-        const hystgen_corner_t *c = &corner[left - 1];
-        k = hystgen_gallop_thresholds(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
+        c = &corner[left - 1];
+        k = hystgen_threshold_not_reached(t->threshold, k, c->end - 1u,
+                                          hystgen_way(w, c->extremum, c->side, rising));
     }
-    m->here.depth = (uint_least16_t)left;
-    m->here.k = (uint_least16_t)k;
-    hystgen_corners_settle(t, &m->here, corner);
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
+}
+
+/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. */
+static const hystgen_corner_t *hystgen_entered_by(const hystgen_corner_t *corner, unsigned int left,
+                                                  unsigned int depth, unsigned int k)
+{
+    return left < depth && corner[left].end == k ? &corner[left] : &corner[left - 1];
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner)
+{
+    const hystgen_place_t *there = &m->there;
+    const hystgen_corner_t *owner;
+    if (there->rising != m->here.rising || hystgen_reached(m->w, there->next, there->rising)) {
+        return false;
+    }
+    owner = hystgen_entered_by(corner, there->depth, m->here.depth, there->k);
+    return hystgen_reached(m->w, hystgen_activation(t, owner, there->k - 1u, there->rising), there->rising);
 }
 
 /* Memory at rest: every play holds w, nothing has moved yet. */
@@ -200,7 +252,8 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
             hystgen_corners_settle(t, &m->here, corner);
         }
         if (hystgen_reached(w, m->here.next, m->here.rising)) {
-            hystgen_corners_search(t, m, corner);
+            hystgen_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
+            hystgen_corners_settle(t, &m->here, corner);
         }
     }
     m->there.k = 0;

@@ -1,25 +1,5 @@
 #include "hystgen_runtime.h"
 
-/* As hystgen_gallop_thresholds, over outputs. */
-static unsigned int hystgen_gallop_levels(const hystgen_sum_t *step, unsigned int k, unsigned int high, hystgen_sum_t x)
-{
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
-        }
-    }
-    return k;
-}
-
 /* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `depth` corners.
    Rounding is kept from leading out of the place that was found: then the plays that follow are those that will. */
 static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_memory_t *m,
@@ -27,35 +7,19 @@ static hystgen_real_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_
                                              bool rising, hystgen_real_t output)
 {
     hystgen_place_t *there = &m->there;
-    unsigned int low = 0;
-    unsigned int left = depth;
-    unsigned int probe = left;
     hystgen_real_t w;
-    while (low < left) {
-        const hystgen_corner_t *c = &corner[probe - 1];
-        if (hystgen_reached(output, hystgen_level(t, c, c->end - 1u, rising), rising)) {
-            left = probe - 1;
-            k = c->end;
-        } else {
-            low = probe;
-        }
-        probe = (low + left + 1) / 2;
-    }
-    if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
-        const hystgen_corner_t *c = &corner[left - 1];
-        k = hystgen_gallop_levels(t->start_level, k, c->end - 1u, hystgen_way(output, c->output, c->side, rising));
-    }
-    there->k = (uint_least16_t)k;
-    there->depth = (uint_least16_t)left;
     there->rising = rising;
+    hystgen_find_by_output(t, corner, depth, k, output, there);
     hystgen_corners_settle(t, there, corner);
+    k = there->k;
     w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
     if (hystgen_reached(w, there->next, rising)) {
         there->k = 0;
         return there->next;
     }
     if (k > 1) {
-        const hystgen_real_t first = hystgen_entered(t, corner, left, depth, k, rising);
+        const hystgen_corner_t *owner = hystgen_entered_by(corner, there->depth, depth, k);
+        const hystgen_real_t first = hystgen_activation(t, owner, k - 1, rising);
         if (!hystgen_reached(w, first, rising)) {
             there->k = 0;
             return first;
@@ -74,11 +38,14 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     const hystgen_real_t w = p->anchor + (output - p->anchor_output) * t->inverse_slope[p->k];
     unsigned int depth = p->depth;
     if (p->rising ? w >= m->w : w <= m->w) {
-        if (!hystgen_reached(w, p->next, p->rising)) {
-            m->there = *p;
-            return w; /* the same plays follow: the usual sample */
+        if (hystgen_passed(output, p->next_output, p->rising)) {
+            return hystgen_corners_locate(t, m, corner, depth, p->k + 1u, p->rising, output);
         }
-        return hystgen_corners_locate(t, m, corner, depth, p->k, p->rising, output);
+        if (hystgen_reached(w, p->next, p->rising)) {
+            return p->next;
+        }
+        m->there = *p;
+        return w; /* the same plays follow: the usual sample */
     }
     if (p->k > 1) {
         hystgen_push_corner(t, m, &corner[depth]);

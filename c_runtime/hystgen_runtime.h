@@ -19,6 +19,7 @@ typedef int32_t hystgen_play_t;
 typedef int64_t hystgen_reach_t;
 typedef int64_t hystgen_sum_t;
 #define HYSTGEN_REACH_MAX (INT64_MAX / 2)
+#define HYSTGEN_SUM_MAX (INT64_MAX / 2)
 #else
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 typedef double hystgen_real_t;
@@ -30,6 +31,7 @@ typedef float hystgen_real_t;
 typedef hystgen_real_t hystgen_play_t;
 typedef hystgen_real_t hystgen_reach_t;
 typedef hystgen_real_t hystgen_sum_t;
+#define HYSTGEN_SUM_MAX HYSTGEN_REACH_MAX
 #endif
 #define HYSTGEN_API
 

@@ -14,8 +14,9 @@ typedef struct {
 /* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
     hystgen_sum_t anchor_output; /* while the same plays follow, output = anchor_output + (w - anchor) slope[k] */
+    hystgen_sum_t next_output;   /* output at which play k starts to follow */
     hystgen_reach_t anchor;
-    hystgen_reach_t next;        /* w at which play k starts to follow */
+    hystgen_reach_t next;        /* w at which it does */
     uint_least16_t k;
     uint_least16_t depth;
     bool rising;                 /* direction of w */

@@ -21,7 +21,7 @@ from hystgen.reference import (
     HINT_DEPTH,
     HINT_K,
     HINT_RISING,
-    NEXT,
+    NEXT_OUTPUT,
     OFFSET,
     RISING,
     K,
@@ -29,18 +29,17 @@ from hystgen.reference import (
     State,
     W,
     activation,
+    corners_find,
     corners_output,
-    gallop,
+    entered_by,
     level,
     loop_output,
-    opposite,
     push_corner,
     reached,
-    way,
 )
 
 # more places in `limits`, after those of `hystgen.reference`
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SLACK = 16, 17, 18, 19, 20, 21, 22
+PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX = 16, 17, 18, 19, 20, 21
 
 HALF = 1 << 30
 
@@ -111,33 +110,19 @@ def going(t: FixedTables, w: Any, d: Any, k: int, rising: int) -> Any:
     return w - step
 
 
-def corners_locate(t: FixedTables, s: State, left: int, k: int, rising: int, output: Any) -> Any:
-    """Input that gives `output` when plays 0 .. k-1 follow and `left` corners hold the others."""
-    w = s.real[W]
-    here = corners_output(t, s)
-    low = 0
-    probe = left
-    while low < left:
-        c = probe - 1
-        there = level(t, s, c, s.end[c] - 1, rising)
-        if reached(output, there, rising):
-            w = activation(t, s, c, t.threshold[s.end[c] - 1], rising)
-            here = there
-            left = c
-            k = s.end[c]
-        else:
-            low = probe
-        probe = (low + left + 1) // 2
-    c = left - 1
-    if left > 0 and opposite(s.side[c], rising):
-        begun = k
-        k = gallop(t.start_level, k, s.end[c] - 1, way(t, output, s.output[c], s.side[c], rising))
-        if k > begun:
-            w = activation(t, s, c, t.threshold[k - 1], rising)
-            here = level(t, s, c, k - 1, rising)
+def corners_locate(t: FixedTables, s: State, depth: int, begun: int, k: int, rising: int, output: Any) -> Any:
+    """Input that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the others."""
+    left, k = corners_find(t, s, depth, k, rising, output, s.output, t.start_level)
     s.counts[HINT_K] = k
     s.counts[HINT_DEPTH] = left
     s.counts[HINT_RISING] = rising
+    if k > begun:  # the last place known to be passed, and the output there
+        owner = entered_by(s, left, depth, k)
+        w = activation(t, s, owner, t.threshold[k - 1], rising)
+        here = level(t, s, owner, k - 1, rising)
+    else:
+        w = s.real[W]
+        here = corners_output(t, s)
     if rising:
         return going(t, w, output - here, k, rising)
     return going(t, w, here - output, k, rising)
@@ -152,20 +137,16 @@ def corners_solve(t: FixedTables, s: State, output: Any) -> Any:
     here = corners_output(t, s)
     if output == here:
         return w
-    if rising and output > here:
-        w = going(t, w, output - here, k, rising)
-        if w < s.real[NEXT] - t.limits[SLACK]:
-            return w
-        return corners_locate(t, s, depth, k, rising, output)
-    if not rising and output < here:
-        w = going(t, w, here - output, k, rising)
-        if w > s.real[NEXT] + t.limits[SLACK]:
-            return w
-        return corners_locate(t, s, depth, k, rising, output)
+    if (rising and output > here) or (not rising and output < here):
+        if reached(output, s.real[NEXT_OUTPUT], rising):
+            return corners_locate(t, s, depth, k, k + 1, rising, output)
+        if rising:
+            return going(t, w, output - here, k, rising)
+        return going(t, w, here - output, k, rising)
     if k > 1:
         push_corner(t, s, depth)
         depth = depth + 1
-    return corners_locate(t, s, depth, 1, 1 - rising, output)
+    return corners_locate(t, s, depth, 1, 1, 1 - rising, output)
 
 
 def loop_solve(t: FixedTables, s: State, output: Any) -> Any:
@@ -266,8 +247,8 @@ _OWN: list[Callable[..., Any]] = [
 _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
-    "multiple", "activation", "level", "all_follow", "reached", "corners_settle", "way", "gallop", "opposite",
-    "entered", "foretold", "corners_search", "corners_rest", "corners_start", "push_corner", "corners_absorb",
+    "multiple", "activation", "level", "all_follow", "reached", "corners_settle", "way", "not_reached", "opposite",
+    "corners_find", "entered_by", "foretold", "corners_rest", "corners_start", "push_corner", "corners_absorb",
     "corners_output", "loop_rest", "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip
 

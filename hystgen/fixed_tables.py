@@ -264,7 +264,7 @@ class _Builder:
 
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = [0] * 23
+        limits = [0] * 22
         limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX] = self.drive
         limits[reference.OUTPUT_MIN], limits[reference.OUTPUT_MAX] = self.output
         limits[reference.OFFSET] = self.offset
@@ -277,7 +277,7 @@ class _Builder:
         limits[reference.MULTIPLE - 2 : reference.MULTIPLE + 3] = [-2, -1, 0, 1, 2]
         limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] = self.play
         limits[fixed.MARGIN], limits[fixed.FRACTION] = self.margin, self.bits
-        limits[fixed.FINE], limits[fixed.CODE_MAX], limits[fixed.SLACK] = self.fine, self.code_max, 4
+        limits[fixed.FINE], limits[fixed.CODE_MAX] = self.fine, self.code_max
         curves = self.front
         pieces = [piece for curve in curves for piece in curve.pieces]
 

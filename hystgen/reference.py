@@ -29,7 +29,7 @@ MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
-W, ANCHOR, ANCHOR_OUTPUT, NEXT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+W, ANCHOR, ANCHOR_OUTPUT, NEXT, NEXT_OUTPUT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 HINT_K, HINT_DEPTH, HINT_RISING = 9, 10, 11
 
@@ -93,7 +93,7 @@ def new_state(t: PlayTables) -> State:
     n = len(t.threshold) - 1
     dtype = t.threshold.dtype
     return State(
-        real=np.zeros(9, dtype),
+        real=np.zeros(10, dtype),
         counts=np.zeros(12, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         output=np.zeros(max(n, 1), dtype),
@@ -145,10 +145,12 @@ def corners_settle(t: PlayTables, s: State) -> None:
         s.real[ANCHOR] = activation(t, s, c, t.threshold[k - 1], rising)
         s.real[ANCHOR_OUTPUT] = level(t, s, c, k - 1, rising)
         s.real[NEXT] = activation(t, s, c, t.threshold[k], rising)
+        s.real[NEXT_OUTPUT] = level(t, s, c, k, rising)
     else:
         s.real[ANCHOR] = t.limits[ZERO]
         s.real[ANCHOR_OUTPUT] = all_follow(t, rising)
         s.real[NEXT] = t.limits[REAL_MAX] if rising else -t.limits[REAL_MAX]
+        s.real[NEXT_OUTPUT] = s.real[NEXT]
 
 
 def half(t: PlayTables, x: Any) -> Any:
@@ -164,19 +166,18 @@ def way(t: PlayTables, x: Any, since: Any, side: int, rising: int) -> Any:
     return half(t, d)
 
 
-def gallop(steps: Reals, k: int, high: int, x: Any) -> int:
-    """First of the rising steps k .. high that x has not reached; high is known to be one."""
-    stride = 1
-    probe = k
-    while k < high:
-        if x >= steps[probe]:
-            k = probe + 1
-            stride = stride * 2
-        else:
-            high = probe
-        probe = (k + high) // 2
-        if probe > k + stride - 1:
-            probe = k + stride - 1
+def not_reached(steps: Reals, k: int, high: int, x: Any) -> int:
+    """First of the rising steps k .. high-1 that x has not reached, or high; mostly it is one of the first two."""
+    if k < high and x >= steps[k]:
+        k += 1
+        if k < high and x >= steps[k]:
+            k += 1
+            while k < high:
+                middle = (k + high) // 2
+                if x >= steps[middle]:
+                    k = middle + 1
+                else:
+                    high = middle
     return k
 
 
@@ -185,12 +186,47 @@ def opposite(side: int, rising: int) -> bool:
     return side >= 0 if rising else side <= 0
 
 
-def entered(t: PlayTables, s: State, left: int, depth: int, k: int, rising: int) -> Any:
-    """Input from which on plays 0 .. k-1 follow when a move has left `left` of `depth` corners."""
-    owner = left - 1
+def corners_find(
+    t: PlayTables, s: State, depth: int, k: int, rising: int, x: Any, held: Reals, steps: Reals
+) -> tuple[int, int]:
+    """Corners that a move to x leaves of `depth`, and the plays that follow then; plays 0 .. k-1 are known to.
+
+    `held` and `steps` are the corners' extrema and the thresholds where x is an input of the plays, their outputs and
+    the start levels where x is an output. Blocks are passed whole or in part; the last one left is looked at first.
+    """
+    if depth == 0:
+        return 0, k
+    left = depth
+    c = left - 1
+    if opposite(s.side[c], rising):
+        k = not_reached(steps, k, s.end[c], way(t, x, held[c], s.side[c], rising))
+        if k < s.end[c]:
+            return left, k
+    elif not reached(x, held[c], rising):
+        return left, k
+    left = c
+    k = s.end[c]
+    low = 0
+    probe = left
+    while low < left:
+        c = probe - 1
+        if reached(x, held[c] + multiple(t, s, c, rising) * steps[s.end[c] - 1], rising):
+            left = c
+            k = s.end[c]
+        else:
+            low = probe
+        probe = (low + left + 1) // 2
+    c = left - 1
+    if left > 0 and opposite(s.side[c], rising):
+        k = not_reached(steps, k, s.end[c] - 1, way(t, x, held[c], s.side[c], rising))
+    return left, k
+
+
+def entered_by(s: State, left: int, depth: int, k: int) -> int:
+    """Corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1."""
     if left < depth and s.end[left] == k:
-        owner = left
-    return activation(t, s, owner, t.threshold[k - 1], rising)
+        return left
+    return left - 1
 
 
 def foretold(t: PlayTables, s: State) -> bool:
@@ -203,32 +239,8 @@ def foretold(t: PlayTables, s: State) -> bool:
     w = s.real[W]
     if left > 0 and reached(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
         return False
-    return reached(w, entered(t, s, left, s.counts[DEPTH], k, rising), rising)
-
-
-def corners_search(t: PlayTables, s: State) -> None:
-    """The move has passed `next`: find the plays that follow now."""
-    w = s.real[W]
-    rising = s.counts[RISING]
-    low = 0
-    left = s.counts[DEPTH]
-    k = s.counts[K]
-    probe = left
-    while low < left:
-        c = probe - 1
-        if reached(w, activation(t, s, c, t.threshold[s.end[c] - 1], rising), rising):
-            left = c
-            k = s.end[c]
-        else:
-            low = probe
-        probe = (low + left + 1) // 2
-    if left > 0:
-        c = left - 1
-        if opposite(s.side[c], rising):
-            k = gallop(t.threshold, k, s.end[c] - 1, way(t, w, s.extremum[c], s.side[c], rising))
-    s.counts[DEPTH] = left
-    s.counts[K] = k
-    corners_settle(t, s)
+    owner = entered_by(s, left, s.counts[DEPTH], k)
+    return reached(w, activation(t, s, owner, t.threshold[k - 1], rising), rising)
 
 
 def corners_rest(t: PlayTables, s: State, w: Any) -> None:
@@ -301,7 +313,12 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
         if turned:
             corners_settle(t, s)
         if reached(w, s.real[NEXT], s.counts[RISING]):
-            corners_search(t, s)
+            left, k = corners_find(
+                t, s, s.counts[DEPTH], s.counts[K] + 1, s.counts[RISING], w, s.extremum, t.threshold
+            )
+            s.counts[DEPTH] = left
+            s.counts[K] = k
+            corners_settle(t, s)
     s.counts[HINT_K] = 0
 
 
@@ -313,24 +330,12 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
 
     Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
     """
-    low = 0
-    left = depth
-    probe = left
-    while low < left:
-        c = probe - 1
-        if reached(output, level(t, s, c, s.end[c] - 1, rising), rising):
-            left = c
-            k = s.end[c]
-        else:
-            low = probe
-        probe = (low + left + 1) // 2
-    c = left - 1
-    if left > 0 and opposite(s.side[c], rising):
-        k = gallop(t.start_level, k, s.end[c] - 1, way(t, output, s.output[c], s.side[c], rising))
+    left, k = corners_find(t, s, depth, k, rising, output, s.output, t.start_level)
     s.counts[HINT_K] = k
     s.counts[HINT_DEPTH] = left
     s.counts[HINT_RISING] = rising
     if left > 0:
+        c = left - 1
         w = activation(t, s, c, t.threshold[k - 1], rising)
         w = w + (output - level(t, s, c, k - 1, rising)) * t.inverse_slope[k]
         last = activation(t, s, c, t.threshold[k], rising)
@@ -340,7 +345,7 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
     else:
         w = t.limits[ZERO] + (output - all_follow(t, rising)) * t.inverse_slope[k]
     if k > 1:
-        first = entered(t, s, left, depth, k, rising)
+        first = activation(t, s, entered_by(s, left, depth, k), t.threshold[k - 1], rising)
         if not reached(w, first, rising):
             s.counts[HINT_K] = 0
             return first
@@ -354,9 +359,11 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
     depth = s.counts[DEPTH]
     w = s.real[ANCHOR] + (output - s.real[ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if (rising and w >= s.real[W]) or (not rising and w <= s.real[W]):
-        if not reached(w, s.real[NEXT], rising):
-            return w
-        return corners_locate(t, s, depth, k, rising, output)
+        if reached(output, s.real[NEXT_OUTPUT], rising):
+            return corners_locate(t, s, depth, k + 1, rising, output)
+        if reached(w, s.real[NEXT], rising):
+            return s.real[NEXT]
+        return w
     if k > 1:
         push_corner(t, s, depth)
         depth = depth + 1
@@ -702,8 +709,8 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 
 
 COMPILED: list[Callable[..., Any]] = [
-    multiple, activation, level, all_follow, reached, corners_settle, half, way, gallop, opposite, entered, foretold,
-    corners_search, corners_rest, corners_start, corners_output, push_corner, corners_absorb, corners_locate,
+    multiple, activation, level, all_follow, reached, corners_settle, half, way, not_reached, opposite, corners_find,
+    entered_by, foretold, corners_rest, corners_start, corners_output, push_corner, corners_absorb, corners_locate,
     corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
     front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer,

@@ -23,6 +23,7 @@ FLOAT_KERNELS = (
     "dead_zone_inverse.c",
     "half_float.c",
     "corners_absorb.c",
+    "corners_find.c",
     "corners_solve.c",
     "loop_absorb.c",
     "loop_solve.c",
@@ -30,6 +31,7 @@ FLOAT_KERNELS = (
 FIXED_KERNELS = (
     "over_slope.c",
     "corners_absorb.c",
+    "corners_find.c",
     "corners_solve_fixed.c",
     "loop_absorb.c",
     "loop_solve_fixed.c",
@@ -42,13 +44,18 @@ class Family:
     """How an arithmetic appears in C: `bits` names it, `real` is the type of inputs and answers.
 
     In floating point every number has that type; in fixed point `reach` and `sum` are those of where plays start to
-    follow and of outputs before they are rounded, `reach_max` is beyond any of the former.
+    follow and of outputs before they are rounded, `reach_max` and `sum_max` are beyond any of them.
     """
 
     bits: str
     real: str
     reach_max: str
     reach: str = ""
+
+    @property
+    def sum_max(self) -> str:
+        """Beyond any output before it is rounded."""
+        return "(INT64_MAX / 2)" if self.fixed else self.reach_max
 
     @property
     def fixed(self) -> bool:
@@ -153,6 +160,7 @@ def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
     text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
+    text = text.replace("HYSTGEN_SUM_MAX", family.sum_max)
     return _named(text, prefix, family)
 
 

@@ -1,0 +1,62 @@
+#include "hystgen_runtime.h"
+
+/* As hystgen_threshold_not_reached, over outputs gained. */
+static unsigned int hystgen_level_not_reached(const hystgen_sum_t *step, unsigned int k, unsigned int high,
+                                              hystgen_sum_t x)
+{
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
+            }
+        }
+    }
+    return k;
+}
+
+/* As hystgen_find_by_input, for a move to an output. */
+static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
+                                   unsigned int k, hystgen_sum_t output, hystgen_place_t *p)
+{
+    const bool rising = p->rising;
+    const hystgen_corner_t *c = &corner[depth - 1];
+    unsigned int low = 0;
+    unsigned int left = depth - 1;
+    unsigned int probe = left;
+    p->depth = (uint_least16_t)depth;
+    if (hystgen_opposite(c->side, rising)) {
+        k = hystgen_level_not_reached(t->start_level, k, c->end, hystgen_way(output, c->output, c->side, rising));
+        p->k = (uint_least16_t)k;
+        if (k < c->end) {
+            return;
+        }
+    } else if (!hystgen_passed(output, c->output, rising)) {
+        p->k = (uint_least16_t)k;
+        return;
+    }
+    k = c->end;
+    while (low < left) {
+        c = &corner[probe - 1];
+        if (hystgen_passed(output, hystgen_level(t, c, c->end - 1u, rising), rising)) {
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
+        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
+        c = &corner[left - 1];
+        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u,
+                                      hystgen_way(output, c->output, c->side, rising));
+    }
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
+}
