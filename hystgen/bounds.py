@@ -4,10 +4,10 @@ Forward: rounded thresholds, start memory and stage constants move a play by no 
 play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
 roundoffs. In the corner list an output is computed from that of the corner below it, so that the roundings of up to n
 corners and of the output itself add up. With S = sum |p_i| max |w| + sum |p_i| r_i, which no play sum exceeds, one
-such step `y - m lift_k - e slope_k + w slope_k` (m at most 2) adds at most, in unit roundoffs: 2 S from the table's
-lift, 3 S for the first difference, S from the table's slope and S for the product with e, 2 S for the second
-difference, S and S for slope and product with w, S for the last sum; together 12 S. A corner of a start memory that
-is a list adds less: 2 S from two slopes, 2 S for their difference and the product, S for the sum.
+such step `(y + m z_(k-1)) + (w - (e + m r_(k-1))) slope_k` (m at most 2, z the start level) adds at most, in unit
+roundoffs, with a = |m r_(k-1)| and b the rest of the way from e to w, a + b at most 2 max |w|: sum |p_i| (2 a + 3 b)
+from the tables and products, S for the first sum, S for the anchor's, S for the last; together 9 S. A corner of a start
+memory that is a list adds less: 2 S from two slopes, 2 S for their difference and the product, S for the sum.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
 residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into
@@ -45,6 +45,15 @@ class ErrorBounds:
     rounding: float
 
 
+def largest_sum(cascade: Cascade) -> float:
+    """Size that nothing added up for a play sum exceeds: sum |p_i| max |w| + sum |p_i| r_i."""
+    pi = cascade.pi
+    total = math.fsum(abs(p) for p in pi.weights)
+    lift = math.fsum(abs(p) * r for p, r in zip(pi.weights, pi.thresholds, strict=True))
+    w = max(*(abs(end) for end in cascade.play_range), *(abs(s) for s in pi.start))
+    return total * w + lift
+
+
 def _stage_errors(
     stage: Stage, low: float, high: float, eps: float, kind: str, ascending: bool
 ) -> tuple[float, float, float]:
@@ -66,7 +75,6 @@ def _one(cascade: Cascade, kind: str, engine: str) -> tuple[float, float]:
     eps = float(np.finfo(kind).eps) / 2
     pi = cascade.pi
     total = math.fsum(abs(p) for p in pi.weights)
-    lift = math.fsum(abs(p) * r for p, r in zip(pi.weights, pi.thresholds, strict=True))
     w = max(*(abs(end) for end in cascade.play_range), *(abs(s) for s in pi.start))
     offset = abs(cascade.output_offset)
     drive = max(abs(end) for end in cascade.input_range)
@@ -80,9 +88,9 @@ def _one(cascade: Cascade, kind: str, engine: str) -> tuple[float, float]:
             residual = slope * residual + back
         front, front_inverse = max(front, error), max(front_inverse, residual)
 
-    size = total * w + lift  # nothing that is added up for an output is larger
+    size = largest_sum(cascade)
     states = front + eps * (4 * w + 5 * pi.thresholds[-1])
-    sums = (pi.n + 3) if engine == "loop" else 12 * (pi.n + 1)
+    sums = (pi.n + 3) if engine == "loop" else 9 * (pi.n + 1)
     forward = total * states + eps * (sums * size + 2 * (size + offset))
     solving = eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
     underflow = (8 * pi.n + 16) * float(np.finfo(kind).smallest_subnormal) * (1 + total)

@@ -23,12 +23,13 @@ class Cost:
     worst_case: list[tuple[str, str]]
 
 
-def _struct(*fields: int) -> int:
-    """Size of a C struct of these field sizes under natural alignment."""
-    at = 0
-    for size in fields:
-        at = -(-at // size) * size + size
-    return -(-at // max(fields)) * max(fields)
+def _struct(*fields: tuple[int, int]) -> tuple[int, int]:
+    """Size and alignment of a C struct of fields of these sizes and alignments."""
+    at, most = 0, 1
+    for size, alignment in fields:
+        at = -(-at // alignment) * alignment + size
+        most = max(most, alignment)
+    return -(-at // most) * most, most
 
 
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
@@ -66,20 +67,20 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
     for op in ("forward", "inverse"):
         if not getattr(options, op):
             continue
-        if corners:
-            place = _struct(sums, reach, reach, 2, 2, 1)
-            memory = [-(-(2 * place + play) // sums) * sums, max(n, 1) * _struct(sums, play, 2, 1)]
-        else:
-            memory = [(n + 1) * play]
-        if op == "forward":
-            fields = [real] * (1 + branches) + [1] * branches + [4]
-        else:
+        fields = [real] * (1 + branches) + [1] * branches + [4]
+        if op == "inverse":
             fast = corners and not fixed and not cascade.stages
-            fields = [real] * (4 + branches) + [1] * (3 + branches)
-            fields += [real] * 4 * fast + [1] * 2 * fast + [4, 4]
-        widest = sums if corners else play
-        whole = sum(memory) + _struct(*fields)
-        sizes.append((op, -(-whole // widest) * widest))
+            fields = [real] * (4 + 4 * fast + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
+        scalars = [(size, size) for size in fields]
+        if corners:
+            place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
+            memory = _struct(place, place, (play, play))
+            size, alignment = _struct(*((size, size) for size in (sums, play, 2, 1)))
+            order = [*scalars, memory] if op == "inverse" else [memory, *scalars]
+            whole = _struct(*order, (max(n, 1) * size, alignment))
+        else:
+            whole = _struct(*scalars, ((n + 1) * play, play))
+        sizes.append((op, whole[0]))
     worst = [(op, _worst(n, op, corners, numbers)) for op, _ in sizes]
     return Cost(_constants(text, reach if fixed else real, fixed), sizes, worst)
 

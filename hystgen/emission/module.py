@@ -183,7 +183,6 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
         inverse=options.inverse,
         branches=cascade.branches_differ,
     )
-    values.memory_fields = _memory_fields(values.play_t, prefix, n, corners)
     values.state_types = "" if shared or not corners else runtime.types("hystgen_state.h", (), prefix, values.family)
     values.kernels = _kernels(values, options)
     values.details = _details(parameters, cascade, options, values)
@@ -205,15 +204,6 @@ def _units(parameters: Parameters) -> SimpleNamespace:
         drive_words=f"Drive in {drive}" if drive else "Drive in the units of the parameter file",
         output_words=f"output and reference in {output}" if output else "output and reference likewise",
     )
-
-
-def _memory_fields(play_t: str, prefix: str, n: int, corners: bool) -> str:
-    if corners:
-        return (
-            f"    {prefix}_memory_t memory;\n"
-            f"    {prefix}_corner_t corner[{max(n, 1)}];"
-        )
-    return f"    {play_t} play[{n + 1}]; /* play 0 is the input of the plays */"
 
 
 def _kernels(values: SimpleNamespace, options: Options) -> str:

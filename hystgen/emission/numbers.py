@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hystgen import fixed, fixed_tables, reference, tables
-from hystgen.bounds import error_bounds
+from hystgen.bounds import error_bounds, largest_sum
 from hystgen.emission.text import literal, operand, table
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
@@ -95,6 +95,8 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "inverse_max_error": operand(_upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(_upward(bounds.rounding, dtype)) if options.inverse else "",
         "fast": options.inverse and corners and not stages,
+        "shy": literal(_upward(16 * float(np.finfo(dtype).eps) * (largest_sum(cascade) + abs(cascade.output_offset)), dtype)),
+        "half": literal(dtype(0.5)),
         "has_offset": bool(numbers.limits[reference.OFFSET]),
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
