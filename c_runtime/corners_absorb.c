@@ -5,6 +5,11 @@ static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool risin
     return rising ? x >= level : x <= level;
 }
 
+static bool hystgen_beyond_it(hystgen_reach_t x, hystgen_reach_t level, bool rising)
+{
+    return rising ? x > level : x < level;
+}
+
 static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
 {
     return rising ? output >= level : output <= level;
@@ -167,8 +172,11 @@ static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *
 {
     const hystgen_place_t *there = &m->there;
     const hystgen_corner_t *owner;
-    if (there->rising != m->here.rising || hystgen_reached(m->w, there->next, there->rising)) {
+    if (there->rising != m->here.rising || hystgen_beyond_it(m->w, there->next, there->rising)) {
         return false;
+    }
+    if (there->k == 1) {
+        return true;
     }
     owner = hystgen_entered_by(corner, there->depth, m->here.depth, there->k);
     return hystgen_reached(m->w, hystgen_activation(t, owner, there->k - 1u, there->rising), there->rising);
@@ -245,7 +253,7 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
         m->here.k = 1;
     }
     m->w = w;
-    if (m->there.k > m->here.k && hystgen_foretold(t, m, corner)) {
+    if (m->there.k > 0 && hystgen_foretold(t, m, corner)) {
         m->here = m->there;
     } else {
         if (turned) {

@@ -15,11 +15,12 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     bool rising = here->rising;
     if (rising ? w >= m->w : w <= m->w) {
         if (!hystgen_passed(output, here->next_output, rising)) {
-            if (hystgen_reached(w, here->next, rising)) {
-                return here->next;
+            if (!hystgen_reached(w, here->next, rising)) {
+                there->k = 0;
+                return w;
             }
             *there = *here;
-            return w;
+            return here->next;
         }
     } else { /* the move turns back */
         if (k > 2) {
@@ -34,15 +35,15 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     hystgen_corners_settle(t, there, corner);
     k = there->k;
     w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
-    if (hystgen_reached(w, there->next, rising)) {
-        there->k = 0;
+    if (hystgen_beyond_it(w, there->next, rising)) {
         return there->next;
     }
     if (k > 1) {
         const hystgen_corner_t *owner = hystgen_entered_by(corner, there->depth, depth, k);
         const hystgen_real_t first = hystgen_activation(t, owner, k - 1, rising);
         if (!hystgen_reached(w, first, rising)) {
-            there->k = 0;
+            there->anchor = first; /* so that later answers of the same move do not lie before this one */
+            there->anchor_output = output;
             return first;
         }
     }

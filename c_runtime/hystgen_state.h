@@ -25,7 +25,7 @@ typedef struct {
 /* The plays of one instance, with its corners. */
 typedef struct {
     hystgen_place_t here;
-    hystgen_place_t there; /* where the answer that solving found last lies; k = 0 where it did not have to search */
+    hystgen_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
     hystgen_play_t w;      /* input of the plays, w = G[v] */
 } hystgen_memory_t;
 

@@ -18,9 +18,6 @@ from hystgen.reference import (
     DEPTH,
     DRIVE_MAX,
     DRIVE_MIN,
-    HINT_DEPTH,
-    HINT_K,
-    HINT_RISING,
     NEXT_OUTPUT,
     OFFSET,
     RISING,
@@ -32,6 +29,7 @@ from hystgen.reference import (
     corners_find,
     corners_output,
     entered_by,
+    hint,
     level,
     loop_output,
     push_corner,
@@ -113,9 +111,7 @@ def going(t: FixedTables, w: Any, d: Any, k: int, rising: int) -> Any:
 def corners_locate(t: FixedTables, s: State, depth: int, begun: int, k: int, rising: int, output: Any) -> Any:
     """Input that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the others."""
     left, k = corners_find(t, s, depth, k, rising, output, s.output, t.start_level)
-    s.counts[HINT_K] = k
-    s.counts[HINT_DEPTH] = left
-    s.counts[HINT_RISING] = rising
+    hint(t, s, left, k, rising)
     if k > begun:  # the last place known to be passed, and the output there
         owner = entered_by(s, left, depth, k)
         w = activation(t, s, owner, t.threshold[k - 1], rising)
@@ -247,7 +243,7 @@ _OWN: list[Callable[..., Any]] = [
 _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
-    "multiple", "activation", "level", "all_follow", "reached", "corners_settle", "way", "not_reached", "opposite",
+    "multiple", "activation", "level", "beyond", "all_follow", "reached", "corners_settle", "hint", "way", "not_reached", "opposite",
     "corners_find", "entered_by", "foretold", "corners_rest", "corners_start", "push_corner", "corners_absorb",
     "corners_output", "loop_rest", "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip

@@ -29,7 +29,8 @@ MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
-W, ANCHOR, ANCHOR_OUTPUT, NEXT, NEXT_OUTPUT, PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+W, ANCHOR, ANCHOR_OUTPUT, NEXT, NEXT_OUTPUT, HINT_ANCHOR, HINT_ANCHOR_OUTPUT = 0, 1, 2, 3, 4, 5, 6
+PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 7, 8, 9, 10, 11
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 HINT_K, HINT_DEPTH, HINT_RISING = 9, 10, 11
 
@@ -93,7 +94,7 @@ def new_state(t: PlayTables) -> State:
     n = len(t.threshold) - 1
     dtype = t.threshold.dtype
     return State(
-        real=np.zeros(10, dtype),
+        real=np.zeros(12, dtype),
         counts=np.zeros(12, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         output=np.zeros(max(n, 1), dtype),
@@ -121,6 +122,13 @@ def activation(t: PlayTables, s: State, c: int, r: Any, rising: int) -> Any:
 def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
     """Output at the moment that play k, held by corner c, starts to follow."""
     return s.output[c] + multiple(t, s, c, rising) * t.start_level[k]
+
+
+def beyond(x: Any, level: Any, rising: int) -> bool:
+    """Whether a move has come farther than `level`."""
+    if rising:
+        return bool(x > level)
+    return bool(x < level)
 
 
 def all_follow(t: PlayTables, rising: int) -> Any:
@@ -237,8 +245,10 @@ def foretold(t: PlayTables, s: State) -> bool:
     if rising != s.counts[HINT_RISING]:
         return False
     w = s.real[W]
-    if left > 0 and reached(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
+    if left > 0 and beyond(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
         return False
+    if k == 1:
+        return True
     owner = entered_by(s, left, s.counts[DEPTH], k)
     return reached(w, activation(t, s, owner, t.threshold[k - 1], rising), rising)
 
@@ -305,10 +315,12 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
         s.counts[RISING] = 1 - rising
         s.counts[K] = 1
     s.real[W] = w
-    if s.counts[HINT_K] > s.counts[K] and foretold(t, s):
+    if s.counts[HINT_K] > 0 and foretold(t, s):
         s.counts[DEPTH] = s.counts[HINT_DEPTH]
         s.counts[K] = s.counts[HINT_K]
         corners_settle(t, s)
+        s.real[ANCHOR] = s.real[HINT_ANCHOR]
+        s.real[ANCHOR_OUTPUT] = s.real[HINT_ANCHOR_OUTPUT]
     else:
         if turned:
             corners_settle(t, s)
@@ -325,29 +337,36 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
 # ---------------------------------------------------------------- corners_solve.c
 
 
+def hint(t: PlayTables, s: State, left: int, k: int, rising: int) -> None:
+    """Leave word of the place where the answer lies."""
+    s.counts[HINT_K] = k
+    s.counts[HINT_DEPTH] = left
+    s.counts[HINT_RISING] = rising
+    if left > 0:
+        s.real[HINT_ANCHOR] = activation(t, s, left - 1, t.threshold[k - 1], rising)
+        s.real[HINT_ANCHOR_OUTPUT] = level(t, s, left - 1, k - 1, rising)
+    else:
+        s.real[HINT_ANCHOR] = t.limits[ZERO]
+        s.real[HINT_ANCHOR_OUTPUT] = all_follow(t, rising)
+
+
 def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> Any:
     """Input that gives `output` when plays 0 .. k-1 follow and `depth` corners hold the others.
 
     Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
     """
     left, k = corners_find(t, s, depth, k, rising, output, s.output, t.start_level)
-    s.counts[HINT_K] = k
-    s.counts[HINT_DEPTH] = left
-    s.counts[HINT_RISING] = rising
+    hint(t, s, left, k, rising)
+    w = s.real[HINT_ANCHOR] + (output - s.real[HINT_ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if left > 0:
-        c = left - 1
-        w = activation(t, s, c, t.threshold[k - 1], rising)
-        w = w + (output - level(t, s, c, k - 1, rising)) * t.inverse_slope[k]
-        last = activation(t, s, c, t.threshold[k], rising)
-        if reached(w, last, rising):
-            s.counts[HINT_K] = 0
+        last = activation(t, s, left - 1, t.threshold[k], rising)
+        if beyond(w, last, rising):
             return last
-    else:
-        w = t.limits[ZERO] + (output - all_follow(t, rising)) * t.inverse_slope[k]
     if k > 1:
         first = activation(t, s, entered_by(s, left, depth, k), t.threshold[k - 1], rising)
         if not reached(w, first, rising):
-            s.counts[HINT_K] = 0
+            s.real[HINT_ANCHOR] = first  # so that later answers of the same move do not lie before this one
+            s.real[HINT_ANCHOR_OUTPUT] = output
             return first
     return w
 
@@ -362,6 +381,11 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
         if reached(output, s.real[NEXT_OUTPUT], rising):
             return corners_locate(t, s, depth, k + 1, rising, output)
         if reached(w, s.real[NEXT], rising):
+            s.counts[HINT_K] = k
+            s.counts[HINT_DEPTH] = depth
+            s.counts[HINT_RISING] = rising
+            s.real[HINT_ANCHOR] = s.real[ANCHOR]
+            s.real[HINT_ANCHOR_OUTPUT] = s.real[ANCHOR_OUTPUT]
             return s.real[NEXT]
         return w
     if k > 1:
@@ -709,9 +733,9 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 
 
 COMPILED: list[Callable[..., Any]] = [
-    multiple, activation, level, all_follow, reached, corners_settle, half, way, not_reached, opposite, corners_find,
-    entered_by, foretold, corners_rest, corners_start, corners_output, push_corner, corners_absorb, corners_locate,
-    corners_solve,
+    multiple, activation, level, beyond, all_follow, reached, corners_settle, half, way, not_reached, opposite,
+    corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner, corners_absorb, hint,
+    corners_locate, corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
     front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer,
     clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,
