@@ -119,30 +119,17 @@ static unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, un
     return k;
 }
 
-/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. Blocks
-   are passed whole or in part; the last one left is looked at first. */
+/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
+   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
 static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
                                   unsigned int k, hystgen_reach_t w, hystgen_place_t *p)
 {
     const bool rising = p->rising;
-    const hystgen_corner_t *c = &corner[depth - 1];
     unsigned int low = 0;
-    unsigned int left = depth - 1;
+    unsigned int left = depth;
     unsigned int probe = left;
-    p->depth = (uint_least16_t)depth;
-    if (hystgen_opposite(c->side, rising)) {
-        k = hystgen_threshold_not_reached(t->threshold, k, c->end, hystgen_way(w, c->extremum, c->side, rising));
-        p->k = (uint_least16_t)k;
-        if (k < c->end) {
-            return;
-        }
-    } else if (!hystgen_reached(w, c->extremum, rising)) {
-        p->k = (uint_least16_t)k;
-        return;
-    }
-    k = c->end;
     while (low < left) {
-        c = &corner[probe - 1];
+        const hystgen_corner_t *c = &corner[probe - 1];
         if (hystgen_reached(w, hystgen_activation(t, c, c->end - 1u, rising), rising)) {
             left = probe - 1;
             k = c->end;
@@ -152,9 +139,8 @@ static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corne
         probe = (low + left + 1) / 2;
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
-        c = &corner[left - 1];
-        k = hystgen_threshold_not_reached(t->threshold, k, c->end - 1u,
-                                          hystgen_way(w, c->extremum, c->side, rising));
+        const hystgen_corner_t *c = &corner[left - 1];
+        k = hystgen_threshold_not_reached(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
     }
     p->depth = (uint_least16_t)left;
     p->k = (uint_least16_t)k;

@@ -26,24 +26,11 @@ static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corn
                                    unsigned int k, hystgen_sum_t output, hystgen_place_t *p)
 {
     const bool rising = p->rising;
-    const hystgen_corner_t *c = &corner[depth - 1];
     unsigned int low = 0;
-    unsigned int left = depth - 1;
+    unsigned int left = depth;
     unsigned int probe = left;
-    p->depth = (uint_least16_t)depth;
-    if (hystgen_opposite(c->side, rising)) {
-        k = hystgen_level_not_reached(t->start_level, k, c->end, hystgen_way(output, c->output, c->side, rising));
-        p->k = (uint_least16_t)k;
-        if (k < c->end) {
-            return;
-        }
-    } else if (!hystgen_passed(output, c->output, rising)) {
-        p->k = (uint_least16_t)k;
-        return;
-    }
-    k = c->end;
     while (low < left) {
-        c = &corner[probe - 1];
+        const hystgen_corner_t *c = &corner[probe - 1];
         if (hystgen_passed(output, hystgen_level(t, c, c->end - 1u, rising), rising)) {
             left = probe - 1;
             k = c->end;
@@ -53,9 +40,8 @@ static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corn
         probe = (low + left + 1) / 2;
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
-        c = &corner[left - 1];
-        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u,
-                                      hystgen_way(output, c->output, c->side, rising));
+        const hystgen_corner_t *c = &corner[left - 1];
+        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u, hystgen_way(output, c->output, c->side, rising));
     }
     p->depth = (uint_least16_t)left;
     p->k = (uint_least16_t)k;

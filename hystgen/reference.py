@@ -200,21 +200,11 @@ def corners_find(
     """Corners that a move to x leaves of `depth`, and the plays that follow then; plays 0 .. k-1 are known to.
 
     `held` and `steps` are the corners' extrema and the thresholds where x is an input of the plays, their outputs and
-    the start levels where x is an output. Blocks are passed whole or in part; the last one left is looked at first.
+    the start levels where x is an output. First the blocks that are passed whole, from the last one left by bisection,
+    then the plays of one block.
     """
-    if depth == 0:
-        return 0, k
-    left = depth
-    c = left - 1
-    if opposite(s.side[c], rising):
-        k = not_reached(steps, k, s.end[c], way(t, x, held[c], s.side[c], rising))
-        if k < s.end[c]:
-            return left, k
-    elif not reached(x, held[c], rising):
-        return left, k
-    left = c
-    k = s.end[c]
     low = 0
+    left = depth
     probe = left
     while low < left:
         c = probe - 1
