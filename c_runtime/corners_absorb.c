@@ -5,14 +5,9 @@ static bool hystgen_reached(hystgen_reach_t x, hystgen_reach_t level, bool risin
     return rising ? x >= level : x <= level;
 }
 
-static bool hystgen_beyond_it(hystgen_reach_t x, hystgen_reach_t level, bool rising)
+static bool hystgen_past(hystgen_reach_t x, hystgen_reach_t level, bool rising)
 {
     return rising ? x > level : x < level;
-}
-
-static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
-{
-    return rising ? output >= level : output <= level;
 }
 
 /* `steps`, a threshold or an output gained, gone on from what a corner holds to where its plays start to follow: two
@@ -30,12 +25,6 @@ static hystgen_reach_t hystgen_activation(const hystgen_tables_t *t, const hystg
                                           bool rising)
 {
     return (hystgen_reach_t)hystgen_from(c->extremum, c->side, t->threshold[k], rising);
-}
-
-/* The output at that moment: the corner's own, or as far from it as the inverse play's threshold z_k says (36). */
-static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
-{
-    return hystgen_from(c->output, c->side, t->start_level[k], rising);
 }
 
 /* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
@@ -85,11 +74,16 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p
     }
 }
 
-/* How far x lies from what a corner holds, in the measure of the thresholds. */
-static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t since, int side, bool rising)
+/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
+static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t held, int side)
 {
-    const hystgen_sum_t d = rising ? x - since : since - x;
-    return side == 0 ? d : hystgen_half(d);
+    return side == 0 ? x - held : hystgen_half(x - held);
+}
+
+/* Where the last play of a corner's block starts to follow a rising move. */
+static hystgen_sum_t hystgen_last_step(hystgen_sum_t held, int side, hystgen_sum_t steps)
+{
+    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
 }
 
 /* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
@@ -125,12 +119,13 @@ static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corne
                                   unsigned int k, hystgen_reach_t w, hystgen_place_t *p)
 {
     const bool rising = p->rising;
+    const hystgen_sum_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
     unsigned int left = depth;
     unsigned int probe = left;
     while (low < left) {
         const hystgen_corner_t *c = &corner[probe - 1];
-        if (hystgen_reached(w, hystgen_activation(t, c, c->end - 1u, rising), rising)) {
+        if (x >= hystgen_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -140,7 +135,7 @@ static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corne
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];
-        k = hystgen_threshold_not_reached(t->threshold, k, c->end - 1u, hystgen_way(w, c->extremum, c->side, rising));
+        k = hystgen_threshold_not_reached(t->threshold, k, c->end - 1u, hystgen_way(x, rising ? c->extremum : -c->extremum, c->side));
     }
     p->depth = (uint_least16_t)left;
     p->k = (uint_least16_t)k;
@@ -158,7 +153,7 @@ static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *
 {
     const hystgen_place_t *there = &m->there;
     const hystgen_corner_t *owner;
-    if (there->rising != m->here.rising || hystgen_beyond_it(m->w, there->next, there->rising)) {
+    if (there->rising != m->here.rising || hystgen_past(m->w, there->next, there->rising)) {
         return false;
     }
     if (there->k == 1) {
@@ -166,6 +161,18 @@ static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *
     }
     owner = hystgen_entered_by(corner, there->depth, m->here.depth, there->k);
     return hystgen_reached(m->w, hystgen_activation(t, owner, there->k - 1u, there->rising), there->rising);
+}
+
+/* Field by field, since compilers may call memcpy for a whole one. */
+HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
+{
+    to->anchor_output = from->anchor_output;
+    to->next_output = from->next_output;
+    to->anchor = from->anchor;
+    to->next = from->next;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
 }
 
 /* Memory at rest: every play holds w, nothing has moved yet. */
@@ -240,7 +247,7 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
     }
     m->w = w;
     if (m->there.k > 0 && hystgen_foretold(t, m, corner)) {
-        m->here = m->there;
+        hystgen_copy_place(&m->here, &m->there);
     } else {
         if (turned) {
             hystgen_corners_settle(t, &m->here, corner);

@@ -1,5 +1,10 @@
 #include "hystgen_runtime.h"
 
+static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
+{
+    return rising ? output >= level : output <= level;
+}
+
 /* As hystgen_threshold_not_reached, over outputs gained. */
 static unsigned int hystgen_level_not_reached(const hystgen_sum_t *step, unsigned int k, unsigned int high,
                                               hystgen_sum_t x)
@@ -26,12 +31,13 @@ static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corn
                                    unsigned int k, hystgen_sum_t output, hystgen_place_t *p)
 {
     const bool rising = p->rising;
+    const hystgen_sum_t x = rising ? output : -output; /* everything as a rising move sees it */
     unsigned int low = 0;
     unsigned int left = depth;
     unsigned int probe = left;
     while (low < left) {
         const hystgen_corner_t *c = &corner[probe - 1];
-        if (hystgen_passed(output, hystgen_level(t, c, c->end - 1u, rising), rising)) {
+        if (x >= hystgen_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -41,7 +47,7 @@ static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corn
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];
-        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u, hystgen_way(output, c->output, c->side, rising));
+        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u, hystgen_way(x, rising ? c->output : -c->output, c->side));
     }
     p->depth = (uint_least16_t)left;
     p->k = (uint_least16_t)k;

@@ -15,12 +15,8 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     bool rising = here->rising;
     if (rising ? w >= m->w : w <= m->w) {
         if (!hystgen_passed(output, here->next_output, rising)) {
-            if (!hystgen_reached(w, here->next, rising)) {
-                there->k = 0;
-                return w;
-            }
-            *there = *here;
-            return here->next;
+            there->k = 0;
+            return hystgen_reached(w, here->next, rising) ? here->next : w;
         }
     } else { /* the move turns back */
         if (k > 2) {
@@ -35,7 +31,7 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     hystgen_corners_settle(t, there, corner);
     k = there->k;
     w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
-    if (hystgen_beyond_it(w, there->next, rising)) {
+    if (hystgen_past(w, there->next, rising)) {
         return there->next;
     }
     if (k > 1) {

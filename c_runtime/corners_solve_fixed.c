@@ -1,5 +1,11 @@
 #include "hystgen_runtime.h"
 
+/* The output at which play k, held by corner c, starts to follow a rising (falling) move. */
+static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
+{
+    return hystgen_from(c->output, c->side, t->start_level[k], rising);
+}
+
 /* Input of the plays that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the
    others. Whole numbers decide which play follows last, so that every engine finds the same. */
 static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen_memory_t *m,

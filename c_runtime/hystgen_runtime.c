@@ -3,6 +3,7 @@
 #ifdef HYSTGEN_FIXED
 #include "over_slope.c"
 #include "corners_absorb.c"
+#include "corners_find.c"
 #include "corners_solve_fixed.c"
 #include "loop_absorb.c"
 #include "loop_solve_fixed.c"
@@ -21,6 +22,7 @@
 #include "dead_zone_inverse.c"
 #include "half_float.c"
 #include "corners_absorb.c"
+#include "corners_find.c"
 #include "corners_solve.c"
 #include "loop_absorb.c"
 #include "loop_solve.c"

@@ -55,6 +55,7 @@ hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_r
 hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y);
 #endif
 
+void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
 void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                           hystgen_play_t w);
 void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,

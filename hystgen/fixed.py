@@ -243,7 +243,7 @@ _OWN: list[Callable[..., Any]] = [
 _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
-    "multiple", "activation", "level", "beyond", "all_follow", "reached", "corners_settle", "hint", "way",
+    "multiple", "activation", "level", "past", "all_follow", "reached", "corners_settle", "hint", "way",
     "not_reached", "opposite", "corners_find", "entered_by", "foretold", "corners_rest", "corners_start",
     "push_corner", "corners_absorb", "corners_output", "loop_rest", "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip

@@ -124,7 +124,7 @@ def level(t: PlayTables, s: State, c: int, k: int, rising: int) -> Any:
     return s.output[c] + multiple(t, s, c, rising) * t.start_level[k]
 
 
-def beyond(x: Any, level: Any, rising: int) -> bool:
+def past(x: Any, level: Any, rising: int) -> bool:
     """Whether a move has come farther than `level`."""
     if rising:
         return bool(x > level)
@@ -235,7 +235,7 @@ def foretold(t: PlayTables, s: State) -> bool:
     if rising != s.counts[HINT_RISING]:
         return False
     w = s.real[W]
-    if left > 0 and beyond(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
+    if left > 0 and past(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
         return False
     if k == 1:
         return True
@@ -350,7 +350,7 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
     w = s.real[HINT_ANCHOR] + (output - s.real[HINT_ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if left > 0:
         last = activation(t, s, left - 1, t.threshold[k], rising)
-        if beyond(w, last, rising):
+        if past(w, last, rising):
             return last
     if k > 1:
         first = activation(t, s, entered_by(s, left, depth, k), t.threshold[k - 1], rising)
@@ -371,11 +371,6 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
         if reached(output, s.real[NEXT_OUTPUT], rising):
             return corners_locate(t, s, depth, k + 1, rising, output)
         if reached(w, s.real[NEXT], rising):
-            s.counts[HINT_K] = k
-            s.counts[HINT_DEPTH] = depth
-            s.counts[HINT_RISING] = rising
-            s.real[HINT_ANCHOR] = s.real[ANCHOR]
-            s.real[HINT_ANCHOR_OUTPUT] = s.real[ANCHOR_OUTPUT]
             return s.real[NEXT]
         return w
     if k > 1:
@@ -723,7 +718,7 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 
 
 COMPILED: list[Callable[..., Any]] = [
-    multiple, activation, level, beyond, all_follow, reached, corners_settle, half, way, not_reached, opposite,
+    multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner, corners_absorb, hint,
     corners_locate, corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,

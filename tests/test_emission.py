@@ -14,7 +14,8 @@ from modelfiles import FILES
 import hystgen
 from hystgen.api import Model
 from hystgen.params import parse_parameters
-from hystgen.verification import compilers
+from hystgen.verification import compilers, signals
+from hystgen.verification.comparison import REALS
 
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = ("self-contained", "single-header", "shared-runtime")
@@ -53,6 +54,50 @@ def test_bits_equal(name: str, arithmetic: str, engine: str) -> None:
 @pytest.mark.parametrize("name", ["listed", "mixed"])
 def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) -> None:
     check_codegen(name, arithmetic=arithmetic, layout=layout)
+
+
+SANITIZED = """
+#include "{name}.h"
+#include <stdio.h>
+int main(void)
+{{
+    static {name}_{op}_t self;
+    int call;
+    {name}_real_t x;
+    {name}_{op}_init(&self);
+    while ((call = getchar()) != EOF && fread(&x, sizeof x, 1, stdin) == 1) {{
+        switch (call) {{
+        case 0: (void){name}_{op}_step(&self, x); break;
+        case 1: {commit} break;
+        case 2: {name}_{op}_reset(&self, x); break;
+        default: {name}_{op}_init(&self); break;
+        }}
+    }}
+    return 0;
+}}
+"""
+
+
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("name", ["plain", "listed", "two_branches"])
+def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_path: Path) -> None:
+    """No access outside an object and no undefined behaviour over the verification records."""
+    gcc = next((c for c in required_compilers() if c.name == "gcc"), None)
+    if gcc is None:
+        pytest.skip("gcc and its sanitizers are not installed")
+    one = model(name)
+    hystgen.emit(one, tmp_path, operator="both", arithmetic=arithmetic, engine=engine)
+    numbers, real = one.tables(arithmetic, engine), REALS[arithmetic]
+    for op in ("forward", "inverse"):
+        commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
+        (tmp_path / "main.c").write_text(SANITIZED.format(name=name, op=op, commit=commit))
+        flags = ["-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+        gcc.run([*flags, "-I", tmp_path, tmp_path / "main.c", tmp_path / f"{name}.c", "-o", tmp_path / "run"])
+        for record, call, x in signals.suite(numbers, real, op == "inverse", 20_000):
+            calls = np.rec.fromarrays([call, x.astype(real)], dtype=[("call", "u1"), ("x", real)])
+            done = subprocess.run([tmp_path / "run"], input=calls.tobytes(), capture_output=True, check=False)
+            assert done.returncode == 0, f"{op}, {record}: {done.stderr.decode()}"
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

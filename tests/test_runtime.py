@@ -29,7 +29,7 @@ void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_
     hystgen_real_t play[65];
     int i;
     t.threshold = r; t.weight = p; t.slope = slope; t.lift = lift; t.start_level = start_level;
-    t.inverse_slope = inverse; t.n = n;
+    t.inverse_slope = inverse; t.all_lift = lift[n + 1]; t.n = n;
     hystgen_corners_rest(&t, &m, corner, 0);
     hystgen_loop_rest(&t, play, 0);
     for (i = 0; i < count; ++i) {

@@ -218,6 +218,8 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
         roots.add(f"hystgen_{engine}_output")
     if options.inverse:
         roots.add(f"hystgen_{engine}_solve")
+    if values.fast:
+        roots.add("hystgen_copy_place")
     types = {"hystgen_tables_t"} | {f"hystgen_{stage['kind']}_t" for stage in values.stages}
     for stage in values.stages:
         roots.add(f"hystgen_{stage['kind']}_forward")

@@ -95,7 +95,7 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "inverse_max_error": operand(_upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(_upward(bounds.rounding, dtype)) if options.inverse else "",
         "fast": options.inverse and corners and not stages,
-        "shy": literal(_upward(16 * float(np.finfo(dtype).eps) * (largest_sum(cascade) + abs(cascade.output_offset)), dtype)),
+        "shy": literal(_upward(_shy(cascade, float(np.finfo(dtype).eps)), dtype)),
         "half": literal(dtype(0.5)),
         "has_offset": bool(numbers.limits[reference.OFFSET]),
         "wide_t": f"{name}_real_t",
@@ -107,6 +107,16 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
 def _upward(x: float, dtype: Any) -> Any:
     rounded = dtype(x)
     return rounded if float(rounded) >= x else np.nextafter(rounded, dtype(np.inf))
+
+
+def _shy(cascade: Cascade, epsilon: float) -> float:
+    """How far short of the next play's output a straight piece is left.
+
+    In unit roundoffs, with S the largest sum: 4 S for the two start levels in the tables, 6 S for the two sums with
+    them, 4 S and 2 S for the same of the thresholds, 2 S each for the difference, the reciprocal and the product, S
+    for the last sum, S for taking this off, 2 S and twice the offset for adding and taking off the offset: below 32.
+    """
+    return 16 * epsilon * (largest_sum(cascade) + abs(cascade.output_offset))
 
 
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:
@@ -160,7 +170,8 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     if len(numbers.start) > 1:
         arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
     margin = limits[fixed.MARGIN]
-    pointers += [literal(numbers.lift[-1]), literal(limits[fixed.PLAY_MIN] - margin), literal(limits[fixed.PLAY_MAX] + margin)]
+    ends = (limits[fixed.PLAY_MIN] - margin, limits[fixed.PLAY_MAX] + margin)
+    pointers += [literal(number) for number in (numbers.lift[-1], *ends)]
     fine = int(limits[fixed.FINE])
     units = parameters.units
     drive, output = (f" {unit}" if unit else "" for unit in (units.input, units.output))

@@ -25,9 +25,10 @@ typedef struct {
     const bent_real_t *threshold;      /* r_0 = 0 .. r_n */
     const bent_real_t *weight;         /* p_0 .. p_n */
     const bent_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
-    const bent_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const bent_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1), for engine loop */
     const bent_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
     const bent_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
+    bent_real_t all_lift;              /* p_0 r_0 + ... + p_n r_n */
     uint_least16_t n;                     /* plays without r_0 */
 } bent_tables_t;
 
@@ -153,9 +154,10 @@ static const bent_real_t bent_reciprocal[8] = {
     0.3968253968253968, 0.3949447077409163
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; plays without r_0 */
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; the
+   whole sum of weight times threshold; plays without r_0 */
 static const bent_tables_t bent_tables = {
-    bent_threshold, bent_weight, NULL, bent_lift, NULL, bent_reciprocal, 6
+    bent_threshold, bent_weight, NULL, bent_lift, NULL, bent_reciprocal, 1.9224, 6
 };
 
 /* the straight pieces of the dead-zone sum */
@@ -300,6 +302,7 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
 {
     bent_real_t w;
     bent_real_t v;
+    bent_real_t asked;
     bent_real_t inside;
     unsigned int bits = 0;
     bool limited = false;
@@ -307,23 +310,21 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
         bent_inverse_see(self, self->pending);
         self->has_pending = false;
     }
-    if (!bent_finite(u)) {
-        self->status |= BENT_STATUS_HELD;
-        return bent_inverse_answer(self, self->stepped ? self->answer : bent_clamp_drive(self->applied));
+    asked = u;
+    if (!(u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX)) {
+        if (!bent_finite(u)) {
+            self->status |= BENT_STATUS_HELD;
+            return bent_inverse_answer(self, self->stepped ? self->answer : bent_clamp_drive(self->applied));
+        }
+        u = u < BENT_OUTPUT_MIN ? BENT_OUTPUT_MIN : BENT_OUTPUT_MAX;
+        bits = BENT_STATUS_INPUT_CLAMPED;
     }
-    if (self->repeat && !(u < self->reference) && !(u > self->reference)) {
+    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
         self->status |= self->bits;
         return bent_inverse_answer(self, self->answer);
     }
-    self->reference = u;
+    self->reference = asked;
     self->repeat = true;
-    if (u < BENT_OUTPUT_MIN) {
-        u = BENT_OUTPUT_MIN;
-        bits |= BENT_STATUS_INPUT_CLAMPED;
-    } else if (u > BENT_OUTPUT_MAX) {
-        u = BENT_OUTPUT_MAX;
-        bits |= BENT_STATUS_INPUT_CLAMPED;
-    }
     w = bent_loop_solve(&bent_tables, self->play, u - 0.0);
     v = bent_front_inverse(w, &limited);
     if (limited) {

@@ -17,10 +17,10 @@ typedef struct {
     const curved_play_t *threshold;  /* r_0 = 0 .. r_n, in least steps of the input of the plays */
     const int32_t *weight;            /* p_0 .. p_n, parts of an output code per such step */
     const int32_t *slope;             /* slope[k] = p_0 + ... + p_(k-1) */
-    const curved_sum_t *lift;        /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
     const curved_sum_t *start_level; /* output gained by the time play k starts to follow: z_0 .. z_n */
     const uint32_t *reciprocal;       /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
+    curved_sum_t all_lift;           /* p_0 r_0 + ... + p_n r_n */
     curved_reach_t least, most;      /* no input of the plays is asked for beyond these */
     uint_least16_t n;                 /* plays without r_0 */
 } curved_tables_t;
@@ -58,58 +58,90 @@ static curved_reach_t curved_going(const curved_tables_t *t, curved_reach_t w, c
     return step > (curved_sum_t)w - t->least ? t->least : (curved_reach_t)(w - step);
 }
 
-/* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static curved_reach_t curved_activation(const curved_corner_t *c, curved_play_t threshold, bool rising)
-{
-    const curved_reach_t e = c->extremum;
-    const curved_reach_t r = threshold;
-    if (rising) {
-        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
-    }
-    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
-}
-
 static bool curved_reached(curved_reach_t x, curved_reach_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
 }
 
-/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
-   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
-static curved_sum_t curved_base(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising)
+static bool curved_past(curved_reach_t x, curved_reach_t level, bool rising)
 {
-    curved_sum_t y = c->output;
-    if (c->side == 0) {
-        y = rising ? y - t->lift[k] : y + t->lift[k];
-    } else if (rising && c->side > 0) {
-        y = y - (t->lift[k] + t->lift[k]);
-    } else if (!rising && c->side < 0) {
-        y = y + (t->lift[k] + t->lift[k]);
-    }
-    return y - (curved_sum_t)c->extremum * t->slope[k];
+    return rising ? x > level : x < level;
 }
 
-/* Brings base and next up to date after k, depth or the direction have changed. */
-static void curved_corners_settle(const curved_tables_t *t, curved_memory_t *m, const curved_corner_t *corner)
+/* `steps`, a threshold or an output gained, gone on from what a corner holds to where its plays start to follow: two
+   after a turn, one from the start, none where the move leads back to where the corner was. */
+static curved_sum_t curved_from(curved_sum_t held, int side, curved_sum_t steps, bool rising)
 {
-    if (m->depth > 0) {
-        const curved_corner_t *c = &corner[m->depth - 1];
-        m->base = curved_base(t, c, m->k, m->rising);
-        m->next = curved_activation(c, t->threshold[m->k], m->rising);
-    } else if (m->rising) { /* every play follows */
-        m->base = -t->lift[m->k];
-        m->next = INT32_MAX;
-    } else {
-        m->base = t->lift[m->k];
-        m->next = -INT32_MAX;
+    if (rising) {
+        return side > 0 ? held + (steps + steps) : side == 0 ? held + steps : held;
+    }
+    return side < 0 ? held - (steps + steps) : side == 0 ? held - steps : held;
+}
+
+/* The w at which play k, held by corner c, starts to follow a rising (falling) move. */
+static curved_reach_t curved_activation(const curved_tables_t *t, const curved_corner_t *c, unsigned int k,
+                                          bool rising)
+{
+    return (curved_reach_t)curved_from(c->extremum, c->side, t->threshold[k], rising);
+}
+
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
+   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, const curved_corner_t *corner)
+{
+    if (p->depth > 0) {
+        const curved_corner_t *c = &corner[p->depth - 1];
+        const curved_reach_t e = c->extremum;
+        const curved_sum_t y = c->output;
+        const curved_play_t *r = &t->threshold[p->k];
+        const curved_sum_t *z = &t->start_level[p->k];
+        const int side = c->side;
+        if (p->rising ? side < 0 : side > 0) {
+            p->anchor = e;
+            p->anchor_output = y;
+            p->next = e;
+            p->next_output = y;
+        } else {
+            curved_reach_t to_anchor = r[-1];
+            curved_reach_t to_next = r[0];
+            curved_sum_t to_anchor_output = z[-1];
+            curved_sum_t to_next_output = z[0];
+            if (side != 0) {
+                to_anchor = to_anchor + to_anchor;
+                to_next = to_next + to_next;
+                to_anchor_output = to_anchor_output + to_anchor_output;
+                to_next_output = to_next_output + to_next_output;
+            }
+            if (p->rising) {
+                p->anchor = e + to_anchor;
+                p->anchor_output = y + to_anchor_output;
+                p->next = e + to_next;
+                p->next_output = y + to_next_output;
+            } else {
+                p->anchor = e - to_anchor;
+                p->anchor_output = y - to_anchor_output;
+                p->next = e - to_next;
+                p->next_output = y - to_next_output;
+            }
+        }
+    } else { /* every play follows */
+        p->anchor = 0;
+        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
+        p->next = p->rising ? INT32_MAX : -INT32_MAX;
+        p->next_output = p->rising ? (INT64_MAX / 2) : -(INT64_MAX / 2);
     }
 }
 
-/* How far x lies from what corner c holds, in the measure of the thresholds. */
-static curved_sum_t curved_way(curved_sum_t x, curved_sum_t since, int side, bool rising)
+/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
+static curved_sum_t curved_way(curved_sum_t x, curved_sum_t held, int side)
 {
-    const curved_sum_t d = rising ? x - since : since - x;
-    return side == 0 ? d : curved_half(d);
+    return side == 0 ? x - held : curved_half(x - held);
+}
+
+/* Where the last play of a corner's block starts to follow a rising move. */
+static curved_sum_t curved_last_step(curved_sum_t held, int side, curved_sum_t steps)
+{
+    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
 }
 
 /* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
@@ -118,185 +150,40 @@ static bool curved_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
-   most moves take one play at a time. */
-static unsigned int curved_gallop_thresholds(const curved_play_t *step, unsigned int k, unsigned int high,
-                                              curved_sum_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
+static unsigned int curved_threshold_not_reached(const curved_play_t *step, unsigned int k, unsigned int high,
+                                                  curved_sum_t x)
 {
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
-        }
-    }
-    return k;
-}
-
-/* Whether the place that solving found is where the move has come to. */
-static bool curved_foretold(const curved_tables_t *t, const curved_memory_t *m, const curved_corner_t *corner)
-{
-    const unsigned int k = m->hint_k;
-    const unsigned int left = m->hint_depth;
-    const bool rising = m->rising;
-    unsigned int owner;
-    if (k <= m->k || rising != m->hint_rising) {
-        return false;
-    }
-    if (left > 0 && curved_reached(m->w, curved_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
-        return false;
-    }
-    owner = left < m->depth && corner[left].end == k ? left : left - 1;
-    return curved_reached(m->w, curved_activation(&corner[owner], t->threshold[k - 1], rising), rising);
-}
-
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
-static void curved_corners_advance(const curved_tables_t *t, curved_memory_t *m, const curved_corner_t *corner)
-{
-    const curved_reach_t w = m->w;
-    const bool rising = m->rising;
-    unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
-    unsigned int k = m->k;
-    if (curved_foretold(t, m, corner)) {
-        left = m->hint_depth;
-        k = m->hint_k;
-    } else {
-        unsigned int low = 0;
-        unsigned int probe = left;
-        while (low < left) {
-            const curved_corner_t *c = &corner[probe - 1];
-            if (curved_reached(w, curved_activation(c, t->threshold[c->end - 1], rising), rising)) {
-                left = probe - 1;
-                k = c->end;
-            } else {
-                low = probe;
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
             }
-            probe = (low + left + 1) / 2;
-        }
-        if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
-            const curved_corner_t *c = &corner[left - 1];
-            k = curved_gallop_thresholds(t->threshold, k, c->end - 1u, curved_way(w, c->extremum, c->side, rising));
-        }
-    }
-    m->depth = (uint_least16_t)left;
-    m->k = (uint_least16_t)k;
-    curved_corners_settle(t, m, corner);
-}
-
-/* Memory at rest: every play holds w, nothing has moved yet. */
-static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
-                                      curved_play_t w)
-{
-    m->w = w;
-    m->k = 1;
-    m->depth = 0;
-    m->rising = true;
-    m->hint_k = 0;
-    if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = (curved_sum_t)w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
-        m->depth = 1;
-    }
-    curved_corners_settle(t, m, corner);
-}
-
-/* Output of the play sum for the memory as it is. */
-static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved_memory_t *m)
-{
-    return m->base + (curved_sum_t)m->w * t->slope[m->k];
-}
-
-/* Writes the corner that turning back leaves into slot c. */
-static void curved_push_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *c)
-{
-    c->extremum = m->w;
-    c->output = curved_corners_output(t, m);
-    c->end = m->k;
-    c->side = m->rising ? -1 : 1;
-}
-
-/* Moves the input of the plays to w. */
-static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
-                                        curved_play_t w)
-{
-    if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
-        if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            curved_push_corner(t, m, &corner[m->depth]);
-            m->depth = (uint_least16_t)(m->depth + 1u);
-        }
-        m->rising = !m->rising;
-        m->k = 1;
-        curved_corners_settle(t, m, corner);
-    }
-    m->w = w;
-    if (curved_reached(w, m->next, m->rising)) {
-        curved_corners_advance(t, m, corner);
-    }
-    m->hint_k = 0;
-}
-
-/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
-   play's threshold z_k says (36). */
-static curved_sum_t curved_level(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising)
-{
-    const curved_sum_t z = t->start_level[k];
-    if (rising) {
-        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
-    }
-    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
-}
-
-static bool curved_passed(curved_sum_t output, curved_sum_t level, bool rising)
-{
-    return rising ? output >= level : output <= level;
-}
-
-/* As curved_gallop_thresholds, over outputs. */
-static unsigned int curved_gallop_levels(const curved_sum_t *step, unsigned int k, unsigned int high, curved_sum_t x)
-{
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
         }
     }
     return k;
 }
 
-/* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners.
-   Whole numbers decide which play follows last, so that every engine finds the same. */
-static curved_reach_t curved_corners_locate(const curved_tables_t *t, curved_memory_t *m,
-                                              const curved_corner_t *corner, unsigned int left, unsigned int k,
-                                              bool rising, curved_sum_t output)
+/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
+   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+static void curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner, unsigned int depth,
+                                  unsigned int k, curved_reach_t w, curved_place_t *p)
 {
-    curved_reach_t w = m->w; /* the last place known to be passed, and the output there */
-    curved_sum_t here = curved_corners_output(t, m);
+    const bool rising = p->rising;
+    const curved_sum_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
+    unsigned int left = depth;
     unsigned int probe = left;
-    curved_sum_t there;
     while (low < left) {
         const curved_corner_t *c = &corner[probe - 1];
-        there = curved_level(t, c, c->end - 1u, rising);
-        if (curved_passed(output, there, rising)) {
-            w = curved_activation(c, t->threshold[c->end - 1u], rising);
-            here = there;
+        if (x >= curved_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -306,43 +193,214 @@ static curved_reach_t curved_corners_locate(const curved_tables_t *t, curved_mem
     }
     if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
         const curved_corner_t *c = &corner[left - 1];
-        const unsigned int begun = k;
-        k = curved_gallop_levels(t->start_level, k, c->end - 1u, curved_way(output, c->output, c->side, rising));
-        if (k > begun) {
-            w = curved_activation(c, t->threshold[k - 1], rising);
-            here = curved_level(t, c, k - 1, rising);
+        k = curved_threshold_not_reached(t->threshold, k, c->end - 1u, curved_way(x, rising ? c->extremum : -c->extremum, c->side));
+    }
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
+}
+
+/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. */
+static const curved_corner_t *curved_entered_by(const curved_corner_t *corner, unsigned int left,
+                                                  unsigned int depth, unsigned int k)
+{
+    return left < depth && corner[left].end == k ? &corner[left] : &corner[left - 1];
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool curved_foretold(const curved_tables_t *t, const curved_memory_t *m, const curved_corner_t *corner)
+{
+    const curved_place_t *there = &m->there;
+    const curved_corner_t *owner;
+    if (there->rising != m->here.rising || curved_past(m->w, there->next, there->rising)) {
+        return false;
+    }
+    if (there->k == 1) {
+        return true;
+    }
+    owner = curved_entered_by(corner, there->depth, m->here.depth, there->k);
+    return curved_reached(m->w, curved_activation(t, owner, there->k - 1u, there->rising), there->rising);
+}
+
+/* Field by field, since compilers may call memcpy for a whole one. */
+static void curved_copy_place(curved_place_t *to, const curved_place_t *from)
+{
+    to->anchor_output = from->anchor_output;
+    to->next_output = from->next_output;
+    to->anchor = from->anchor;
+    to->next = from->next;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
+/* Memory at rest: every play holds w, nothing has moved yet. */
+static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
+                                      curved_play_t w)
+{
+    m->w = w;
+    m->here.k = 1;
+    m->here.depth = 0;
+    m->here.rising = true;
+    m->there.k = 0;
+    if (t->n > 0) {
+        corner[0].extremum = w;
+        corner[0].output = (curved_sum_t)w * t->slope[t->n + 1u];
+        corner[0].end = (uint_least16_t)(t->n + 1);
+        corner[0].side = 0;
+        m->here.depth = 1;
+    }
+    curved_corners_settle(t, &m->here, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved_memory_t *m)
+{
+    return m->here.anchor_output + ((curved_sum_t)m->w - m->here.anchor) * t->slope[m->here.k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void curved_push_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = curved_corners_output(t, m);
+    c->end = m->here.k;
+    c->side = m->here.rising ? -1 : 1;
+}
+
+/* Moves the input of the plays to w. */
+static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
+                                        curved_play_t w)
+{
+    const bool turned = m->here.rising ? w < m->w : w > m->w;
+    if (turned) {       /* the plays that followed stay where they are */
+        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
+            curved_push_corner(t, m, &corner[m->here.depth]);
+            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
+        }
+        m->here.rising = !m->here.rising;
+        m->here.k = 1;
+    }
+    m->w = w;
+    if (m->there.k > 0 && curved_foretold(t, m, corner)) {
+        curved_copy_place(&m->here, &m->there);
+    } else {
+        if (turned) {
+            curved_corners_settle(t, &m->here, corner);
+        }
+        if (curved_reached(w, m->here.next, m->here.rising)) {
+            curved_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
+            curved_corners_settle(t, &m->here, corner);
         }
     }
-    m->hint_k = (uint_least16_t)k;
-    m->hint_depth = (uint_least16_t)left;
-    m->hint_rising = rising;
+    m->there.k = 0;
+}
+
+static bool curved_passed(curved_sum_t output, curved_sum_t level, bool rising)
+{
+    return rising ? output >= level : output <= level;
+}
+
+/* As curved_threshold_not_reached, over outputs gained. */
+static unsigned int curved_level_not_reached(const curved_sum_t *step, unsigned int k, unsigned int high,
+                                              curved_sum_t x)
+{
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
+            }
+        }
+    }
+    return k;
+}
+
+/* As curved_find_by_input, for a move to an output. */
+static void curved_find_by_output(const curved_tables_t *t, const curved_corner_t *corner, unsigned int depth,
+                                   unsigned int k, curved_sum_t output, curved_place_t *p)
+{
+    const bool rising = p->rising;
+    const curved_sum_t x = rising ? output : -output; /* everything as a rising move sees it */
+    unsigned int low = 0;
+    unsigned int left = depth;
+    unsigned int probe = left;
+    while (low < left) {
+        const curved_corner_t *c = &corner[probe - 1];
+        if (x >= curved_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
+        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
+        const curved_corner_t *c = &corner[left - 1];
+        k = curved_level_not_reached(t->start_level, k, c->end - 1u, curved_way(x, rising ? c->output : -c->output, c->side));
+    }
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
+}
+
+/* The output at which play k, held by corner c, starts to follow a rising (falling) move. */
+static curved_sum_t curved_level(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising)
+{
+    return curved_from(c->output, c->side, t->start_level[k], rising);
+}
+
+/* Input of the plays that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the
+   others. Whole numbers decide which play follows last, so that every engine finds the same. */
+static curved_reach_t curved_corners_locate(const curved_tables_t *t, curved_memory_t *m,
+                                              const curved_corner_t *corner, unsigned int depth, unsigned int begun,
+                                              unsigned int k, bool rising, curved_sum_t output)
+{
+    curved_place_t *there = &m->there;
+    curved_reach_t w; /* the last place known to be passed, and the output there */
+    curved_sum_t here;
+    there->rising = rising;
+    curved_find_by_output(t, corner, depth, k, output, there);
+    curved_corners_settle(t, there, corner);
+    k = there->k;
+    if (k > begun) {
+        const curved_corner_t *owner = curved_entered_by(corner, there->depth, depth, k);
+        w = curved_activation(t, owner, k - 1, rising);
+        here = curved_level(t, owner, k - 1, rising);
+    } else {
+        w = m->w;
+        here = curved_corners_output(t, m);
+    }
     return curved_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
+   that turning back would leave. */
 static curved_reach_t curved_corners_solve(const curved_tables_t *t, curved_memory_t *m,
                                                   curved_corner_t *corner, curved_sum_t output)
 {
+    const curved_place_t *p = &m->here;
     const curved_sum_t here = curved_corners_output(t, m);
-    unsigned int depth = m->depth;
+    unsigned int depth = p->depth;
     if (output == here) {
         return m->w;
     }
-    if (m->rising && output > here) {
-        const curved_reach_t w = curved_going(t, m->w, output - here, m->k, true);
-        /* the reciprocal is off by less than 4 steps: short of that the same plays follow, the usual sample */
-        return w < m->next - 4 ? w : curved_corners_locate(t, m, corner, depth, m->k, true, output);
+    if (p->rising ? output > here : output < here) {
+        if (curved_passed(output, p->next_output, p->rising)) {
+            return curved_corners_locate(t, m, corner, depth, p->k, p->k + 1u, p->rising, output);
+        }
+        return curved_going(t, m->w, p->rising ? output - here : here - output, p->k, p->rising);
     }
-    if (!m->rising && output < here) {
-        const curved_reach_t w = curved_going(t, m->w, here - output, m->k, false);
-        return w > m->next + 4 ? w : curved_corners_locate(t, m, corner, depth, m->k, false, output);
-    }
-    if (m->k > 1) {
+    if (p->k > 1) {
         curved_push_corner(t, m, &corner[depth]);
         depth = depth + 1;
     }
-    return curved_corners_locate(t, m, corner, depth, 1, !m->rising, output);
+    return curved_corners_locate(t, m, corner, depth, 1, 1, !p->rising, output);
 }
 
 /* x / 2^bits to the nearest whole number, ties away from zero. */
@@ -401,11 +459,6 @@ static const int32_t curved_slope[8] = {
     0, 483367913, 886174507, 1208419783, 1450103739, 1611226377, 1691787696, 1699843828
 };
 
-static const curved_sum_t curved_lift[8] = {
-    0, 0, 12164351901333466, 31627314991785394, 53523148136262890, 72986111065592180, 85150462916563316,
-    86610185158410472
-};
-
 static const curved_sum_t curved_start_level[7] = {
     0, 14597222287639957, 41358796476613380, 77851851002392984, 121643517865312855, 170300925500845708,
     221391203522685052
@@ -419,10 +472,10 @@ static const uint8_t curved_shift[8] = {
     1, 27, 28, 29, 29, 29, 29, 29
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights and their shifts; ends of
-   the input of the plays; plays without r_0 */
+/* thresholds, weights, sums of weights, inverse thresholds, 1 / sums of weights and their shifts; the sum of weight times
+   threshold; ends of the input of the plays; plays without r_0 */
 static const curved_tables_t curved_tables = {
-    curved_threshold, NULL, curved_slope, curved_lift, curved_start_level, curved_reciprocal, curved_shift, -389231414, 428259574, 6
+    curved_threshold, NULL, curved_slope, curved_start_level, curved_reciprocal, curved_shift, 86610185158410472, -389231414, 428259574, 6
 };
 
 /* w = G[v] */
@@ -552,6 +605,7 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
 {
     curved_reach_t w;
     curved_reach_t v;
+    curved_real_t asked;
     curved_real_t inside;
     unsigned int bits = 0;
     bool limited = false;
@@ -559,16 +613,17 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
         curved_inverse_see(self, self->pending);
         self->has_pending = false;
     }
-    if (self->repeat && !(u < self->reference) && !(u > self->reference)) {
+    asked = u;
+    if (u < CURVED_OUTPUT_MIN) {
+        u = CURVED_OUTPUT_MIN;
+        bits = CURVED_STATUS_INPUT_CLAMPED;
+    }
+    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
         self->status |= self->bits;
         return curved_inverse_answer(self, self->answer);
     }
-    self->reference = u;
+    self->reference = asked;
     self->repeat = true;
-    if (u < CURVED_OUTPUT_MIN) {
-        u = CURVED_OUTPUT_MIN;
-        bits |= CURVED_STATUS_INPUT_CLAMPED;
-    }
     w = curved_corners_solve(&curved_tables, &self->memory, self->corner, (curved_sum_t)u * ((curved_sum_t)1 << 44) - 0);
     v = curved_front_inverse(w, &limited);
     if (limited) {

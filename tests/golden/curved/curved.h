@@ -15,8 +15,8 @@
  *     inputs of plays between -351039069 and 390067229, 44 fraction bits of an output code
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   2098 bytes
- *     inverse instance  152 bytes of RAM
+ *     constant tables   2042 bytes
+ *     inverse instance  192 bytes of RAM
  *     inverse step, worst case: 76 multiplications of 32 by 32 bits, 49 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -65,23 +65,26 @@ typedef struct {
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } curved_corner_t;
 
-/* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
+/* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
-    curved_sum_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    curved_reach_t next;  /* w at which play k starts to follow */
-    curved_play_t w;      /* input of the plays, w = G[v] */
+    curved_sum_t anchor_output; /* while the same plays follow, output = anchor_output + (w - anchor) slope[k] */
+    curved_sum_t next_output;   /* output at which play k starts to follow */
+    curved_reach_t anchor;
+    curved_reach_t next;        /* w at which it does */
     uint_least16_t k;
-    uint_least16_t depth;  /* corners held */
-    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
-    uint_least16_t hint_depth;
-    bool hint_rising;
-    bool rising;           /* direction of the present move of w */
+    uint_least16_t depth;
+    bool rising;                 /* direction of w */
+} curved_place_t;
+
+/* The plays of one instance, with its corners. */
+typedef struct {
+    curved_place_t here;
+    curved_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
+    curved_play_t w;      /* input of the plays, w = G[v] */
 } curved_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
-    curved_memory_t memory;
-    curved_corner_t corner[6];
     curved_real_t pending;   /* drive sent but not yet part of the memory */
     curved_real_t applied;   /* drive seen last */
     curved_real_t reference; /* input of the last step */
@@ -91,6 +94,8 @@ typedef struct {
     bool stepped;
     unsigned int bits;           /* status of that answer */
     unsigned int status;
+    curved_memory_t memory;
+    curved_corner_t corner[6];
 } curved_inverse_t;
 
 /* Start memory of the parameter file. */

@@ -25,9 +25,10 @@ typedef struct {
     const plain_real_t *threshold;      /* r_0 = 0 .. r_n */
     const plain_real_t *weight;         /* p_0 .. p_n */
     const plain_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
-    const plain_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const plain_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1), for engine loop */
     const plain_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
     const plain_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
+    plain_real_t all_lift;              /* p_0 r_0 + ... + p_n r_n */
     uint_least16_t n;                     /* plays without r_0 */
 } plain_tables_t;
 
@@ -36,58 +37,90 @@ static plain_real_t plain_half(plain_real_t x)
     return x * (plain_real_t)0.5f;
 }
 
-/* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static plain_real_t plain_activation(const plain_corner_t *c, plain_real_t threshold, bool rising)
-{
-    const plain_real_t e = c->extremum;
-    const plain_real_t r = threshold;
-    if (rising) {
-        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
-    }
-    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
-}
-
 static bool plain_reached(plain_real_t x, plain_real_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
 }
 
-/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
-   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
-static plain_real_t plain_base(const plain_tables_t *t, const plain_corner_t *c, unsigned int k, bool rising)
+static bool plain_past(plain_real_t x, plain_real_t level, bool rising)
 {
-    plain_real_t y = c->output;
-    if (c->side == 0) {
-        y = rising ? y - t->lift[k] : y + t->lift[k];
-    } else if (rising && c->side > 0) {
-        y = y - (t->lift[k] + t->lift[k]);
-    } else if (!rising && c->side < 0) {
-        y = y + (t->lift[k] + t->lift[k]);
-    }
-    return y - c->extremum * t->slope[k];
+    return rising ? x > level : x < level;
 }
 
-/* Brings base and next up to date after k, depth or the direction have changed. */
-static void plain_corners_settle(const plain_tables_t *t, plain_memory_t *m, const plain_corner_t *corner)
+/* `steps`, a threshold or an output gained, gone on from what a corner holds to where its plays start to follow: two
+   after a turn, one from the start, none where the move leads back to where the corner was. */
+static plain_real_t plain_from(plain_real_t held, int side, plain_real_t steps, bool rising)
 {
-    if (m->depth > 0) {
-        const plain_corner_t *c = &corner[m->depth - 1];
-        m->base = plain_base(t, c, m->k, m->rising);
-        m->next = plain_activation(c, t->threshold[m->k], m->rising);
-    } else if (m->rising) { /* every play follows */
-        m->base = -t->lift[m->k];
-        m->next = FLT_MAX;
-    } else {
-        m->base = t->lift[m->k];
-        m->next = -FLT_MAX;
+    if (rising) {
+        return side > 0 ? held + (steps + steps) : side == 0 ? held + steps : held;
+    }
+    return side < 0 ? held - (steps + steps) : side == 0 ? held - steps : held;
+}
+
+/* The w at which play k, held by corner c, starts to follow a rising (falling) move. */
+static plain_real_t plain_activation(const plain_tables_t *t, const plain_corner_t *c, unsigned int k,
+                                          bool rising)
+{
+    return plain_from(c->extremum, c->side, t->threshold[k], rising);
+}
+
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
+   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, const plain_corner_t *corner)
+{
+    if (p->depth > 0) {
+        const plain_corner_t *c = &corner[p->depth - 1];
+        const plain_real_t e = c->extremum;
+        const plain_real_t y = c->output;
+        const plain_real_t *r = &t->threshold[p->k];
+        const plain_real_t *z = &t->start_level[p->k];
+        const int side = c->side;
+        if (p->rising ? side < 0 : side > 0) {
+            p->anchor = e;
+            p->anchor_output = y;
+            p->next = e;
+            p->next_output = y;
+        } else {
+            plain_real_t to_anchor = r[-1];
+            plain_real_t to_next = r[0];
+            plain_real_t to_anchor_output = z[-1];
+            plain_real_t to_next_output = z[0];
+            if (side != 0) {
+                to_anchor = to_anchor + to_anchor;
+                to_next = to_next + to_next;
+                to_anchor_output = to_anchor_output + to_anchor_output;
+                to_next_output = to_next_output + to_next_output;
+            }
+            if (p->rising) {
+                p->anchor = e + to_anchor;
+                p->anchor_output = y + to_anchor_output;
+                p->next = e + to_next;
+                p->next_output = y + to_next_output;
+            } else {
+                p->anchor = e - to_anchor;
+                p->anchor_output = y - to_anchor_output;
+                p->next = e - to_next;
+                p->next_output = y - to_next_output;
+            }
+        }
+    } else { /* every play follows */
+        p->anchor = 0;
+        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
+        p->next = p->rising ? FLT_MAX : -FLT_MAX;
+        p->next_output = p->rising ? FLT_MAX : -FLT_MAX;
     }
 }
 
-/* How far x lies from what corner c holds, in the measure of the thresholds. */
-static plain_real_t plain_way(plain_real_t x, plain_real_t since, int side, bool rising)
+/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
+static plain_real_t plain_way(plain_real_t x, plain_real_t held, int side)
 {
-    const plain_real_t d = rising ? x - since : since - x;
-    return side == 0 ? d : plain_half(d);
+    return side == 0 ? x - held : plain_half(x - held);
+}
+
+/* Where the last play of a corner's block starts to follow a rising move. */
+static plain_real_t plain_last_step(plain_real_t held, int side, plain_real_t steps)
+{
+    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
 }
 
 /* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
@@ -96,173 +129,40 @@ static bool plain_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
-   most moves take one play at a time. */
-static unsigned int plain_gallop_thresholds(const plain_real_t *step, unsigned int k, unsigned int high,
-                                              plain_real_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
+static unsigned int plain_threshold_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
+                                                  plain_real_t x)
 {
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
-        }
-    }
-    return k;
-}
-
-/* Whether the place that solving found is where the move has come to. */
-static bool plain_foretold(const plain_tables_t *t, const plain_memory_t *m, const plain_corner_t *corner)
-{
-    const unsigned int k = m->hint_k;
-    const unsigned int left = m->hint_depth;
-    const bool rising = m->rising;
-    unsigned int owner;
-    if (k <= m->k || rising != m->hint_rising) {
-        return false;
-    }
-    if (left > 0 && plain_reached(m->w, plain_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
-        return false;
-    }
-    owner = left < m->depth && corner[left].end == k ? left : left - 1;
-    return plain_reached(m->w, plain_activation(&corner[owner], t->threshold[k - 1], rising), rising);
-}
-
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
-static void plain_corners_advance(const plain_tables_t *t, plain_memory_t *m, const plain_corner_t *corner)
-{
-    const plain_real_t w = m->w;
-    const bool rising = m->rising;
-    unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
-    unsigned int k = m->k;
-    if (plain_foretold(t, m, corner)) {
-        left = m->hint_depth;
-        k = m->hint_k;
-    } else {
-        unsigned int low = 0;
-        unsigned int probe = left;
-        while (low < left) {
-            const plain_corner_t *c = &corner[probe - 1];
-            if (plain_reached(w, plain_activation(c, t->threshold[c->end - 1], rising), rising)) {
-                left = probe - 1;
-                k = c->end;
-            } else {
-                low = probe;
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
             }
-            probe = (low + left + 1) / 2;
-        }
-        if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
-            const plain_corner_t *c = &corner[left - 1];
-            k = plain_gallop_thresholds(t->threshold, k, c->end - 1u, plain_way(w, c->extremum, c->side, rising));
-        }
-    }
-    m->depth = (uint_least16_t)left;
-    m->k = (uint_least16_t)k;
-    plain_corners_settle(t, m, corner);
-}
-
-/* Memory at rest: every play holds w, nothing has moved yet. */
-static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
-                                      plain_real_t w)
-{
-    m->w = w;
-    m->k = 1;
-    m->depth = 0;
-    m->rising = true;
-    m->hint_k = 0;
-    if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
-        m->depth = 1;
-    }
-    plain_corners_settle(t, m, corner);
-}
-
-/* Output of the play sum for the memory as it is. */
-static plain_real_t plain_corners_output(const plain_tables_t *t, const plain_memory_t *m)
-{
-    return m->base + m->w * t->slope[m->k];
-}
-
-/* Writes the corner that turning back leaves into slot c. */
-static void plain_push_corner(const plain_tables_t *t, const plain_memory_t *m, plain_corner_t *c)
-{
-    c->extremum = m->w;
-    c->output = plain_corners_output(t, m);
-    c->end = m->k;
-    c->side = m->rising ? -1 : 1;
-}
-
-/* Moves the input of the plays to w. */
-static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
-                                        plain_real_t w)
-{
-    if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
-        if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            plain_push_corner(t, m, &corner[m->depth]);
-            m->depth = (uint_least16_t)(m->depth + 1u);
-        }
-        m->rising = !m->rising;
-        m->k = 1;
-        plain_corners_settle(t, m, corner);
-    }
-    m->w = w;
-    if (plain_reached(w, m->next, m->rising)) {
-        plain_corners_advance(t, m, corner);
-    }
-    m->hint_k = 0;
-}
-
-/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
-   play's threshold z_k says (36). */
-static plain_real_t plain_level(const plain_tables_t *t, const plain_corner_t *c, unsigned int k, bool rising)
-{
-    const plain_real_t z = t->start_level[k];
-    if (rising) {
-        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
-    }
-    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
-}
-
-/* As plain_gallop_thresholds, over outputs. */
-static unsigned int plain_gallop_levels(const plain_real_t *step, unsigned int k, unsigned int high, plain_real_t x)
-{
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
         }
     }
     return k;
 }
 
-/* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
-static plain_real_t plain_corners_locate(const plain_tables_t *t, plain_memory_t *m,
-                                             const plain_corner_t *corner, unsigned int left, unsigned int k,
-                                             bool rising, plain_real_t output)
+/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
+   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+static void plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner, unsigned int depth,
+                                  unsigned int k, plain_real_t w, plain_place_t *p)
 {
+    const bool rising = p->rising;
+    const plain_real_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
+    unsigned int left = depth;
     unsigned int probe = left;
     while (low < left) {
         const plain_corner_t *c = &corner[probe - 1];
-        if (plain_reached(output, plain_level(t, c, c->end - 1u, rising), rising)) {
+        if (x >= plain_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -272,35 +172,205 @@ static plain_real_t plain_corners_locate(const plain_tables_t *t, plain_memory_t
     }
     if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
         const plain_corner_t *c = &corner[left - 1];
-        k = plain_gallop_levels(t->start_level, k, c->end - 1u, plain_way(output, c->output, c->side, rising));
+        k = plain_threshold_not_reached(t->threshold, k, c->end - 1u, plain_way(x, rising ? c->extremum : -c->extremum, c->side));
     }
-    m->hint_k = (uint_least16_t)k;
-    m->hint_depth = (uint_least16_t)left;
-    m->hint_rising = rising;
-    if (left > 0) {
-        return (output - plain_base(t, &corner[left - 1], k, rising)) * t->inverse_slope[k];
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
+}
+
+/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. */
+static const plain_corner_t *plain_entered_by(const plain_corner_t *corner, unsigned int left,
+                                                  unsigned int depth, unsigned int k)
+{
+    return left < depth && corner[left].end == k ? &corner[left] : &corner[left - 1];
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool plain_foretold(const plain_tables_t *t, const plain_memory_t *m, const plain_corner_t *corner)
+{
+    const plain_place_t *there = &m->there;
+    const plain_corner_t *owner;
+    if (there->rising != m->here.rising || plain_past(m->w, there->next, there->rising)) {
+        return false;
     }
-    return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
+    if (there->k == 1) {
+        return true;
+    }
+    owner = plain_entered_by(corner, there->depth, m->here.depth, there->k);
+    return plain_reached(m->w, plain_activation(t, owner, there->k - 1u, there->rising), there->rising);
+}
+
+/* Field by field, since compilers may call memcpy for a whole one. */
+static void plain_copy_place(plain_place_t *to, const plain_place_t *from)
+{
+    to->anchor_output = from->anchor_output;
+    to->next_output = from->next_output;
+    to->anchor = from->anchor;
+    to->next = from->next;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
+/* Memory at rest: every play holds w, nothing has moved yet. */
+static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                      plain_real_t w)
+{
+    m->w = w;
+    m->here.k = 1;
+    m->here.depth = 0;
+    m->here.rising = true;
+    m->there.k = 0;
+    if (t->n > 0) {
+        corner[0].extremum = w;
+        corner[0].output = w * t->slope[t->n + 1u];
+        corner[0].end = (uint_least16_t)(t->n + 1);
+        corner[0].side = 0;
+        m->here.depth = 1;
+    }
+    plain_corners_settle(t, &m->here, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+static plain_real_t plain_corners_output(const plain_tables_t *t, const plain_memory_t *m)
+{
+    return m->here.anchor_output + (m->w - m->here.anchor) * t->slope[m->here.k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void plain_push_corner(const plain_tables_t *t, const plain_memory_t *m, plain_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = plain_corners_output(t, m);
+    c->end = m->here.k;
+    c->side = m->here.rising ? -1 : 1;
+}
+
+/* Moves the input of the plays to w. */
+static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                        plain_real_t w)
+{
+    const bool turned = m->here.rising ? w < m->w : w > m->w;
+    if (turned) {       /* the plays that followed stay where they are */
+        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
+            plain_push_corner(t, m, &corner[m->here.depth]);
+            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
+        }
+        m->here.rising = !m->here.rising;
+        m->here.k = 1;
+    }
+    m->w = w;
+    if (m->there.k > 0 && plain_foretold(t, m, corner)) {
+        plain_copy_place(&m->here, &m->there);
+    } else {
+        if (turned) {
+            plain_corners_settle(t, &m->here, corner);
+        }
+        if (plain_reached(w, m->here.next, m->here.rising)) {
+            plain_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
+            plain_corners_settle(t, &m->here, corner);
+        }
+    }
+    m->there.k = 0;
+}
+
+static bool plain_passed(plain_real_t output, plain_real_t level, bool rising)
+{
+    return rising ? output >= level : output <= level;
+}
+
+/* As plain_threshold_not_reached, over outputs gained. */
+static unsigned int plain_level_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
+                                              plain_real_t x)
+{
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
+            }
+        }
+    }
+    return k;
+}
+
+/* As plain_find_by_input, for a move to an output. */
+static void plain_find_by_output(const plain_tables_t *t, const plain_corner_t *corner, unsigned int depth,
+                                   unsigned int k, plain_real_t output, plain_place_t *p)
+{
+    const bool rising = p->rising;
+    const plain_real_t x = rising ? output : -output; /* everything as a rising move sees it */
+    unsigned int low = 0;
+    unsigned int left = depth;
+    unsigned int probe = left;
+    while (low < left) {
+        const plain_corner_t *c = &corner[probe - 1];
+        if (x >= plain_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
+        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
+        const plain_corner_t *c = &corner[left - 1];
+        k = plain_level_not_reached(t->start_level, k, c->end - 1u, plain_way(x, rising ? c->output : -c->output, c->side));
+    }
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
+   that turning back would leave. Rounding is kept from leading out of the place that was found: then the plays that
+   follow are those that will. */
 static plain_real_t plain_corners_solve(const plain_tables_t *t, plain_memory_t *m,
                                                  plain_corner_t *corner, plain_real_t output)
 {
-    const plain_real_t w = (output - m->base) * t->inverse_slope[m->k];
-    unsigned int depth = m->depth;
-    if (m->rising ? w >= m->w : w <= m->w) {
-        if (!plain_reached(w, m->next, m->rising)) {
-            return w; /* the same plays follow: the usual sample */
+    const plain_place_t *here = &m->here;
+    plain_place_t *there = &m->there;
+    plain_real_t w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
+    unsigned int depth = here->depth;
+    unsigned int k = here->k + 1u;
+    bool rising = here->rising;
+    if (rising ? w >= m->w : w <= m->w) {
+        if (!plain_passed(output, here->next_output, rising)) {
+            there->k = 0;
+            return plain_reached(w, here->next, rising) ? here->next : w;
         }
-        return plain_corners_locate(t, m, corner, depth, m->k, m->rising, output);
+    } else { /* the move turns back */
+        if (k > 2) {
+            plain_push_corner(t, m, &corner[depth]);
+            depth = depth + 1;
+        }
+        k = 1;
+        rising = !rising;
     }
-    if (m->k > 1) {
-        plain_push_corner(t, m, &corner[depth]);
-        depth = depth + 1;
+    there->rising = rising;
+    plain_find_by_output(t, corner, depth, k, output, there);
+    plain_corners_settle(t, there, corner);
+    k = there->k;
+    w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
+    if (plain_past(w, there->next, rising)) {
+        return there->next;
     }
-    return plain_corners_locate(t, m, corner, depth, 1, !m->rising, output);
+    if (k > 1) {
+        const plain_corner_t *owner = plain_entered_by(corner, there->depth, depth, k);
+        const plain_real_t first = plain_activation(t, owner, k - 1, rising);
+        if (!plain_reached(w, first, rising)) {
+            there->anchor = first; /* so that later answers of the same move do not lie before this one */
+            there->anchor_output = output;
+            return first;
+        }
+    }
+    return w;
 }
 
 static const plain_real_t plain_threshold[7] = {
@@ -311,10 +381,6 @@ static const plain_real_t plain_slope[8] = {
     0.0f, 0.72f, 1.32f, 1.8f, 2.16f, 2.4f, 2.52f, 2.532f
 };
 
-static const plain_real_t plain_lift[8] = {
-    0.0f, 0.0f, 0.27f, 0.702f, 1.188f, 1.62f, 1.89f, 1.9224f
-};
-
 static const plain_real_t plain_start_level[7] = {
     0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
 };
@@ -323,9 +389,10 @@ static const plain_real_t plain_reciprocal[8] = {
     0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; plays without r_0 */
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; the
+   whole sum of weight times threshold; plays without r_0 */
 static const plain_tables_t plain_tables = {
-    plain_threshold, NULL, plain_slope, plain_lift, plain_start_level, plain_reciprocal, 6
+    plain_threshold, NULL, plain_slope, NULL, plain_start_level, plain_reciprocal, 1.9224f, 6
 };
 
 static bool plain_finite(plain_real_t x)
@@ -359,6 +426,7 @@ static void plain_inverse_begin(plain_inverse_t *self, plain_real_t applied)
     self->edge[0] = 0;
     self->edge[1] = 0;
     self->gain = 0;
+    self->before = 0;
     self->fast = false;
     self->falling = false;
     self->status = 0;
@@ -374,37 +442,52 @@ static plain_real_t plain_inverse_answer(plain_inverse_t *self, plain_real_t v)
     return v;
 }
 
-/* After a step that merely went on with the move: for which references the next one does, so that it need not look.
-   Rounding keeps order: where the drive at the far end is short of the next play and of the range, all before are. */
+/* After a step whose answer lies where solving put it: up to which reference the same plays follow, so that the next
+   steps need not look; a little short of it, by more than rounding can be. */
 static void plain_inverse_enter_fast(plain_inverse_t *self, plain_real_t u)
 {
-    const plain_memory_t *m = &self->memory;
-    const bool up = m->rising;
-    const plain_real_t gain = plain_reciprocal[m->k];
-    const plain_real_t end = up ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN;
-    const plain_real_t stop = (up ? m->next < end : m->next > end) ? m->next : end;
-    const plain_real_t most = up ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN;
-    plain_real_t last = m->base + stop * plain_slope[m->k];
-    plain_real_t drive;
-    last = last - (last < 0 ? -last : last) * (up ? 4 * FLT_EPSILON : -4 * FLT_EPSILON);
-    last = (up ? last < most : last > most) ? last : most;
-    drive = (last - m->base) * gain;
-    self->gain = gain;
-    self->falling = !up;
-    self->fast = up ? drive < stop : drive > stop;
-    self->edge[up ? 0 : 1] = u;
-    self->edge[up ? 1 : 0] = self->fast ? last : u;
+    const plain_place_t *p = &self->memory.there;
+    self->fast = true;
+    self->gain = plain_reciprocal[p->k];
+    self->falling = !p->rising;
+    if (p->rising) {
+        plain_real_t edge = p->next_output;
+        if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
+            edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
+        }
+        if (edge > PLAIN_OUTPUT_MAX) {
+            edge = PLAIN_OUTPUT_MAX;
+        }
+        self->edge[0] = u;
+        self->edge[1] = edge - 2.2984315e-05f;
+    } else {
+        plain_real_t edge = p->next_output;
+        if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
+            edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
+        }
+        if (edge < PLAIN_OUTPUT_MIN) {
+            edge = PLAIN_OUTPUT_MIN;
+        }
+        self->edge[0] = edge + 2.2984315e-05f;
+        self->edge[1] = u;
+    }
 }
 
-/* What the fast steps have left undone. */
+/* What the fast steps have left undone, all but taking the drives to memory. */
 static void plain_inverse_leave_fast(plain_inverse_t *self)
 {
-    if (self->fast) {
-        self->fast = false;
-        self->reference = self->edge[self->falling ? 1 : 0];
-        self->answer = self->pending;
-    }
+    self->fast = false;
+    self->reference = self->edge[self->falling ? 1 : 0];
+    self->answer = self->pending;
     self->edge[0] = self->edge[1];
+}
+
+/* The actuator has seen w, which lies where solving put it. */
+static void plain_inverse_take(plain_inverse_t *self, plain_real_t w)
+{
+    plain_copy_place(&self->memory.here, &self->memory.there);
+    self->memory.there.k = 0;
+    self->memory.w = w;
 }
 
 #if defined(__GNUC__)
@@ -412,46 +495,136 @@ __attribute__((noinline)) /* so that the usual sample saves no registers for it 
 #endif
 static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u);
 
+/* Where a move that has gone on fast takes just one more play of the same corner along, the usual one among the samples
+   that are left, there is no need to look further. */
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
+{
+    const plain_real_t output = u;
+    plain_place_t *p = &self->memory.there;
+    plain_real_t answer;
+    if (!self->fast) {
+        return plain_inverse_look(self, u);
+    }
+    if (p->rising && output >= p->next_output && u <= PLAIN_OUTPUT_MAX) {
+        const plain_corner_t *c = &self->corner[p->depth - 1];
+        const unsigned int k = p->k + 1u;
+        const plain_real_t v = p->next + (output - p->next_output) * plain_reciprocal[k];
+        plain_real_t way = output - c->output;
+        plain_real_t r;
+        plain_real_t z;
+        if (k >= c->end || c->side < 0) {
+            return plain_inverse_look(self, u);
+        }
+        r = plain_threshold[k];
+        z = plain_start_level[k];
+        if (c->side != 0) {
+            way = way * 0.5f;
+            r = r + r;
+            if (way >= z) {
+                return plain_inverse_look(self, u);
+            }
+            z = z + z;
+        } else if (way >= z) {
+            return plain_inverse_look(self, u);
+        }
+        r = c->extremum + r;
+        if (!(v < r && v <= PLAIN_DRIVE_MAX)) {
+            return plain_inverse_look(self, u);
+        }
+        plain_copy_place(&self->memory.here, p);
+        p->next = r;
+        p->next_output = c->output + z;
+        answer = v;
+    } else if (!p->rising && output <= p->next_output && u >= PLAIN_OUTPUT_MIN) {
+        const plain_corner_t *c = &self->corner[p->depth - 1];
+        const unsigned int k = p->k + 1u;
+        const plain_real_t v = p->next + (output - p->next_output) * plain_reciprocal[k];
+        plain_real_t way = c->output - output;
+        plain_real_t r;
+        plain_real_t z;
+        if (k >= c->end || c->side > 0) {
+            return plain_inverse_look(self, u);
+        }
+        r = plain_threshold[k];
+        z = plain_start_level[k];
+        if (c->side != 0) {
+            way = way * 0.5f;
+            r = r + r;
+            if (way >= z) {
+                return plain_inverse_look(self, u);
+            }
+            z = z + z;
+        } else if (way >= z) {
+            return plain_inverse_look(self, u);
+        }
+        r = c->extremum - r;
+        if (!(v > r && v >= PLAIN_DRIVE_MIN)) {
+            return plain_inverse_look(self, u);
+        }
+        plain_copy_place(&self->memory.here, p);
+        p->next = r;
+        p->next_output = c->output - z;
+        answer = v;
+    } else {
+        return plain_inverse_look(self, u);
+    }
+    p->anchor = self->memory.here.next;
+    p->anchor_output = self->memory.here.next_output;
+    p->k = (uint_least16_t)(p->k + 1u);
+    self->memory.w = self->pending;
+    self->pending = answer;
+    self->reference = u;
+    plain_inverse_enter_fast(self, u);
+    return answer;
+}
+
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
 {
     if (u > self->edge[0] && u < self->edge[1]) { /* the usual sample; never so for NaN */
-        const plain_real_t v = (u - self->memory.base) * self->gain;
-        self->memory.w = self->pending;
+        const plain_real_t v = self->memory.there.anchor
+            + (u - self->memory.there.anchor_output) * self->gain;
+        self->before = self->pending;
         self->edge[self->falling] = u;
         self->pending = v;
         return v;
     }
-    return plain_inverse_look(self, u);
+    return plain_inverse_next(self, u);
 }
 
 static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
 {
     plain_real_t w;
     plain_real_t v;
+    plain_real_t asked;
     plain_real_t inside;
     unsigned int bits = 0;
-    plain_inverse_leave_fast(self);
+    if (self->fast) {
+        plain_inverse_leave_fast(self);
+        plain_inverse_take(self, self->pending);
+        self->has_pending = false;
+    }
     if (self->has_pending) { /* what was sent last is what the actuator has seen */
         plain_inverse_see(self, self->pending);
         self->has_pending = false;
     }
-    if (!plain_finite(u)) {
-        self->status |= PLAIN_STATUS_HELD;
-        return plain_inverse_answer(self, self->stepped ? self->answer : plain_clamp_drive(self->applied));
+    asked = u;
+    if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
+        if (!plain_finite(u)) {
+            self->status |= PLAIN_STATUS_HELD;
+            return plain_inverse_answer(self, self->stepped ? self->answer : plain_clamp_drive(self->applied));
+        }
+        u = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
+        bits = PLAIN_STATUS_INPUT_CLAMPED;
     }
-    if (self->repeat && !(u < self->reference) && !(u > self->reference)) {
+    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
         self->status |= self->bits;
         return plain_inverse_answer(self, self->answer);
     }
-    self->reference = u;
+    self->reference = asked;
     self->repeat = true;
-    if (u < PLAIN_OUTPUT_MIN) {
-        u = PLAIN_OUTPUT_MIN;
-        bits |= PLAIN_STATUS_INPUT_CLAMPED;
-    } else if (u > PLAIN_OUTPUT_MAX) {
-        u = PLAIN_OUTPUT_MAX;
-        bits |= PLAIN_STATUS_INPUT_CLAMPED;
-    }
     w = plain_corners_solve(&plain_tables, &self->memory, self->corner, u - 0.0f);
     v = w;
     inside = plain_clamp_drive(v);
@@ -460,15 +633,31 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
     }
     self->bits = bits;
     self->status |= bits;
-    if (bits == 0 && self->memory.hint_k == 0) { /* nothing limited, nothing searched for */
-        plain_inverse_enter_fast(self, u);
+    if (!(bits & PLAIN_STATUS_OUTPUT_CLAMPED)) { /* the drive is what solving gave */
+        const plain_memory_t *m = &self->memory;
+        if (m->there.k > 0) {
+            if (m->there.rising ? v > m->w : v < m->w) {
+                plain_inverse_enter_fast(self, asked);
+            }
+        } else if (m->here.rising ? v > m->w && v < m->here.next : v < m->w && v > m->here.next) {
+            plain_copy_place(&self->memory.there, &m->here);
+            plain_inverse_enter_fast(self, asked);
+        }
     }
     return plain_inverse_answer(self, inside);
 }
 
 void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
 {
-    plain_inverse_leave_fast(self);
+    if (self->fast) {
+        const bool more = self->edge[self->falling] < self->reference || self->edge[self->falling] > self->reference;
+        plain_inverse_leave_fast(self);
+        if (more) { /* than the step that looked */
+            plain_inverse_take(self, self->before);
+        } else if (self->memory.there.k == self->memory.here.k && self->memory.there.rising == self->memory.here.rising) {
+            self->memory.there.k = 0; /* it found nothing new */
+        }
+    }
     if (!plain_finite(applied)) {
         self->status |= PLAIN_STATUS_HELD;
         return;

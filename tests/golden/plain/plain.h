@@ -9,8 +9,8 @@
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   180 bytes
- *     inverse instance  140 bytes of RAM
+ *     constant tables   152 bytes
+ *     inverse instance  172 bytes of RAM
  *     inverse step, worst case: 33 multiplications, 33 comparisons
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -46,7 +46,7 @@ typedef float plain_real_t;
 #define PLAIN_DRIVE_MAX 4.0f
 #define PLAIN_OUTPUT_MIN (-8.2056f) /* output, um, over every drive history in range */
 #define PLAIN_OUTPUT_MAX 8.2056f
-#define PLAIN_INVERSE_MAX_ERROR 0.00017638535f /* against the double model, drive, V */
+#define PLAIN_INVERSE_MAX_ERROR 0.00014008458f /* against the double model, drive, V */
 
 /* Sticky bits of the status functions */
 #define PLAIN_STATUS_INPUT_CLAMPED 1u /* the input was out of range and was limited */
@@ -65,36 +65,42 @@ typedef struct {
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } plain_corner_t;
 
-/* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
+/* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
-    plain_real_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    plain_real_t next;  /* w at which play k starts to follow */
-    plain_real_t w;      /* input of the plays, w = G[v] */
+    plain_real_t anchor_output; /* while the same plays follow, output = anchor_output + (w - anchor) slope[k] */
+    plain_real_t next_output;   /* output at which play k starts to follow */
+    plain_real_t anchor;
+    plain_real_t next;        /* w at which it does */
     uint_least16_t k;
-    uint_least16_t depth;  /* corners held */
-    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
-    uint_least16_t hint_depth;
-    bool hint_rising;
-    bool rising;           /* direction of the present move of w */
+    uint_least16_t depth;
+    bool rising;                 /* direction of w */
+} plain_place_t;
+
+/* The plays of one instance, with its corners. */
+typedef struct {
+    plain_place_t here;
+    plain_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
+    plain_real_t w;      /* input of the plays, w = G[v] */
 } plain_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
-    plain_memory_t memory;
-    plain_corner_t corner[6];
+    plain_real_t edge[2];   /* references strictly between these go on with the present move, nothing limited */
+    plain_real_t gain;      /* drive per reference of that move */
+    plain_real_t before;    /* drive before `pending`, where that is not the first answer of the move */
     plain_real_t pending;   /* drive sent but not yet part of the memory */
     plain_real_t applied;   /* drive seen last */
     plain_real_t reference; /* input of the last step */
     plain_real_t answer;    /* drive returned last */
+    bool fast;                   /* edge and gain hold */
+    bool falling;
     bool has_pending;
     bool repeat;                 /* the last answer still stands for `reference` */
     bool stepped;
-    plain_real_t edge[2];    /* references strictly between these go on with the present move, nothing limited */
-    plain_real_t gain;       /* drive per reference of that move */
-    bool fast;                   /* edge and gain hold */
-    bool falling;
     unsigned int bits;           /* status of that answer */
     unsigned int status;
+    plain_memory_t memory;
+    plain_corner_t corner[6];
 } plain_inverse_t;
 
 /* Start memory of the parameter file. */

@@ -9,8 +9,8 @@
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout single-header
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   392 bytes
- *     inverse instance  128 bytes of RAM
+ *     constant tables   364 bytes
+ *     inverse instance  156 bytes of RAM
  *     inverse step, worst case: 39 multiplications, 51 comparisons, 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -47,8 +47,8 @@ typedef float two_branches_real_t;
 #define TWO_BRANCHES_DRIVE_MAX 4.0f
 #define TWO_BRANCHES_OUTPUT_MIN (-11.322212f) /* output, um, over every drive history in range */
 #define TWO_BRANCHES_OUTPUT_MAX 13.554334f
-#define TWO_BRANCHES_INVERSE_MAX_ERROR 7.9128385f /* against the double model, drive, V */
-#define TWO_BRANCHES_INVERSE_ROUNDING_ERROR 0.00097423466f /* the same while both take the same branch */
+#define TWO_BRANCHES_INVERSE_MAX_ERROR 7.9126635f /* against the double model, drive, V */
+#define TWO_BRANCHES_INVERSE_ROUNDING_ERROR 0.0007995373f /* the same while both take the same branch */
 
 /* Sticky bits of the status functions */
 #define TWO_BRANCHES_STATUS_INPUT_CLAMPED 1u /* the input was out of range and was limited */
@@ -67,23 +67,26 @@ typedef struct {
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } two_branches_corner_t;
 
-/* The present move: plays 0 .. k-1 follow the input w, the corners hold the others. */
+/* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
-    two_branches_real_t base;    /* output = base + w * (p_0 + ... + p_(k-1)) while the same plays follow */
-    two_branches_real_t next;  /* w at which play k starts to follow */
-    two_branches_real_t w;      /* input of the plays, w = G[v] */
+    two_branches_real_t anchor_output; /* while the same plays follow, output = anchor_output + (w - anchor) slope[k] */
+    two_branches_real_t next_output;   /* output at which play k starts to follow */
+    two_branches_real_t anchor;
+    two_branches_real_t next;        /* w at which it does */
     uint_least16_t k;
-    uint_least16_t depth;  /* corners held */
-    uint_least16_t hint_k; /* k and depth where the last answer lies, and on which way; 0 where that is not known */
-    uint_least16_t hint_depth;
-    bool hint_rising;
-    bool rising;           /* direction of the present move of w */
+    uint_least16_t depth;
+    bool rising;                 /* direction of w */
+} two_branches_place_t;
+
+/* The plays of one instance, with its corners. */
+typedef struct {
+    two_branches_place_t here;
+    two_branches_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
+    two_branches_real_t w;      /* input of the plays, w = G[v] */
 } two_branches_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
-    two_branches_memory_t memory;
-    two_branches_corner_t corner[6];
     two_branches_real_t pending;   /* drive sent but not yet part of the memory */
     two_branches_real_t applied;   /* drive seen last */
     two_branches_real_t reference; /* input of the last step */
@@ -95,6 +98,8 @@ typedef struct {
     bool stepped;
     unsigned int bits;           /* status of that answer */
     unsigned int status;
+    two_branches_memory_t memory;
+    two_branches_corner_t corner[6];
 } two_branches_inverse_t;
 
 /* Start memory of the parameter file. */
@@ -134,9 +139,10 @@ typedef struct {
     const two_branches_real_t *threshold;      /* r_0 = 0 .. r_n */
     const two_branches_real_t *weight;         /* p_0 .. p_n */
     const two_branches_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
-    const two_branches_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const two_branches_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1), for engine loop */
     const two_branches_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
     const two_branches_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
+    two_branches_real_t all_lift;              /* p_0 r_0 + ... + p_n r_n */
     uint_least16_t n;                     /* plays without r_0 */
 } two_branches_tables_t;
 
@@ -299,58 +305,90 @@ static two_branches_real_t two_branches_half(two_branches_real_t x)
     return x * (two_branches_real_t)0.5f;
 }
 
-/* The w at which a play of threshold r, held by corner c, starts to follow a rising (falling) move. */
-static two_branches_real_t two_branches_activation(const two_branches_corner_t *c, two_branches_real_t threshold, bool rising)
-{
-    const two_branches_real_t e = c->extremum;
-    const two_branches_real_t r = threshold;
-    if (rising) {
-        return c->side > 0 ? e + (r + r) : c->side == 0 ? e + r : e;
-    }
-    return c->side < 0 ? e - (r + r) : c->side == 0 ? e - r : e;
-}
-
 static bool two_branches_reached(two_branches_real_t x, two_branches_real_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
 }
 
-/* Output less w * slope[k] while plays 0 .. k-1 follow and corner c holds play k. From the corner's own output: what
-   is not moved by a move is not computed anew, and rounding does not pile up from sample to sample. */
-static two_branches_real_t two_branches_base(const two_branches_tables_t *t, const two_branches_corner_t *c, unsigned int k, bool rising)
+static bool two_branches_past(two_branches_real_t x, two_branches_real_t level, bool rising)
 {
-    two_branches_real_t y = c->output;
-    if (c->side == 0) {
-        y = rising ? y - t->lift[k] : y + t->lift[k];
-    } else if (rising && c->side > 0) {
-        y = y - (t->lift[k] + t->lift[k]);
-    } else if (!rising && c->side < 0) {
-        y = y + (t->lift[k] + t->lift[k]);
-    }
-    return y - c->extremum * t->slope[k];
+    return rising ? x > level : x < level;
 }
 
-/* Brings base and next up to date after k, depth or the direction have changed. */
-static void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_memory_t *m, const two_branches_corner_t *corner)
+/* `steps`, a threshold or an output gained, gone on from what a corner holds to where its plays start to follow: two
+   after a turn, one from the start, none where the move leads back to where the corner was. */
+static two_branches_real_t two_branches_from(two_branches_real_t held, int side, two_branches_real_t steps, bool rising)
 {
-    if (m->depth > 0) {
-        const two_branches_corner_t *c = &corner[m->depth - 1];
-        m->base = two_branches_base(t, c, m->k, m->rising);
-        m->next = two_branches_activation(c, t->threshold[m->k], m->rising);
-    } else if (m->rising) { /* every play follows */
-        m->base = -t->lift[m->k];
-        m->next = FLT_MAX;
-    } else {
-        m->base = t->lift[m->k];
-        m->next = -FLT_MAX;
+    if (rising) {
+        return side > 0 ? held + (steps + steps) : side == 0 ? held + steps : held;
+    }
+    return side < 0 ? held - (steps + steps) : side == 0 ? held - steps : held;
+}
+
+/* The w at which play k, held by corner c, starts to follow a rising (falling) move. */
+static two_branches_real_t two_branches_activation(const two_branches_tables_t *t, const two_branches_corner_t *c, unsigned int k,
+                                          bool rising)
+{
+    return two_branches_from(c->extremum, c->side, t->threshold[k], rising);
+}
+
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
+   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+static void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_place_t *p, const two_branches_corner_t *corner)
+{
+    if (p->depth > 0) {
+        const two_branches_corner_t *c = &corner[p->depth - 1];
+        const two_branches_real_t e = c->extremum;
+        const two_branches_real_t y = c->output;
+        const two_branches_real_t *r = &t->threshold[p->k];
+        const two_branches_real_t *z = &t->start_level[p->k];
+        const int side = c->side;
+        if (p->rising ? side < 0 : side > 0) {
+            p->anchor = e;
+            p->anchor_output = y;
+            p->next = e;
+            p->next_output = y;
+        } else {
+            two_branches_real_t to_anchor = r[-1];
+            two_branches_real_t to_next = r[0];
+            two_branches_real_t to_anchor_output = z[-1];
+            two_branches_real_t to_next_output = z[0];
+            if (side != 0) {
+                to_anchor = to_anchor + to_anchor;
+                to_next = to_next + to_next;
+                to_anchor_output = to_anchor_output + to_anchor_output;
+                to_next_output = to_next_output + to_next_output;
+            }
+            if (p->rising) {
+                p->anchor = e + to_anchor;
+                p->anchor_output = y + to_anchor_output;
+                p->next = e + to_next;
+                p->next_output = y + to_next_output;
+            } else {
+                p->anchor = e - to_anchor;
+                p->anchor_output = y - to_anchor_output;
+                p->next = e - to_next;
+                p->next_output = y - to_next_output;
+            }
+        }
+    } else { /* every play follows */
+        p->anchor = 0;
+        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
+        p->next = p->rising ? FLT_MAX : -FLT_MAX;
+        p->next_output = p->rising ? FLT_MAX : -FLT_MAX;
     }
 }
 
-/* How far x lies from what corner c holds, in the measure of the thresholds. */
-static two_branches_real_t two_branches_way(two_branches_real_t x, two_branches_real_t since, int side, bool rising)
+/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
+static two_branches_real_t two_branches_way(two_branches_real_t x, two_branches_real_t held, int side)
 {
-    const two_branches_real_t d = rising ? x - since : since - x;
-    return side == 0 ? d : two_branches_half(d);
+    return side == 0 ? x - held : two_branches_half(x - held);
+}
+
+/* Where the last play of a corner's block starts to follow a rising move. */
+static two_branches_real_t two_branches_last_step(two_branches_real_t held, int side, two_branches_real_t steps)
+{
+    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
 }
 
 /* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
@@ -359,173 +397,40 @@ static bool two_branches_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising steps k .. high that x has not reached; high is known to be one. Gallops away from k because
-   most moves take one play at a time. */
-static unsigned int two_branches_gallop_thresholds(const two_branches_real_t *step, unsigned int k, unsigned int high,
-                                              two_branches_real_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
+static unsigned int two_branches_threshold_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
+                                                  two_branches_real_t x)
 {
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
-        }
-    }
-    return k;
-}
-
-/* Whether the place that solving found is where the move has come to. */
-static bool two_branches_foretold(const two_branches_tables_t *t, const two_branches_memory_t *m, const two_branches_corner_t *corner)
-{
-    const unsigned int k = m->hint_k;
-    const unsigned int left = m->hint_depth;
-    const bool rising = m->rising;
-    unsigned int owner;
-    if (k <= m->k || rising != m->hint_rising) {
-        return false;
-    }
-    if (left > 0 && two_branches_reached(m->w, two_branches_activation(&corner[left - 1], t->threshold[k], rising), rising)) {
-        return false;
-    }
-    owner = left < m->depth && corner[left].end == k ? left : left - 1;
-    return two_branches_reached(m->w, two_branches_activation(&corner[owner], t->threshold[k - 1], rising), rising);
-}
-
-/* The move has passed `next`: finds the plays that follow now. Whole blocks first, by bisection, then inside one. */
-static void two_branches_corners_advance(const two_branches_tables_t *t, two_branches_memory_t *m, const two_branches_corner_t *corner)
-{
-    const two_branches_real_t w = m->w;
-    const bool rising = m->rising;
-    unsigned int left = m->depth; /* corners that stay; those from here on have been passed whole */
-    unsigned int k = m->k;
-    if (two_branches_foretold(t, m, corner)) {
-        left = m->hint_depth;
-        k = m->hint_k;
-    } else {
-        unsigned int low = 0;
-        unsigned int probe = left;
-        while (low < left) {
-            const two_branches_corner_t *c = &corner[probe - 1];
-            if (two_branches_reached(w, two_branches_activation(c, t->threshold[c->end - 1], rising), rising)) {
-                left = probe - 1;
-                k = c->end;
-            } else {
-                low = probe;
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
             }
-            probe = (low + left + 1) / 2;
-        }
-        if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
-            const two_branches_corner_t *c = &corner[left - 1];
-            k = two_branches_gallop_thresholds(t->threshold, k, c->end - 1u, two_branches_way(w, c->extremum, c->side, rising));
-        }
-    }
-    m->depth = (uint_least16_t)left;
-    m->k = (uint_least16_t)k;
-    two_branches_corners_settle(t, m, corner);
-}
-
-/* Memory at rest: every play holds w, nothing has moved yet. */
-static void two_branches_corners_rest(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
-                                      two_branches_real_t w)
-{
-    m->w = w;
-    m->k = 1;
-    m->depth = 0;
-    m->rising = true;
-    m->hint_k = 0;
-    if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
-        m->depth = 1;
-    }
-    two_branches_corners_settle(t, m, corner);
-}
-
-/* Output of the play sum for the memory as it is. */
-static two_branches_real_t two_branches_corners_output(const two_branches_tables_t *t, const two_branches_memory_t *m)
-{
-    return m->base + m->w * t->slope[m->k];
-}
-
-/* Writes the corner that turning back leaves into slot c. */
-static void two_branches_push_corner(const two_branches_tables_t *t, const two_branches_memory_t *m, two_branches_corner_t *c)
-{
-    c->extremum = m->w;
-    c->output = two_branches_corners_output(t, m);
-    c->end = m->k;
-    c->side = m->rising ? -1 : 1;
-}
-
-/* Moves the input of the plays to w. */
-static void two_branches_corners_absorb(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
-                                        two_branches_real_t w)
-{
-    if (m->rising ? w < m->w : w > m->w) { /* turned back: the plays that followed stay where they are */
-        if (m->k > 1) {                    /* a corner that owns no play but the input itself is none */
-            two_branches_push_corner(t, m, &corner[m->depth]);
-            m->depth = (uint_least16_t)(m->depth + 1u);
-        }
-        m->rising = !m->rising;
-        m->k = 1;
-        two_branches_corners_settle(t, m, corner);
-    }
-    m->w = w;
-    if (two_branches_reached(w, m->next, m->rising)) {
-        two_branches_corners_advance(t, m, corner);
-    }
-    m->hint_k = 0;
-}
-
-/* Output at the moment play k of corner c's block starts to follow: the corner's own, or as far from it as the inverse
-   play's threshold z_k says (36). */
-static two_branches_real_t two_branches_level(const two_branches_tables_t *t, const two_branches_corner_t *c, unsigned int k, bool rising)
-{
-    const two_branches_real_t z = t->start_level[k];
-    if (rising) {
-        return c->side > 0 ? c->output + (z + z) : c->side == 0 ? c->output + z : c->output;
-    }
-    return c->side < 0 ? c->output - (z + z) : c->side == 0 ? c->output - z : c->output;
-}
-
-/* As two_branches_gallop_thresholds, over outputs. */
-static unsigned int two_branches_gallop_levels(const two_branches_real_t *step, unsigned int k, unsigned int high, two_branches_real_t x)
-{
-    unsigned int stride = 1;
-    unsigned int probe = k;
-    while (k < high) {
-        if (x >= step[probe]) {
-            k = probe + 1;
-            stride = stride * 2;
-        } else {
-            high = probe;
-        }
-        probe = (k + high) / 2;
-        if (probe > k + stride - 1) {
-            probe = k + stride - 1;
         }
     }
     return k;
 }
 
-/* Input of the plays that gives `output` when the move goes on with plays 0 .. k-1 following and `left` corners. */
-static two_branches_real_t two_branches_corners_locate(const two_branches_tables_t *t, two_branches_memory_t *m,
-                                             const two_branches_corner_t *corner, unsigned int left, unsigned int k,
-                                             bool rising, two_branches_real_t output)
+/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
+   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+static void two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner, unsigned int depth,
+                                  unsigned int k, two_branches_real_t w, two_branches_place_t *p)
 {
+    const bool rising = p->rising;
+    const two_branches_real_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
+    unsigned int left = depth;
     unsigned int probe = left;
     while (low < left) {
         const two_branches_corner_t *c = &corner[probe - 1];
-        if (two_branches_reached(output, two_branches_level(t, c, c->end - 1u, rising), rising)) {
+        if (x >= two_branches_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -535,35 +440,205 @@ static two_branches_real_t two_branches_corners_locate(const two_branches_tables
     }
     if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
         const two_branches_corner_t *c = &corner[left - 1];
-        k = two_branches_gallop_levels(t->start_level, k, c->end - 1u, two_branches_way(output, c->output, c->side, rising));
+        k = two_branches_threshold_not_reached(t->threshold, k, c->end - 1u, two_branches_way(x, rising ? c->extremum : -c->extremum, c->side));
     }
-    m->hint_k = (uint_least16_t)k;
-    m->hint_depth = (uint_least16_t)left;
-    m->hint_rising = rising;
-    if (left > 0) {
-        return (output - two_branches_base(t, &corner[left - 1], k, rising)) * t->inverse_slope[k];
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
+}
+
+/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. */
+static const two_branches_corner_t *two_branches_entered_by(const two_branches_corner_t *corner, unsigned int left,
+                                                  unsigned int depth, unsigned int k)
+{
+    return left < depth && corner[left].end == k ? &corner[left] : &corner[left - 1];
+}
+
+/* Whether the place that solving found is where the move has come to. */
+static bool two_branches_foretold(const two_branches_tables_t *t, const two_branches_memory_t *m, const two_branches_corner_t *corner)
+{
+    const two_branches_place_t *there = &m->there;
+    const two_branches_corner_t *owner;
+    if (there->rising != m->here.rising || two_branches_past(m->w, there->next, there->rising)) {
+        return false;
     }
-    return (rising ? output + t->lift[k] : output - t->lift[k]) * t->inverse_slope[k];
+    if (there->k == 1) {
+        return true;
+    }
+    owner = two_branches_entered_by(corner, there->depth, m->here.depth, there->k);
+    return two_branches_reached(m->w, two_branches_activation(t, owner, there->k - 1u, there->rising), there->rising);
+}
+
+/* Field by field, since compilers may call memcpy for a whole one. */
+static void two_branches_copy_place(two_branches_place_t *to, const two_branches_place_t *from)
+{
+    to->anchor_output = from->anchor_output;
+    to->next_output = from->next_output;
+    to->anchor = from->anchor;
+    to->next = from->next;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
+/* Memory at rest: every play holds w, nothing has moved yet. */
+static void two_branches_corners_rest(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                      two_branches_real_t w)
+{
+    m->w = w;
+    m->here.k = 1;
+    m->here.depth = 0;
+    m->here.rising = true;
+    m->there.k = 0;
+    if (t->n > 0) {
+        corner[0].extremum = w;
+        corner[0].output = w * t->slope[t->n + 1u];
+        corner[0].end = (uint_least16_t)(t->n + 1);
+        corner[0].side = 0;
+        m->here.depth = 1;
+    }
+    two_branches_corners_settle(t, &m->here, corner);
+}
+
+/* Output of the play sum for the memory as it is. */
+static two_branches_real_t two_branches_corners_output(const two_branches_tables_t *t, const two_branches_memory_t *m)
+{
+    return m->here.anchor_output + (m->w - m->here.anchor) * t->slope[m->here.k];
+}
+
+/* Writes the corner that turning back leaves into slot c. */
+static void two_branches_push_corner(const two_branches_tables_t *t, const two_branches_memory_t *m, two_branches_corner_t *c)
+{
+    c->extremum = m->w;
+    c->output = two_branches_corners_output(t, m);
+    c->end = m->here.k;
+    c->side = m->here.rising ? -1 : 1;
+}
+
+/* Moves the input of the plays to w. */
+static void two_branches_corners_absorb(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                        two_branches_real_t w)
+{
+    const bool turned = m->here.rising ? w < m->w : w > m->w;
+    if (turned) {       /* the plays that followed stay where they are */
+        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
+            two_branches_push_corner(t, m, &corner[m->here.depth]);
+            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
+        }
+        m->here.rising = !m->here.rising;
+        m->here.k = 1;
+    }
+    m->w = w;
+    if (m->there.k > 0 && two_branches_foretold(t, m, corner)) {
+        two_branches_copy_place(&m->here, &m->there);
+    } else {
+        if (turned) {
+            two_branches_corners_settle(t, &m->here, corner);
+        }
+        if (two_branches_reached(w, m->here.next, m->here.rising)) {
+            two_branches_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
+            two_branches_corners_settle(t, &m->here, corner);
+        }
+    }
+    m->there.k = 0;
+}
+
+static bool two_branches_passed(two_branches_real_t output, two_branches_real_t level, bool rising)
+{
+    return rising ? output >= level : output <= level;
+}
+
+/* As two_branches_threshold_not_reached, over outputs gained. */
+static unsigned int two_branches_level_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
+                                              two_branches_real_t x)
+{
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            ++k;
+            while (k < high) {
+                const unsigned int middle = (k + high) / 2;
+                if (x >= step[middle]) {
+                    k = middle + 1;
+                } else {
+                    high = middle;
+                }
+            }
+        }
+    }
+    return k;
+}
+
+/* As two_branches_find_by_input, for a move to an output. */
+static void two_branches_find_by_output(const two_branches_tables_t *t, const two_branches_corner_t *corner, unsigned int depth,
+                                   unsigned int k, two_branches_real_t output, two_branches_place_t *p)
+{
+    const bool rising = p->rising;
+    const two_branches_real_t x = rising ? output : -output; /* everything as a rising move sees it */
+    unsigned int low = 0;
+    unsigned int left = depth;
+    unsigned int probe = left;
+    while (low < left) {
+        const two_branches_corner_t *c = &corner[probe - 1];
+        if (x >= two_branches_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+            left = probe - 1;
+            k = c->end;
+        } else {
+            low = probe;
+        }
+        probe = (low + left + 1) / 2;
+    }
+    if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
+        const two_branches_corner_t *c = &corner[left - 1];
+        k = two_branches_level_not_reached(t->start_level, k, c->end - 1u, two_branches_way(x, rising ? c->output : -c->output, c->side));
+    }
+    p->depth = (uint_least16_t)left;
+    p->k = (uint_least16_t)k;
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner that turning back would leave. */
+   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
+   that turning back would leave. Rounding is kept from leading out of the place that was found: then the plays that
+   follow are those that will. */
 static two_branches_real_t two_branches_corners_solve(const two_branches_tables_t *t, two_branches_memory_t *m,
                                                  two_branches_corner_t *corner, two_branches_real_t output)
 {
-    const two_branches_real_t w = (output - m->base) * t->inverse_slope[m->k];
-    unsigned int depth = m->depth;
-    if (m->rising ? w >= m->w : w <= m->w) {
-        if (!two_branches_reached(w, m->next, m->rising)) {
-            return w; /* the same plays follow: the usual sample */
+    const two_branches_place_t *here = &m->here;
+    two_branches_place_t *there = &m->there;
+    two_branches_real_t w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
+    unsigned int depth = here->depth;
+    unsigned int k = here->k + 1u;
+    bool rising = here->rising;
+    if (rising ? w >= m->w : w <= m->w) {
+        if (!two_branches_passed(output, here->next_output, rising)) {
+            there->k = 0;
+            return two_branches_reached(w, here->next, rising) ? here->next : w;
         }
-        return two_branches_corners_locate(t, m, corner, depth, m->k, m->rising, output);
+    } else { /* the move turns back */
+        if (k > 2) {
+            two_branches_push_corner(t, m, &corner[depth]);
+            depth = depth + 1;
+        }
+        k = 1;
+        rising = !rising;
     }
-    if (m->k > 1) {
-        two_branches_push_corner(t, m, &corner[depth]);
-        depth = depth + 1;
+    there->rising = rising;
+    two_branches_find_by_output(t, corner, depth, k, output, there);
+    two_branches_corners_settle(t, there, corner);
+    k = there->k;
+    w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
+    if (two_branches_past(w, there->next, rising)) {
+        return there->next;
     }
-    return two_branches_corners_locate(t, m, corner, depth, 1, !m->rising, output);
+    if (k > 1) {
+        const two_branches_corner_t *owner = two_branches_entered_by(corner, there->depth, depth, k);
+        const two_branches_real_t first = two_branches_activation(t, owner, k - 1, rising);
+        if (!two_branches_reached(w, first, rising)) {
+            there->anchor = first; /* so that later answers of the same move do not lie before this one */
+            there->anchor_output = output;
+            return first;
+        }
+    }
+    return w;
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
@@ -574,10 +649,6 @@ static const two_branches_real_t two_branches_slope[8] = {
     0.0f, 0.72f, 1.32f, 1.8f, 2.16f, 2.4f, 2.52f, 2.532f
 };
 
-static const two_branches_real_t two_branches_lift[8] = {
-    0.0f, 0.0f, 0.27f, 0.702f, 1.188f, 1.62f, 1.89f, 1.9224f
-};
-
 static const two_branches_real_t two_branches_start_level[7] = {
     0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
 };
@@ -586,9 +657,10 @@ static const two_branches_real_t two_branches_reciprocal[8] = {
     0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
 };
 
-/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; plays without r_0 */
+/* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; the
+   whole sum of weight times threshold; plays without r_0 */
 static const two_branches_tables_t two_branches_tables = {
-    two_branches_threshold, NULL, two_branches_slope, two_branches_lift, two_branches_start_level, two_branches_reciprocal, 6
+    two_branches_threshold, NULL, two_branches_slope, NULL, two_branches_start_level, two_branches_reciprocal, 1.9224f, 6
 };
 
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
@@ -684,7 +756,7 @@ static two_branches_real_t two_branches_inverse_choose(const two_branches_invers
         return v;
     }
     back = two_branches_clamp_drive(v) - self->applied;
-    if (up == self->ascending && back >= -0.0019484693f && back <= 0.0019484693f) {
+    if (up == self->ascending && back >= -0.0015990745f && back <= 0.0015990745f) {
         return self->applied; /* stepped back by rounding alone */
     }
     v = two_branches_front_inverse(w, !up, limited);
@@ -695,6 +767,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
 {
     two_branches_real_t w;
     two_branches_real_t v;
+    two_branches_real_t asked;
     two_branches_real_t inside;
     unsigned int bits = 0;
     bool limited = false;
@@ -702,23 +775,21 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         two_branches_inverse_see(self, self->pending);
         self->has_pending = false;
     }
-    if (!two_branches_finite(u)) {
-        self->status |= TWO_BRANCHES_STATUS_HELD;
-        return two_branches_inverse_answer(self, self->stepped ? self->answer : two_branches_clamp_drive(self->applied));
+    asked = u;
+    if (!(u >= TWO_BRANCHES_OUTPUT_MIN && u <= TWO_BRANCHES_OUTPUT_MAX)) {
+        if (!two_branches_finite(u)) {
+            self->status |= TWO_BRANCHES_STATUS_HELD;
+            return two_branches_inverse_answer(self, self->stepped ? self->answer : two_branches_clamp_drive(self->applied));
+        }
+        u = u < TWO_BRANCHES_OUTPUT_MIN ? TWO_BRANCHES_OUTPUT_MIN : TWO_BRANCHES_OUTPUT_MAX;
+        bits = TWO_BRANCHES_STATUS_INPUT_CLAMPED;
     }
-    if (self->repeat && !(u < self->reference) && !(u > self->reference)) {
+    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
         self->status |= self->bits;
         return two_branches_inverse_answer(self, self->answer);
     }
-    self->reference = u;
+    self->reference = asked;
     self->repeat = true;
-    if (u < TWO_BRANCHES_OUTPUT_MIN) {
-        u = TWO_BRANCHES_OUTPUT_MIN;
-        bits |= TWO_BRANCHES_STATUS_INPUT_CLAMPED;
-    } else if (u > TWO_BRANCHES_OUTPUT_MAX) {
-        u = TWO_BRANCHES_OUTPUT_MAX;
-        bits |= TWO_BRANCHES_STATUS_INPUT_CLAMPED;
-    }
     w = two_branches_corners_solve(&two_branches_tables, &self->memory, self->corner, u - 0.0f);
     v = two_branches_inverse_choose(self, u, w, &limited);
     self->level = u;
