@@ -23,6 +23,8 @@ static hystgen_reach_t hystgen_corners_locate(const hystgen_tables_t *t, hystgen
         const hystgen_corner_t *owner = hystgen_entered_by(corner, there->depth, depth, k);
         w = hystgen_activation(t, owner, k - 1, rising);
         here = hystgen_level(t, owner, k - 1, rising);
+        there->anchor = w; /* the same line, from where it begins */
+        there->anchor_output = here;
     } else {
         w = m->w;
         here = hystgen_corners_output(t, m);

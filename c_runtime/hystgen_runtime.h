@@ -39,6 +39,7 @@ typedef hystgen_real_t hystgen_sum_t;
 #ifdef HYSTGEN_FIXED
 #include "hystgen_tables_fixed.h"
 
+uint64_t hystgen_wide(uint32_t a, uint32_t b);
 int64_t hystgen_nearest(int64_t x, unsigned int bits);
 int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient, unsigned int pieces,
                       unsigned int degree, int32_t x);

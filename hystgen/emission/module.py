@@ -220,6 +220,8 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
         roots.add(f"hystgen_{engine}_solve")
     if values.fast:
         roots.add("hystgen_copy_place")
+    if values.fast and family.fixed:
+        roots.add("hystgen_wide")
     types = {"hystgen_tables_t"} | {f"hystgen_{stage['kind']}_t" for stage in values.stages}
     for stage in values.stages:
         roots.add(f"hystgen_{stage['kind']}_forward")

@@ -210,7 +210,13 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "forward_max_error": _decimal(form.forward_error),
         "inverse_max_error": _decimal(form.inverse_error) if options.inverse and form.inverse_error else "",
         "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
-        "fast": False,
+        "fast": options.inverse and corners and not numbers.fronts,
+        # output codes of half a drive code and of what the reciprocal can be off, on the steepest piece
+        "shy": (int(max(numbers.slope)) * ((2**fine + 1) // 2 + 8) >> int(limits[fixed.FRACTION])) + 1,
+        # so far on that w goes on by less than 2^30 least steps
+        "most_on": f"UINT64_C({int(min(numbers.slope[1:])) << 30})",
+        "narrow_shift": all(1 <= shift - 1 <= 31 for shift in numbers.shift[1:]),
+        "half_code": 2**fine // 2,
         "wide_t": f"{prefix}_reach_t",
         "play_t": f"{prefix}_play_t",
         "precision": precision,
