@@ -16,6 +16,7 @@ import argparse
 import csv
 import functools
 import itertools
+import math
 import sys
 import tempfile
 import time
@@ -27,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import reference, tables
+from hystgen import fixed_tables, reference, simulation, tables
 from hystgen.api import Model, emit_options
 from hystgen.emission.text import operand, table
 from hystgen.params import parse_parameters
@@ -37,7 +38,13 @@ HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 RANGE = 10.0
-REALS = {"float32": "float", "float64": "double"}
+# of the textbook loop: what numbers are and what sums are
+TYPES = {
+    "float32": ("float", "float"),
+    "float64": ("double", "double"),
+    "q31": ("int32_t", "int64_t"),
+    "q15": ("int16_t", "int32_t"),
+}
 Reals = NDArray[np.float64]
 
 
@@ -85,9 +92,20 @@ def multisine(samples: int, stride: int = 1) -> Reals:
     return np.asarray(x / np.max(np.abs(x)))
 
 
-def from_drive(n: int, operator: str, drive: Reals) -> Reals:
+def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
+    """Operations and arguments that run drive records one after another, each from a reset."""
+    x = np.concatenate([np.append(record[0], record) for record in records])
+    call = np.full(len(x), reference.OP_STEP, dtype=np.uint8)
+    call[np.cumsum([0, *(len(record) + 1 for record in records[:-1])])] = reference.OP_RESET
+    return call, x
+
+
+def from_drive(n: int, operator: str, drive: Reals, call: Any = None) -> Reals:
     """What the operator is given so that the plays see `drive`."""
-    return drive if operator == "forward" else model(n).cascade.simulate(drive)
+    if operator == "forward":
+        return drive
+    session = simulation.Session(model(n).cascade, "forward")
+    return session.run(drive)[0] if call is None else session.operate(call, drive)[0]
 
 
 def corner_lists(n: int) -> Iterator[Reals]:
@@ -123,10 +141,10 @@ def trials(n: int) -> list[Reals]:
             found += [np.append(points, (a, b)), np.append(points, (a, on, b))]
     # and blocks of uneven sizes, which no rule makes: turning points at random, small among large
     rng = np.random.default_rng(11)
-    for _ in range(1500):
+    for _ in range(5000):
         size = rng.integers(4, 12)
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
-        found.append(np.concatenate([[RANGE, -RANGE], turns]))
+        found += [np.concatenate([[RANGE, -RANGE], turns]), turns]  # after full swings, and from the start
     return found
 
 
@@ -149,6 +167,28 @@ class Case:
     arithmetic: str
 
 
+REALS = ("float32", "float64")
+
+
+@functools.cache
+def lsbs(case: Case) -> tuple[float, float]:
+    """Drive and output of a code; 1 in floating point."""
+    if case.arithmetic in REALS:
+        return 1.0, 1.0
+    form = fixed_tables.build(model(case.n).cascade, case.arithmetic, "corners", None, None)[1]
+    return float(form.drive_lsb), float(form.output_lsb)
+
+
+def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
+    """What the operator takes so that the plays see `drive`, in its own numbers: codes, `coarser` times the finest."""
+    x = from_drive(case.n, case.operator, drive, call)
+    real = comparison.REALS[case.arithmetic]
+    if real.kind != "i":
+        return x.astype(real)
+    codes = np.rint(x / lsbs(case)[case.operator == "inverse"] / coarser)
+    return np.clip(codes, np.iinfo(real).min, np.iinfo(real).max).astype(real)
+
+
 class Bench:
     """Builds, runs and counts in a folder of its own; remembers the worst trials found."""
 
@@ -156,7 +196,7 @@ class Bench:
         self._folder = folder
         self._number = itertools.count()
         self._emitted: dict[tuple[int, str, str], sources.Sources] = {}
-        self._worst: dict[Case, Reals] = {}
+        self._worst: dict[Case, tuple[Any, Any]] = {}
 
     def image(self, case: Case, engine: str) -> emulator.Image:
         """A strict build of emitted code with both operators, or of the textbook loop with one."""
@@ -175,19 +215,36 @@ class Bench:
         return self._emitted[about]
 
     def _textbook(self, case: Case) -> sources.Sources:
+        """The loop with its tables; in fixed point with codes of half the finest, so that sums of two fit."""
         folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
         cascade = model(case.n).cascade
         forward = case.operator == "forward"
         pi = cascade.pi if forward else cascade.pi.inverse()
-        dtype = np.dtype(case.arithmetic).type
-        ends = [tables.inward(*pair, dtype) for pair in (cascade.input_range, cascade.output_range)]
+        real, total = TYPES[case.arithmetic]
+        ends = (cascade.input_range, cascade.output_range)
+        sizes = f"#define TEXTBOOK_REAL {real}\n#define TEXTBOOK_SUM {total}\n#define TEXTBOOK_N_PLAYS {case.n}\n"
+        if case.arithmetic in ("q31", "q15"):
+            drive, output = (2 * lsb for lsb in lsbs(case))
+            into, out = (drive, output) if forward else (output, drive)
+            # bits of the sum, less a sign, less those of a number, less those of the steepest gain
+            gain = sum(abs(p) for p in pi.weights) * into / out
+            fraction = (62 if case.arithmetic == "q31" else 30) - (30 if case.arithmetic == "q31" else 14)
+            fraction -= max(0, math.ceil(math.log2(gain))) + 1
+            weights = [round(p * into / out * 2**fraction) for p in pi.weights]
+            thresholds = [round(r / into) for r in pi.thresholds]
+            limits = [[int(end / lsb) for end in pair] for pair, lsb in zip(ends, (drive, output), strict=True)]
+            sizes += f"#define TEXTBOOK_FRACTION {fraction}\n"
+            kind = "int32_t"
+        else:
+            dtype = np.dtype(case.arithmetic).type
+            weights, thresholds = ([dtype(x) for x in numbers] for numbers in (pi.weights, pi.thresholds))
+            limits = [list(tables.inward(*pair, dtype)) for pair in ends]
+            kind = "textbook_real_t"
         names = ("INPUT_MIN", "INPUT_MAX", "OUTPUT_MIN", "OUTPUT_MAX")
-        values = itertools.chain(*(ends if forward else ends[::-1]))
+        values = itertools.chain(*(limits if forward else limits[::-1]))
         text = "".join(f"#define TEXTBOOK_{name} {operand(end)}\n" for name, end in zip(names, values, strict=True))
-        for name, numbers in (("weight", pi.weights), ("threshold", pi.thresholds)):
-            text += table("textbook_real_t", f"textbook_{name}", [dtype(x) for x in numbers])
-        sizes = f"#define TEXTBOOK_REAL {REALS[case.arithmetic]}\n#define TEXTBOOK_N_PLAYS {case.n}\n"
+        text += table(kind, "textbook_weight", weights) + table("textbook_real_t", "textbook_threshold", thresholds)
         (folder / "textbook_tables.h").write_text(text)
         (folder / "textbook_sizes.h").write_text(sizes)
         (folder / "hystgen_harness.c").write_text(sources.harness("textbook", ("forward",)))
@@ -199,29 +256,33 @@ class Bench:
         """The textbook loop over a drive, the multisine; its answers are compared with the double model."""
         image = self.image(case, "textbook")
         core = emulator.Core(case.target, image)
-        x = from_drive(case.n, case.operator, drive).astype(case.arithmetic)
+        x = given(case, drive, 2)
         answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
         cascade = model(case.n).cascade
-        exact = (cascade if case.operator == "forward" else cascade.inverse()).simulate(x, clamp=True)
-        assert np.max(np.abs(answer - exact)) < 1e-3 * RANGE
+        forward = case.operator == "forward"
+        into, out = (2 * lsb for lsb in (lsbs(case) if forward else lsbs(case)[::-1]))
+        if case.arithmetic in REALS:
+            into = out = 1.0
+        exact = (cascade if forward else cascade.inverse()).simulate(x * into, clamp=True)
+        assert np.max(np.abs(answer * out - exact)) < (1e-3 if case.arithmetic != "q15" else 1e-2) * RANGE
         return figures_of(case, "textbook", "multisine", core, image)
 
     def engine(self, case: Case, engine: str, drive: Reals) -> Figures:
         """Emitted code over a drive, the multisine."""
         image = self.image(case, engine)
-        x = from_drive(case.n, case.operator, drive)
+        x = given(case, drive)
         return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
     def worst(self, case: Case) -> Figures:
         """Engine corners over the worst trials."""
         image = self.image(case, "corners")
-        core = self.run(case, image, "corners", self._worst_trials(case))
+        core = self.run(case, image, "corners", *self._worst_trials(case))
         return figures_of(case, "corners", "worst case", core, image)
 
-    def run(self, case: Case, image: emulator.Image, engine: str, x: Reals) -> emulator.Core:
-        """A core after the steps `x`, whose answers have been compared with the bit reference."""
+    def run(self, case: Case, image: emulator.Image, engine: str, x: Any, call: Any = None) -> emulator.Core:
+        """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
         numbers = model(case.n).tables(case.arithmetic, engine)
-        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
+        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8) if call is None else call, x)
         real = comparison.REALS[case.arithmetic]
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)
@@ -229,7 +290,7 @@ class Bench:
         assert not outcome.different, f"{case}, {engine}: {outcome}"
         return core
 
-    def _worst_trials(self, case: Case) -> Reals:
+    def _worst_trials(self, case: Case) -> tuple[Any, Any]:
         """The trials with the dearest samples on a Cortex-M4F, after a search among their neighbours for dearer ones;
         those of other cores differ little."""
         case = replace(case, target=targets.find("cortex-m4f"))
@@ -237,16 +298,20 @@ class Bench:
             image = self.image(case, "corners")
 
             def dearest(found: list[Reals], number: int) -> list[Reals]:
-                x = from_drive(case.n, case.operator, np.concatenate(found))
-                counts = self.run(case, image, "corners", x).counts
-                ends = np.cumsum([len(trial) for trial in found])
+                call, drive = together(found)
+                counts = np.zeros(len(call))
+                counts[call == reference.OP_STEP] = self.run(
+                    case, image, "corners", given(case, drive, call=call), call
+                ).counts
+                ends = np.cumsum([len(trial) + 1 for trial in found])
                 dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
                 return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
 
-            best = dearest(trials(case.n), 10)
-            for _ in range(3):
-                best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], 10)
-            self._worst[case] = from_drive(case.n, case.operator, np.concatenate(best))
+            best = dearest(trials(case.n), 20)
+            for _ in range(6):
+                best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], 20)
+            call, drive = together(best)
+            self._worst[case] = given(case, drive, call=call), call
         return self._worst[case]
 
 
@@ -341,12 +406,14 @@ def table_text(figures: Iterable[Figures]) -> str:
 
 
 def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
-    """What the float32 inverse is to reach: words, figure, most allowed."""
-    found = {(f.target, f.compiler, f.engine, f.n, f.signal): f for f in figures
-             if f.operator == "inverse" and f.arithmetic == "float32"}  # fmt: skip
+    """What the inverse is to reach: words, figure, most allowed."""
+    found = {(f.target, f.compiler, f.engine, f.n, f.signal, f.arithmetic): f for f in figures
+             if f.operator == "inverse"}  # fmt: skip
 
-    def get(target: str, engine: str, n: int, signal: str = "multisine") -> Figures | None:
-        return found.get((target, compiler, engine, n, signal))
+    def get(
+        target: str, engine: str, n: int, signal: str = "multisine", arithmetic: str = "float32"
+    ) -> Figures | None:
+        return found.get((target, compiler, engine, n, signal, arithmetic))
 
     wanted = []
     for compiler in cross.NAMES:
@@ -364,6 +431,10 @@ def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
         if f and text:
             words = f"cortex-m0plus {compiler} n = 16: mean, a ninth of textbook's {text.mean}"
             wanted.append((words, f.mean, text.mean / 9))
+        f, text = (get("cortex-m0plus", engine, 16, arithmetic="q31") for engine in ("corners", "textbook"))
+        if f and text:
+            words = f"cortex-m0plus {compiler} q31 n = 16: mean, a quarter of textbook's {text.mean}"
+            wanted.append((words, f.mean, text.mean / 4))
     return wanted
 
 
@@ -414,7 +485,7 @@ def main() -> int:
     parser.add_argument("--n", default=",".join(map(str, PLAYS)), help="plays, comma separated")
     parser.add_argument("--targets", default=",".join(targets.NAMES[1:]), help="cores, comma separated")
     parser.add_argument("--compilers", default=",".join(cross.NAMES), help="zig, gcc")
-    parser.add_argument("--arithmetics", default="float32", help="comma separated")
+    parser.add_argument("--arithmetics", default="float32,float64,q31,q15", help="comma separated")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="of the multisine")
     parser.add_argument("-o", "--output", type=Path, help="folder for targets.csv and targets.svg")
     parser.add_argument("--check", action="store_true", help="exit 1 where a goal is missed")

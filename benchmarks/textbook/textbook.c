@@ -28,12 +28,14 @@ void textbook_forward_reset(textbook_forward_t *self, textbook_real_t x)
 
 textbook_real_t textbook_forward_step(textbook_forward_t *self, textbook_real_t x)
 {
-    textbook_real_t y;
+    textbook_sum_t y;
     int i;
+#ifndef TEXTBOOK_FRACTION
     if (!(x >= -FLT_MAX && x <= FLT_MAX)) {
         self->status |= TEXTBOOK_STATUS_HELD;
         return self->answer;
     }
+#endif
     if (x < TEXTBOOK_INPUT_MIN) {
         x = TEXTBOOK_INPUT_MIN;
         self->status |= TEXTBOOK_STATUS_INPUT_CLAMPED;
@@ -41,14 +43,17 @@ textbook_real_t textbook_forward_step(textbook_forward_t *self, textbook_real_t 
         x = TEXTBOOK_INPUT_MAX;
         self->status |= TEXTBOOK_STATUS_INPUT_CLAMPED;
     }
-    y = textbook_weight[0] * x;
+    y = (textbook_sum_t)textbook_weight[0] * x;
     for (i = 0; i < TEXTBOOK_N_PLAYS; ++i) {
-        const textbook_real_t low = x - textbook_threshold[i + 1];
-        const textbook_real_t high = x + textbook_threshold[i + 1];
+        const textbook_real_t low = (textbook_real_t)(x - textbook_threshold[i + 1]);
+        const textbook_real_t high = (textbook_real_t)(x + textbook_threshold[i + 1]);
         const textbook_real_t upper = self->play[i] > high ? high : self->play[i];
         self->play[i] = upper < low ? low : upper;
-        y = y + textbook_weight[i + 1] * self->play[i];
+        y = y + (textbook_sum_t)textbook_weight[i + 1] * self->play[i];
     }
+#ifdef TEXTBOOK_FRACTION
+    y = (y + ((textbook_sum_t)1 << (TEXTBOOK_FRACTION - 1))) >> TEXTBOOK_FRACTION;
+#endif
     if (y < TEXTBOOK_OUTPUT_MIN) {
         y = TEXTBOOK_OUTPUT_MIN;
         self->status |= TEXTBOOK_STATUS_OUTPUT_CLAMPED;
@@ -56,8 +61,8 @@ textbook_real_t textbook_forward_step(textbook_forward_t *self, textbook_real_t 
         y = TEXTBOOK_OUTPUT_MAX;
         self->status |= TEXTBOOK_STATUS_OUTPUT_CLAMPED;
     }
-    self->answer = y;
-    return y;
+    self->answer = (textbook_real_t)y;
+    return self->answer;
 }
 
 unsigned int textbook_forward_status(textbook_forward_t *self)

@@ -1,9 +1,13 @@
 #ifndef TEXTBOOK_H
 #define TEXTBOOK_H
 
-#include "textbook_sizes.h" /* written by the benchmark: TEXTBOOK_REAL, TEXTBOOK_N_PLAYS */
+#include <stdint.h>
+
+/* written by the benchmark: TEXTBOOK_REAL, TEXTBOOK_SUM, TEXTBOOK_N_PLAYS, in fixed point TEXTBOOK_FRACTION */
+#include "textbook_sizes.h"
 
 typedef TEXTBOOK_REAL textbook_real_t;
+typedef TEXTBOOK_SUM textbook_sum_t;
 
 #define TEXTBOOK_STATUS_INPUT_CLAMPED 1u
 #define TEXTBOOK_STATUS_OUTPUT_CLAMPED 2u

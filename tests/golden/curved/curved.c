@@ -38,12 +38,25 @@ static curved_sum_t curved_half(curved_sum_t x)
     return x >> 1;
 }
 
+/* a times b. Cores without a long multiplication take half words, which is what they can do without a call. */
+static uint64_t curved_wide(uint32_t a, uint32_t b)
+{
+#if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
+    const uint32_t low = (a & 0xffffu) * (b & 0xffffu);
+    const uint32_t one = (a >> 16) * (b & 0xffffu) + (low >> 16);
+    const uint32_t other = (a & 0xffffu) * (b >> 16) + (one & 0xffffu);
+    return (uint64_t)((a >> 16) * (b >> 16) + (one >> 16) + (other >> 16)) << 32 | (other << 16 | (low & 0xffffu));
+#else
+    return (uint64_t)a * b;
+#endif
+}
+
 /* d / slope[k] to the nearest whole number, d not negative: the upper bits of d times the reciprocal. */
 static curved_sum_t curved_over_slope(const curved_tables_t *t, curved_sum_t d, unsigned int k)
 {
     const uint32_t r = t->reciprocal[k];
-    const uint64_t low = ((uint64_t)(uint32_t)d * r) >> 32;
-    const uint64_t quotient = (uint64_t)(uint32_t)((uint64_t)d >> 32) * r + low;
+    const uint64_t low = curved_wide((uint32_t)d, r) >> 32;
+    const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> 32), r) + low;
     return (curved_sum_t)(((quotient >> (t->shift[k] - 1u)) + 1u) >> 1);
 }
 
@@ -371,6 +384,8 @@ static curved_reach_t curved_corners_locate(const curved_tables_t *t, curved_mem
         const curved_corner_t *owner = curved_entered_by(corner, there->depth, depth, k);
         w = curved_activation(t, owner, k - 1, rising);
         here = curved_level(t, owner, k - 1, rising);
+        there->anchor = w; /* the same line, from where it begins */
+        there->anchor_output = here;
     } else {
         w = m->w;
         here = curved_corners_output(t, m);

@@ -425,8 +425,8 @@ static void plain_inverse_begin(plain_inverse_t *self, plain_real_t applied)
     self->bits = 0;
     self->edge[0] = 0;
     self->edge[1] = 0;
-    self->gain = 0;
     self->before = 0;
+    self->gain = 0;
     self->fast = false;
     self->falling = false;
     self->status = 0;
@@ -635,12 +635,12 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
     self->status |= bits;
     if (!(bits & PLAIN_STATUS_OUTPUT_CLAMPED)) { /* the drive is what solving gave */
         const plain_memory_t *m = &self->memory;
-        if (m->there.k > 0) {
-            if (m->there.rising ? v > m->w : v < m->w) {
-                plain_inverse_enter_fast(self, asked);
+        const plain_place_t *p = m->there.k > 0 ? &m->there : &m->here;
+        if ((p->rising ? v > m->w && (v < p->next || p == &m->there) : v < m->w && (v > p->next || p == &m->there))
+            && (bits == 0 || (asked > u) == p->rising)) { /* a limited reference lies ahead, no other one before it */
+            if (p != &m->there) {
+                plain_copy_place(&self->memory.there, p);
             }
-        } else if (m->here.rising ? v > m->w && v < m->here.next : v < m->w && v > m->here.next) {
-            plain_copy_place(&self->memory.there, &m->here);
             plain_inverse_enter_fast(self, asked);
         }
     }

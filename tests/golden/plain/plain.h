@@ -92,7 +92,7 @@ typedef struct {
     plain_real_t applied;   /* drive seen last */
     plain_real_t reference; /* input of the last step */
     plain_real_t answer;    /* drive returned last */
-    bool fast;                   /* edge and gain hold */
+    bool fast;                   /* edges hold */
     bool falling;
     bool has_pending;
     bool repeat;                 /* the last answer still stands for `reference` */
