@@ -439,7 +439,7 @@ def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
 
 
 def plot(figures: Sequence[Figures], path: Path) -> None:
-    """Instructions against n, a panel a core: textbook loop, both engines, worst case; zig's inverse."""
+    """Instructions against n, a panel a core, of zig's inverse: textbook loop, both engines, worst case; q31."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -450,17 +450,19 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
     high, wide = -(-len(names) // 3), min(3, len(names))
     panels, axes = plt.subplots(high, wide, figsize=(1 + 3.3 * wide, 3.6 * high), squeeze=False, layout="constrained")
     lines = (
-        ("textbook", "multisine", "mean", "textbook loop", "0.45", "-"),
-        ("loop", "multisine", "mean", "engine loop", "tab:orange", "-"),
-        ("corners", "worst case", "max", "engine corners, worst sample", "tab:blue", "--"),
-        ("corners", "multisine", "mean", "engine corners, mean", "tab:blue", "-"),
+        ("float32", "textbook", "multisine", "mean", "textbook loop", "0.45", "-"),
+        ("float32", "loop", "multisine", "mean", "engine loop", "tab:orange", "-"),
+        ("float32", "corners", "worst case", "max", "engine corners, worst sample", "tab:blue", "--"),
+        ("float32", "corners", "multisine", "mean", "engine corners, mean", "tab:blue", "-"),
+        ("q31", "textbook", "multisine", "mean", "textbook loop, q31", "0.45", ":"),
+        ("q31", "corners", "multisine", "mean", "engine corners, mean, q31", "tab:green", "-"),
     )
     for ax, name in zip(axes.flat, names, strict=False):
-        for engine, signal, what, label, colour, style in lines:
+        for arithmetic, engine, signal, what, label, colour, style in lines:
             points = [
                 (f.n, getattr(f, what)) for f in figures
                 if (f.target, f.compiler, f.operator, f.engine, f.signal, f.arithmetic)
-                == (name, "zig", "inverse", engine, signal, "float32")
+                == (name, "zig", "inverse", engine, signal, arithmetic)
             ]  # fmt: skip
             if points:
                 ax.loglog(*zip(*points, strict=True), style, color=colour, marker="o", markersize=3, label=label)
@@ -473,8 +475,8 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
         row[0].set_ylabel("instructions per sample")
     for ax in list(axes.flat)[len(names) :]:
         ax.set_visible(False)
-    panels.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(lines), fontsize=9)
-    panels.suptitle("Inverse in float32, zig -O2, decaying multisine")
+    panels.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9)
+    panels.suptitle("Inverse, zig -O2, decaying multisine")
     panels.savefig(path, metadata={"Date": None})
     plt.close(panels)
 

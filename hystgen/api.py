@@ -54,9 +54,11 @@ class Model:
         """C identifier that prefixes every emitted symbol."""
         return self.parameters.name
 
-    def engine(self, engine: str | None = None) -> str:
-        """'corners' or 'loop': the given engine, or the parameter file's, with `auto` decided."""
-        return tables.choose_engine(engine or self.parameters.emit.engine, self.cascade.pi.n)
+    def engine(self, engine: str | None = None, operator: str | None = None, arithmetic: str | None = None) -> str:
+        """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided."""
+        emit = self.parameters.emit
+        about = (operator or emit.operator, arithmetic or emit.arithmetic)
+        return tables.choose_engine(engine or emit.engine, self.cascade, *about)
 
     def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables:
         """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
@@ -74,7 +76,8 @@ class Model:
 
         if arithmetic is not None:
             check_arithmetic(arithmetic)
-            return Session(self.cascade, operator, arithmetic, self.engine(engine), clamp, self._lsb)
+            chosen = self.engine(engine, arithmetic=arithmetic)
+            return Session(self.cascade, operator, arithmetic, chosen, clamp, self._lsb)
         return Session(self.cascade, operator, clamp=clamp)
 
     def simulate(
@@ -146,18 +149,16 @@ def emit_options(
     from hystgen.emission import module
 
     defaults = model.parameters.emit
-    options = module.Options(
-        operator or defaults.operator, arithmetic or defaults.arithmetic, model.engine(engine), layout
-    )
-    check_arithmetic(options.arithmetic)
+    operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
+    check_arithmetic(arithmetic)
     for value, known, what in (
-        (options.operator, module.OPERATORS, "operator"),
-        (options.engine, tables.ENGINES, "engine"),
-        (options.layout, module.LAYOUTS, "layout"),
+        (operator, module.OPERATORS, "operator"),
+        (engine or "auto", ("auto", *tables.ENGINES), "engine"),
+        (layout, module.LAYOUTS, "layout"),
     ):
         if value not in known:
             raise ValueError(f"{what} {value!r} is none of {', '.join(known)}")
-    return options
+    return module.Options(operator, arithmetic, model.engine(engine, operator, arithmetic), layout)
 
 
 def emitted_files(source: Model | str | os.PathLike[str], **options: str | None) -> dict[str, str]:

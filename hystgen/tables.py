@@ -5,10 +5,13 @@ Everything a compiled operator knows comes from here, once, for the bit referenc
 
 from __future__ import annotations
 
+import csv
+import functools
 import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,20 +28,42 @@ if TYPE_CHECKING:
 ARITHMETICS = ("float32", "float64", "q31", "q15")
 ENGINES = ("corners", "loop")
 FLOAT_ARITHMETICS = ("float32", "float64")
-SMALLEST_CORNERS = 3  # plays from which on the corner list is cheaper than visiting every play
 
 
 class FormatError(ValueError):
     """A model whose numbers do not fit the arithmetic."""
 
 
-def choose_engine(engine: str, n: int) -> str:
-    """The engine that `auto` stands for with n plays; any other choice is kept, but without plays nothing is listed."""
+def choose_engine(engine: str, cascade: Cascade, operator: str, arithmetic: str) -> str:
+    """The engine that `auto` stands for: what takes fewer instructions in the measured table `engine_costs.csv`.
+
+    The table's next smaller number of plays decides; for both operators the sum. Any other choice is kept, but without
+    plays nothing is listed.
+    """
+    n = cascade.pi.n
     if n == 0:
         return "loop"
     if engine != "auto":
         return engine
-    return "corners" if n >= SMALLEST_CORNERS else "loop"
+    kind = "gpi" if cascade.stages else "pi"
+    operators = ("forward", "inverse") if operator == "both" else (operator,)
+    loop = corners = 0
+    for one in operators:
+        measured = _engine_costs()[one, arithmetic, kind]
+        costs = measured[max(plays for plays in measured if plays <= n)]
+        loop, corners = loop + costs[0], corners + costs[1]
+    return "corners" if corners < loop else "loop"
+
+
+@functools.cache
+def _engine_costs() -> dict[tuple[str, str, str], dict[int, tuple[int, int]]]:
+    """Instructions of a sample, loop and corners, by number of plays; for each operator, arithmetic and kind."""
+    found: dict[tuple[str, str, str], dict[int, tuple[int, int]]] = {}
+    with (Path(__file__).parent / "engine_costs.csv").open(encoding="ascii", newline="") as file:
+        for row in csv.DictReader(file):
+            about = (row["operator"], row["arithmetic"], row["kind"])
+            found.setdefault(about, {})[int(row["n"])] = (int(row["loop"]), int(row["corners"]))
+    return found
 
 
 def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:

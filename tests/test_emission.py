@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import subprocess
@@ -13,7 +14,9 @@ from modelfiles import FILES
 
 import hystgen
 from hystgen.api import Model
+from hystgen.models import PI, Cascade, DeadZone
 from hystgen.params import parse_parameters
+from hystgen.tables import choose_engine
 from hystgen.verification import compilers, signals
 from hystgen.verification.comparison import REALS
 
@@ -131,6 +134,25 @@ def test_nothing_forbidden_in_the_text(name: str) -> None:
         assert " / " not in re.sub(r"\) / 2|middle\) / 2", "", code).replace("+ 1) / 2", ""), file
         includes = set(re.findall(r"#include <(\w+)\.h>", code))
         assert includes <= {"stdint", "stdbool", "stddef", "float"}, file
+
+
+def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
+    """By operator, arithmetic and kind; between the measured numbers of plays the next smaller one decides."""
+    measured = {}
+    with (Path(hystgen.__file__).parent / "engine_costs.csv").open() as file:
+        for row in csv.DictReader(file):
+            measured[row["operator"], row["arithmetic"], row["kind"], int(row["n"])] = row
+    counts = sorted({n for *_, n in measured})
+    assert len(measured) == 2 * 4 * 2 * len(counts)
+    assert counts[0] == 1
+    for (operator, arithmetic, kind, n), row in measured.items():
+        stages = (DeadZone([-0.5, 0.0, 0.5], [0.1, 0.1, 0.1]),) if kind == "gpi" else ()
+        for plays in (n, n + 1) if n + 1 not in counts else (n,):
+            pi = PI(np.linspace(0, 0.5, plays + 1).tolist(), [1.0] * (plays + 1))
+            cheaper = "corners" if int(row["corners"]) < int(row["loop"]) else "loop"
+            assert choose_engine("auto", Cascade(pi, stages, 0.0, (-1.0, 1.0)), operator, arithmetic) == cheaper
+    assert choose_engine("auto", Cascade(PI([0], [1])), "both", "q15") == "loop"
+    assert choose_engine("loop", Cascade(PI([0, 0.5], [1, 1])), "both", "q15") == "loop"
 
 
 def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

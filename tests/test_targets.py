@@ -20,11 +20,12 @@ from modelfiles import FILES
 
 import hystgen
 from hystgen import reference
-from hystgen.api import Model
+from hystgen.api import Model, emitted_files
 from hystgen.cli import main
 from hystgen.emission import module
 from hystgen.params import parse_parameters
 from hystgen.verification import Row, compilers, cross, emulator, firmware, sources, targets
+from hystgen.verification.comparison import REALS
 
 CORES = targets.NAMES[1:]
 REQUIRED = bool(os.environ.get("CI"))  # CI installs the second compiler and emulator; elsewhere they may be absent
@@ -270,6 +271,22 @@ def test_the_constructed_worst_case_is_the_worst(bench: ModuleType, tmp_path: Pa
     walk = bench.from_drive(16, "inverse", rng.uniform(-10.5, 10.5, 5000) * rng.choice([1, 0.5, 0.1], 5000))
     core = made.run(case, made.image(case, "corners"), "corners", walk)
     assert core.counts.max() <= worst.max + 5
+
+
+@pytest.mark.parametrize(
+    ("name", "arithmetic", "engine"),
+    [
+        *((name, arithmetic, "corners") for name in ("plain", "two_branches") for arithmetic in REALS),
+        ("plain", "q15", "loop"),
+        ("two_branches", "float64", "loop"),
+    ],
+)
+def test_ram_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, engine: str) -> None:
+    options = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
+    header = emitted_files(model(name), **options)[f"{name}.h"]
+    stated = {op: int(ram) for op, ram in re.findall(r"(forward|inverse) instance +(\d+) bytes", header)}
+    report = hystgen.verify(model(name), targets=["cortex-m0plus"], compiler=["zig"], target_length=20, **options)
+    assert {row.operator: row.ram for row in report.rows if row.ram} == stated
 
 
 def test_reports_hold_the_figures(tmp_path: Path) -> None:

@@ -69,8 +69,10 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
             continue
         fields = [real] * (1 + branches) + [1] * branches + [4]
         if op == "inverse":
-            fast = corners and not fixed and not cascade.stages
-            fields = [real] * (4 + 4 * fast + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
+            fast = corners and not cascade.stages
+            fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
+            if fast:  # what stands before them
+                fields = ([8, 4, 4, play, play, 4, 4, 1] if fixed else [real] * 4) + fields
         scalars = [(size, size) for size in fields]
         if corners:
             place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
@@ -86,40 +88,56 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
 
 
 def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:
-    """Most multiplications and comparisons of real numbers in one step, kernels of tanh and atanh not counted."""
-    bisect = n.bit_length()
-    probes = bisect + 2 * bisect  # through the corners, then through one block with galloping
-    absorb_products, absorb_compares = (2, probes + 3) if corners else (0, 2 * (n + 1))
-    if op == "forward":
-        products = absorb_products + (1 if corners else n + 1)
-        compares = absorb_compares + 4
-    elif corners:
-        products = absorb_products + 1 + 1 + 3 * probes + 2
-        compares = absorb_compares + probes + 2 + 10
-    else:
-        products = (n + 1) + 2 * n + 1
-        compares = absorb_compares + n + 1 + 10
-    if numbers.branches:
-        compares += 12
+    """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside.
+
+    A search through the corner list compares once with the last corner, then bisects the others; that through a block
+    compares twice, then bisects: 3 + 2 b comparisons in all, b the bits of n. A drive that was limited or committed is
+    searched for when it is taken to memory, the answer once more.
+    """
+    stages: list[tuple[int, int]] = []
+    fixed = isinstance(numbers, FixedTables)
     if isinstance(numbers, FixedTables):
-        products = 2 * products + 2  # wide ones count twice
-        if numbers.fronts:
-            passes = 1 if op == "forward" else 2 + int(numbers.branches)
-            degree = numbers.coefficient.shape[1] - 1
-            products += passes * (degree + 1)
-            compares += passes * (int(max(numbers.pieces)).bit_length() + 2)
-        return f"{products} multiplications of 32 by 32 bits, {compares} comparisons"
-    fronts = [0, 0]
-    for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True):
-        passes = 1 if op == "forward" else 2 + int(numbers.branches)
-        if kind == reference.DEAD_ZONE:
-            fronts[0] += passes
-            fronts[1] += passes * int(size).bit_length()
-        else:
-            fronts[0] += 2 * passes
-            fronts[1] += 2 * passes
-    envelopes = sum(int(kind) == reference.TANH for kind in numbers.stage_kind)
-    kernels = f", {envelopes} tanh" if envelopes else ""
-    if envelopes and op == "inverse":
-        kernels += f", {envelopes * (1 + int(numbers.branches))} atanh"
-    return f"{products + fronts[0]} multiplications, {compares + fronts[1]} comparisons{kernels}"
+        fronts = bool(numbers.fronts)
+    else:
+        stages = [(int(kind), int(size)) for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True)]
+        fronts = bool(stages)
+    products, compares, per_play, per_bit = _worst_of_plays(op, corners, fixed, corners and not fronts)
+    per_play_products = 0 if corners else 1 if op == "forward" else 3
+    passes = 1 if op == "forward" else 2 + int(numbers.branches)
+    compares += 12 * int(bool(numbers.branches))
+    kernels = ""
+    if isinstance(numbers, FixedTables) and fronts:
+        products += passes * numbers.coefficient.shape[1]
+        compares += passes * (int(max(numbers.pieces)).bit_length() + 2)
+    envelopes = sum(kind == reference.TANH for kind, _ in stages)
+    for kind, size in stages:
+        products += passes if kind == reference.DEAD_ZONE else 2 * passes
+        compares += passes * size.bit_length() if kind == reference.DEAD_ZONE else 2 * passes
+    if envelopes:
+        kernels = f", {envelopes} tanh"
+        if op == "inverse":
+            kernels += f", {envelopes * (1 + int(numbers.branches))} atanh"
+    many = products + per_play_products * n
+    words = f"{many} multiplications" + " of 32 by 32 bits" * fixed
+    if per_play_products:
+        words += f" ({products} + {per_play_products} n)"
+    total = compares + per_play * n + per_bit * n.bit_length()
+    words += f", {total} comparisons"
+    if per_bit:
+        words += f" ({compares} + {per_bit} b, b = {n.bit_length()} the bits of n)"
+    elif per_play:
+        words += f" ({compares} + {per_play} n)"
+    return words + kernels
+
+
+def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[int, int, int, int]:
+    """Multiplications, comparisons, and of these more a play, more a bit of n; of plays, checks and limits."""
+    if not corners:
+        return (1, 6, 2, 0) if op == "forward" else (2, 13, 3, 0)
+    if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
+        return 4 if fixed else 3, 10, 0, 2  # next 1, search 3. In fixed point a sum takes two multiplications.
+    # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
+    # 4 + 3; where samples can be fast: two edges, one more play 5, edges anew 4. The drive's corner and way, the
+    # reference's; two lines; with fast samples the next play's line and way, and the edge.
+    compares = 30 + 11 * fast
+    return (10 + 4 * fast if fixed else 6 + 3 * fast), compares, 0, 4

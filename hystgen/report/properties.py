@@ -41,7 +41,7 @@ def properties(model: Model) -> str:
             f"answered with drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
         )
         for arithmetic in ("float32", "float64"):
-            bounds = error_bounds(c, arithmetic, model.engine())
+            bounds = error_bounds(c, arithmetic, model.engine(arithmetic=arithmetic))
             lines.append(
                 f"error, {arithmetic}     forward {bounds.forward:.3g}{output}, inverse {bounds.rounding:.3g}{drive}"
                 " at most, against the exact model"
@@ -58,7 +58,8 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
     emit = model.parameters.emit
     for arithmetic in ("q31", "q15"):
         try:
-            form = fixed_tables.build(model.cascade, arithmetic, model.engine(), emit.drive_lsb, emit.output_lsb)[1]
+            engine = model.engine(arithmetic=arithmetic)
+            form = fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]
         except FormatError as error:
             lines.append(f"{arithmetic}                not available: {error}")
             continue

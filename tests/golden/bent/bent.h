@@ -12,8 +12,8 @@
  *     constant tables   532 bytes
  *     forward instance  72 bytes of RAM
  *     inverse instance  104 bytes of RAM
- *     forward step, worst case: 8 multiplications, 21 comparisons
- *     inverse step, worst case: 22 multiplications, 37 comparisons
+ *     forward step, worst case: 8 multiplications (2 + 1 n), 21 comparisons (9 + 2 n)
+ *     inverse step, worst case: 22 multiplications (4 + 3 n), 37 comparisons (19 + 3 n)
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero

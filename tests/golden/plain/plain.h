@@ -11,7 +11,7 @@
  * Cost, derived from the model (32-bit target):
  *     constant tables   152 bytes
  *     inverse instance  172 bytes of RAM
- *     inverse step, worst case: 33 multiplications, 33 comparisons
+ *     inverse step, worst case: 9 multiplications, 53 comparisons (41 + 4 b, b = 3 the bits of n)
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero

@@ -11,7 +11,7 @@
  * Cost, derived from the model (32-bit target):
  *     constant tables   364 bytes
  *     inverse instance  156 bytes of RAM
- *     inverse step, worst case: 39 multiplications, 51 comparisons, 1 tanh, 2 atanh
+ *     inverse step, worst case: 12 multiplications, 60 comparisons (48 + 4 b, b = 3 the bits of n), 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Define TWO_BRANCHES_IMPLEMENTATION in one C file
