@@ -31,7 +31,7 @@ textbook_real_t textbook_forward_step(textbook_forward_t *self, textbook_real_t 
     textbook_sum_t y;
     int i;
 #ifndef TEXTBOOK_FRACTION
-    if (!(x >= -FLT_MAX && x <= FLT_MAX)) {
+    if (!(x >= -TEXTBOOK_REAL_MAX && x <= TEXTBOOK_REAL_MAX)) {
         self->status |= TEXTBOOK_STATUS_HELD;
         return self->answer;
     }

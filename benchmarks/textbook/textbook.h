@@ -3,7 +3,7 @@
 
 #include <stdint.h>
 
-/* written by the benchmark: TEXTBOOK_REAL, TEXTBOOK_SUM, TEXTBOOK_N_PLAYS, in fixed point TEXTBOOK_FRACTION */
+/* written by the benchmark: TEXTBOOK_REAL and _SUM, TEXTBOOK_N_PLAYS, TEXTBOOK_REAL_MAX or, in fixed point, _FRACTION */
 #include "textbook_sizes.h"
 
 typedef TEXTBOOK_REAL textbook_real_t;
