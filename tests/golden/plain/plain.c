@@ -577,6 +577,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
     self->memory.w = self->pending;
     self->pending = answer;
     self->reference = u;
+    self->bits = 0;
     plain_inverse_enter_fast(self, u);
     return answer;
 }
