@@ -141,7 +141,7 @@ def trials(n: int) -> list[Reals]:
             found += [np.append(points, (a, b)), np.append(points, (a, on, b))]
     # and blocks of uneven sizes, which no rule makes: turning points at random, small among large
     rng = np.random.default_rng(11)
-    for _ in range(5000):
+    for _ in range(1500):
         size = rng.integers(4, 12)
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
         found += [np.concatenate([[RANGE, -RANGE], turns]), turns]  # after full swings, and from the start
@@ -308,9 +308,9 @@ class Bench:
                 dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
                 return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
 
-            kept = min(20, max(2, 640 // case.n))  # long corner lists take long to run
+            kept = min(10, max(2, 320 // case.n))  # long corner lists take long to run
             best = dearest(trials(case.n), kept)
-            for _ in range(6 if case.n <= 32 else 2):
+            for _ in range(3 if case.n <= 32 else 2):
                 best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], kept)
             call, drive = together(best)
             self._worst[case] = given(case, drive, call=call), call
@@ -478,7 +478,7 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
     for ax in list(axes.flat)[len(names) :]:
         ax.set_visible(False)
     panels.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9)
-    panels.suptitle("Inverse, zig -O2, decaying multisine")
+    panels.suptitle("Inverse in float32, and where said in q31; zig -O2, decaying multisine")
     panels.savefig(path, metadata={"Date": None})
     plt.close(panels)
 
