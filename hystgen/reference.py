@@ -1,10 +1,15 @@
 """The bit reference: the emitted C, operation for operation, in Python.
 
-Every function has its counterpart of the same name in `c_runtime/` or in the step template and computes the same
-operations in the same order in the same arithmetic, so that results are compared for equal bits. The functions
-know nothing of numpy's or numba's types: they run as plain Python on scalars of the arrays they are given, or
-compiled (see `hystgen.compiled`). Real constants come out of arrays because a literal would not have the arithmetic's
-type.
+Every function has its counterpart in `c_runtime/` or in the step template, mostly of the same name, and computes the
+same operations in the same order in the same arithmetic, so that results are compared for equal bits. Two kinds of
+liberty are taken, neither of which changes a number: `multiple` multiplies by a whole number of thresholds where the C
+adds or leaves out (both exact), and `corners_find` is one function for inputs and outputs, which the C has twice
+because their types differ (`find_by_input`, `find_by_output`). The C's fast steps have no counterpart: they give what
+`inverse_step` gives, which verification shows.
+
+The functions know nothing of numpy's or numba's types: they run as plain Python on scalars of the arrays they are
+given, or compiled (see `hystgen.compiled`). Real constants come out of arrays because a literal would not have the
+arithmetic's type.
 """
 
 from __future__ import annotations
