@@ -282,6 +282,7 @@ def simulate(
 @click.option("-o", "output", required=True, type=click.Path(dir_okay=False), help="parameter file to write")
 @click.option("--model", type=click.Choice(["pi", "gpi-deadzone", "gpi-tanh", "auto"]), default="pi", show_default=True)
 @click.option("--thresholds", type=int, help="number of plays without r_0; default: chosen on held-out error")
+@click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
 @click.option("--holdout", multiple=True, type=click.Path(), help="record that takes no part in the fit")
 @click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
 @click.option("--name", help="C identifier of the model; default: from the output file")
@@ -289,7 +290,8 @@ def simulate(
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @record_options
 def identify(
-    data: tuple[str, ...], output: str, model: str, thresholds: int | None, holdout: tuple[str, ...], skip: int,
+    data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
+    holdout: tuple[str, ...], skip: int,
     name: str | None, units: str | None, plot: str | None, history: str | None, rest: float, **reading: Any,
 ) -> None:
     """Fit a model to measured records and write its parameter file.
@@ -312,6 +314,7 @@ def identify(
             read[: len(data)],
             model=model,
             thresholds=thresholds,
+            breaks=breaks,
             holdout=read[len(data) :],
             history=visited,
             rest=rest,

@@ -205,6 +205,9 @@ class DeadZone:
         return tuple(points)
 
     def _value(self, x: float) -> float:
+        if math.isinf(x):  # the end piece decides, its terms may cancel
+            slope = self.piece_slopes[-1 if x > 0 else 0]
+            return slope * x if slope else self.anchors[-1 if x > 0 else 0][1]
         terms = []
         for rho, eta in zip(self.thresholds, self.weights, strict=True):
             part = max(x - rho, 0.0) if rho > 0 else min(x - rho, 0.0) if rho < 0 else x

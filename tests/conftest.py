@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,24 @@ LEFT_OUT = pytest.StashKey[int]()
 def measured() -> Path:
     """Folder of the measured records; for tests marked `data`."""
     return MEASURED
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """The command line: exit code, standard output, standard error."""
+
+    from hystgen.cli import main
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        capfd.readouterr()
+        with pytest.raises(SystemExit) as stopped:
+            main([str(a) for a in arguments])
+        out, err = capfd.readouterr()
+        # Kernels may have to be compiled first, which is told
+        told = [line for line in err.splitlines() if not line.startswith("compiling")]
+        return int(stopped.value.code or 0), out, "\n".join(told)
+
+    return call
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -15,11 +15,22 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
+from recordings import (
+    brute_output,
+    brute_plays,
+    columns,
+    error_figures,
+    first_exact,
+    noisy,
+    part_of_file,
+    record,
+    wander,
+    write_csv,
+    written,
+)
 from scipy.optimize import lsq_linear, minimize
 
 import hystgen
-from hystgen.cli import main
 from hystgen.identification import Fit, IdentificationError, identifier_from
 from hystgen.models import NotInvertibleError
 from hystgen.records import Record, RecordError
@@ -36,26 +47,6 @@ WEIGHTS = (0.05, 0.02, 0.04, 0.01, 0.03, 0.02)
 
 
 # -- plants, drives and brute force ------------------------------------------------------------------------------------
-
-
-def brute_plays(v: Sequence[float] | Array, thresholds: Sequence[float], start: Sequence[float] | float) -> Array:
-    """States of all plays after every sample, shape (N, n+1)."""
-    states = [float(start)] * len(thresholds) if isinstance(start, int | float) else [float(s) for s in start]
-    out = []
-    for x in np.asarray(v, dtype=float).tolist():
-        for i, r in enumerate(thresholds):
-            if states[i] < x - r:
-                states[i] = x - r
-            elif states[i] > x + r:
-                states[i] = x + r
-        out.append(list(states))
-    return np.array(out).reshape(-1, len(thresholds))
-
-
-def brute_output(
-    v: Array, thresholds: Sequence[float], weights: Sequence[float], start: Sequence[float] | float
-) -> Array:
-    return np.asarray(brute_plays(v, thresholds, start) @ np.asarray(weights))
 
 
 def relay_output(v: Array, thresholds: Sequence[float], weights: Sequence[float], low: float, high: float) -> Array:
@@ -75,42 +66,6 @@ def relay_output(v: Array, thresholds: Sequence[float], weights: Sequence[float]
     return y
 
 
-def first_exact(v: Array, largest: float) -> int:
-    """First sample at which plays up to a threshold no longer depend on an unknown start, but for a constant.
-
-    That is once the drive has swept twice the threshold, or has been at both its own ends.
-    """
-    low = high = v[0]
-    for k, x in enumerate(v):
-        low, high = min(low, x), max(high, x)
-        if high - low >= 2.0 * largest or (low == v.min() and high == v.max()):
-            return k
-    raise AssertionError
-
-
-def error_figures(y: Array, predicted: Array, first: int) -> tuple[float, float, float]:
-    """rms and largest error with a free offset, and rms in % of the whole record's peak to peak."""
-    error = (y - predicted)[first:]
-    error = error - error.sum() / len(error)
-    rms = float(np.sqrt((error**2).sum() / len(error)))
-    return rms, float(abs(error).max()), 100.0 * rms / float(y.max() - y.min())
-
-
-def wander(seed: int, low: float = 0.0, high: float = 100.0, turns: int = 60, samples: int = 40) -> Array:
-    """Straight lines between random places."""
-    places = np.random.default_rng(seed).uniform(low, high, turns)
-    places[3], places[5] = low, high
-    return np.interp(np.arange((turns - 1) * samples + 1) / samples, np.arange(turns), places)
-
-
-def record(v: Array, y: Array, name: str = "made") -> Record:
-    return Record(name, np.arange(len(v)) * 0.001, v, y, sample_time=0.001)
-
-
-def noisy(y: Array, sigma: float, seed: int = 9) -> Array:
-    return np.asarray(y + np.random.default_rng(seed).normal(0.0, sigma, len(y)))
-
-
 def fitted(fit: Fit) -> tuple[Array, Array]:
     part = fit.parameters.model.pi
     return np.array(part.thresholds), np.array(part.weights)
@@ -119,40 +74,6 @@ def fitted(fit: Fit) -> tuple[Array, Array]:
 def row(fit: Fit, part: str, model: str = "written") -> Any:
     (found,) = [r for r in fit.rows if (r.part, r.model) == (part, model)]
     return found
-
-
-def columns(path: Path) -> tuple[Array, Array, Array]:
-    table = np.genfromtxt(path, delimiter=",", names=True)
-    return table["t"], table["v"], table["y"]
-
-
-def part_of_file(source: Path, target: Path, first: int, last: int | None = None) -> Path:
-    """The header and some samples of a CSV file, copied as text."""
-    header, *lines = source.read_text().splitlines()
-    target.write_text("\n".join([header, *lines[first:last]]) + "\n")
-    return target
-
-
-def write_csv(path: Path, v: Any, y: Any) -> Path:
-    lines = [f"{k * 0.001!r},{float(a)!r},{float(b)!r}" for k, (a, b) in enumerate(zip(v, y, strict=True))]
-    path.write_text("\n".join(["t,v,y", *lines]) + "\n")
-    return path
-
-
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Run:
-    """The command line: exit code, standard output, standard error."""
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        capfd.readouterr()
-        with pytest.raises(SystemExit) as stopped:
-            main([str(a) for a in arguments])
-        out, err = capfd.readouterr()
-        # Kernels may have to be compiled first, which is told
-        told = [line for line in err.splitlines() if not line.startswith("compiling")]
-        return int(stopped.value.code or 0), out, "\n".join(told)
-
-    return call
 
 
 def table_of(out: str) -> dict[str, dict[str, str]]:
@@ -167,11 +88,6 @@ def table_of(out: str) -> dict[str, dict[str, str]]:
             names = ("part", "model", "samples", "ignored", "rms", "rms %", "max", "max %", "records")
             found[cells[0].strip()] = dict(zip(names, cells, strict=True))
     return found
-
-
-def written(path: Path) -> dict[str, Any]:
-    content: dict[str, Any] = YAML(typ="safe").load(path)
-    return content
 
 
 def check_predicts(path: Path, data: Path, skip: int = 0) -> tuple[float, float, float]:
@@ -780,7 +696,6 @@ class TestRefused:
                 ("--history", "1,nan"),
                 "--history '1,nan' is not a list of numbers; write --history 100,-100",
             ),
-            (SINE, SINE, ("--model", "gpi-tanh"), "this version fits model pi only, not gpi-tanh"),
         ],
         ids=lambda value: value if isinstance(value, str) else "",
     )
@@ -836,6 +751,10 @@ class TestRefused:
             {"rest": -1.0},
             {"rest": float("nan")},
             {"thresholds": -1},
+            {"breaks": 3},
+            {"breaks": 0, "model": "gpi-deadzone"},
+            {"breaks": [5.0, 3.0], "model": "gpi-deadzone"},
+            {"breaks": [50.0, float("nan")], "model": "gpi-deadzone"},
         ],
         ids=str,
     )

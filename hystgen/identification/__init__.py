@@ -7,10 +7,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import re
-import warnings as python_warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -19,118 +19,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import memory
-from hystgen.identification import pi, reduction
-from hystgen.identification.pi import IdentificationError, Solution
+from hystgen.identification import gpi, pi, reduction, remarks, threads
+from hystgen.identification.fit import HELD_OUT, Fit, Source, visited
+from hystgen.identification.gpi import Fitted
+from hystgen.identification.pi import IdentificationError
 from hystgen.identification.progress import Progress
 from hystgen.identification.reduction import Course
-from hystgen.identification.report import Row, table
+from hystgen.identification.report import Row
 from hystgen.identification.thresholds import rounded
-from hystgen.records import SHORTEST, Record, read_record, read_records, write_atomically
+from hystgen.models import DeadZone, Stage, TanhEnvelope
+from hystgen.records import SHORTEST, Record, read_records
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
 
-MODELS = ("pi", "gpi-deadzone", "gpi-tanh", "auto")
-"""Names of the contract; this version fits the first."""
+MODELS = (*gpi.KINDS, "auto")
+"""Names of the contract."""
 
 P0_FLOOR = 0.05
 """Share of the sum of weights below which p_0 is raised where the data allow it."""
 
-HELD_OUT = 0.25
-"""Share of each record, its end, that is held out for the figures when no record is given for that."""
+PASSES = 60.0
+"""About so many times the search for a front runs through all samples, for the progress bar."""
 
-AMPLIFIES = 100.0
-"""Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""
+MOST_BREAKS = 64
 
-SMALL_REACH = 0.1
-"""Largest threshold, as a share of the drive range, below which a record is said to show little hysteresis."""
-
-STARTS, UNLIKE = 8, 3.0
-"""A start of so many samples whose rms error is so many times that of the rest tells of a wrong history."""
-
-Source = Record | str | os.PathLike[str]
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A fitted model and how good it is.
-
-    `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
-    sentence each; `history`: drive values visited before each record, None when unknown.
-    """
-
-    parameters: Parameters
-    rows: tuple[Row, ...]
-    warnings: tuple[str, ...]
-    history: tuple[float, ...] | None = None
-
-    def table(self) -> str:
-        """The fit table as text: rms and largest error, absolute and in % of the output range."""
-        return table(self.rows, self._unit, self._remarks)
-
-    def predict(
-        self, record: Source, history: Sequence[float] | None = None, free_offset: bool = False
-    ) -> NDArray[np.float64]:
-        """Free-run output (N,) of the model along a record's drive, in output units.
-
-        The start memory comes from `history`, else from the history of the fit, else the plays are at rest at the
-        first drive value: then the samples before the drive has swept its range count little. `free_offset` shifts the
-        result to the mean of the record's `y`. Warns when the drive leaves the fitted range.
-        """
-        data = read_record(record, need=("v",)) if not isinstance(record, Record) else record
-        outside = _outside(data.name, data.v, self.parameters.input_range)
-        if outside:
-            python_warnings.warn(outside, stacklevel=2)
-        before = self.history if history is None else _history(history)
-        part = self.parameters.model.pi
-        predicted = reduction.prediction(data.v, before, np.array(part.thresholds), np.array(part.weights))
-        if free_offset:
-            if data.y is None:
-                raise ValueError(f"{data.name} has no measured column y to take the offset from")
-            return np.asarray(predicted + float(np.mean(data.y - predicted)))
-        return np.asarray(predicted + self.parameters.model.output_offset)
-
-    def settled(self, record: Source) -> int:
-        """First sample of a record at which no play remembers an unknown start; 0 where a history was given."""
-        data = read_record(record, need=("v",)) if not isinstance(record, Record) else record
-        largest = self.parameters.model.pi.thresholds[-1]
-        return 0 if self.history is not None else reduction.settled(data.v, largest)
-
-    def text(self) -> str:
-        """The parameter file: what was fitted on what as comments, then the parameters."""
-        from hystgen.params import dump_parameters
-
-        lines = ["Identified by hystgen; errors have a free offset a record."]
-        lines += [row.sentence() for row in self.rows]
-        lines += [f"Warning: {warning}" for warning in self.warnings]
-        return dump_parameters(self.parameters, header="\n".join(lines))
-
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the parameter file, all or nothing."""
-        write_atomically(path, self.text())
-
-    @property
-    def _unit(self) -> str:
-        units = self.parameters.units
-        return (units.output or "") if units is not None else ""
-
-    @property
-    def _remarks(self) -> list[str]:
-        n = len(self.parameters.model.pi.thresholds) - 1
-        remarks = [
-            f"{n} play{'' if n == 1 else 's'}. Errors of a free run with a free offset a record; % of the largest "
-            "peak-to-peak output of the row's records, each taken whole."
-        ]
-        if any(row.model == "trial" for row in self.rows):
-            remarks.append(
-                f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the "
-                "rest (row held out). written: fitted to everything."
-            )
-        elif any(row.part == "held out" for row in self.rows):
-            remarks.append("written: fitted to the records of row fit only.")
-        if any(row.ignored for row in self.rows):
-            remarks.append("ignored: samples at the start, before the drive had wiped an unknown start memory.")
-        return remarks
+PARSIMONY = 1.03
+"""`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
 
 def identify(
@@ -138,6 +53,7 @@ def identify(
     *,
     model: str = "pi",
     thresholds: int | Sequence[float] | None = None,
+    breaks: int | Sequence[float] | None = None,
     holdout: Source | Iterable[Source] = (),
     history: Sequence[float] | None = None,
     rest: float = 0.0,
@@ -153,11 +69,15 @@ def identify(
     """Fit a model to measured records.
 
     `records`: one or several `Record`s or paths (read with `columns`, `sample_time`, `delimiter`), each with a free
-    offset. `model`: `pi`. `thresholds`: a number of plays without r_0, or a list of thresholds; by default both number
-    and places are chosen by blocked validation on the records. `holdout`: records that take no part in any choice;
-    without them the last quarter of each record gives the held-out figures, from a trial model that has not seen it,
-    and the model written is then fitted to everything. `history`: drive values visited before every record from a
-    virgin state; without it the start of each record is ignored until the drive has wiped the memory that matters.
+    offset. `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest
+    of them whose held-out error is within 3 % of the best. `thresholds`: a number of plays without r_0, or a list of
+    thresholds (behind a memoryless part, which keeps the length of the drive range and the place of 0, in its output);
+    by default both number and places are chosen by blocked validation on the records. `breaks`: how many places, or
+    which, a dead-zone sum may bend at, chosen in the same way by default. `holdout`: records that take no part in any
+    choice but that of `auto`; without them the last quarter of each record gives the held-out figures, from a trial
+    model that has not seen it, and the model written is then fitted to everything. `history`: drive values visited
+    before every record from a virgin state; without it the start of each record is ignored until the drive has wiped
+    the memory that matters.
     `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
     `name`: C identifier of the model. `units`: `input` and `output`. `skip`: samples at the start of every record that
     are not compared, though their drive counts. `p0_floor`: see `weights.fit`; 0 leaves p_0 as it comes.
@@ -169,10 +89,8 @@ def identify(
     """
     if model not in MODELS:
         raise ValueError(f"model {model!r} is none of {', '.join(MODELS)}")
-    if model != "pi":
-        raise ValueError(f"this version fits model pi only, not {model}")
-    wanted = pi.checked_thresholds(thresholds)
-    before = None if history is None else _history(history)
+    how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor, skip)
+    before = None if history is None else visited(history)
     if not (math.isfinite(rest) and rest >= 0.0):
         raise ValueError(f"rest is a number of seconds, not negative, not {rest}")
     if skip < 0:
@@ -188,173 +106,181 @@ def identify(
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
     courses = [pi.course(record, before, skip) for record in fit_records]
     held = [pi.course(record, before, skip) for record in held_records]
-    rows: list[Row] = []
-    with Progress(sum(len(item.v) for item in courses) * (1.0 if held else 2.0 - HELD_OUT), progress) as bar:
-        if not held:
-            rows, reason = _trial(courses, wanted, p0_floor, skip, bar)
+    kinds = gpi.KINDS if model == "auto" else (model,)
+    passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
+    with threads.alone(), Progress(passes * sum(len(item.v) for item in courses), progress) as bar:
+        if held:
+            tried = [_try(courses, held, kind, how, bar) for kind in kinds]
+            chosen = _choose(tried)
+            rows = [tried[k].as_candidate() for k in range(len(tried))] if len(tried) > 1 else []
+            done = tried[chosen]
+            kind, fitted, compared = kinds[chosen], done.fitted, done.compared
+        else:
+            rows, kind, reason = _trial(courses, kinds, how, bar)
             if reason:
                 told.append(reason)
-        solution, compared = pi.solve(courses, wanted, p0_floor, skip, bar.tick)
-    r, p = solution.thresholds, solution.weights
-    begins = [skip] * len(compared)
-    errors = [pi.compare(item, r, p) for item in compared]
-    own = pi.row("fit" if held or not rows else "all", "written", errors, begins)
+            fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, skip, bar.tick)
+    errors = [_compare(item, fitted) for item in compared]
+    own = pi.row("fit" if held or not rows else "all", "written", errors, [skip] * len(compared))
     rows.append(own)
-    low = min(item.drive_range[0] for item in compared)
-    high = max(item.drive_range[1] for item in compared)
+    drive = (min(item.drive_range[0] for item in compared), max(item.drive_range[1] for item in compared))
     if held:
-        settled = [pi.resettled(item, float(r[-1]), skip) for item in held]
-        for item in settled:
-            if item.used < SHORTEST:
-                raise IdentificationError(
-                    f"{item.name} is held out, but only {item.used} of its samples can be compared once its start "
-                    f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
-                )
-        rows.append(pi.row("held out", "written", [pi.compare(item, r, p) for item in settled], [skip] * len(held)))
-        told += [text for item in held if (text := _outside(item.name, item.v, (low, high)))]
-    offset = rounded(errors[0].offset, pi.DIGITS)
+        rows.append(done.held_out)
+        told += [text for item in held if (text := remarks.outside(item.name, item.v, drive))]
     told += [
         f"{item.name}: only {item.used} samples are left once its start memory is known; it hardly counts"
         for item in compared
         if item.used < SHORTEST
     ]
-    told += [text for each in errors if (text := _about_start(each, float(r[-1])))]
-    told += _about_model(solution, wanted, compared, own)
-    return Fit(_parameters(name, units, (low, high), r, p, offset, before), tuple(rows), tuple(told), before)
+    told += [text for each in errors if (text := remarks.about_start(each, float(fitted.solution.thresholds[-1])))]
+    told += remarks.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
+    offset = rounded(errors[0].offset, pi.DIGITS)
+    return Fit(_parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), before)
+
+
+@dataclass(frozen=True)
+class _How:
+    """What was asked of a fit."""
+
+    wanted: int | tuple[float, ...] | None
+    breaks: int | tuple[float, ...] | None
+    floor: float
+    skip: int
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A model of one kind, the courses it was fitted to, and how it does on what it has not seen."""
+
+    fitted: Fitted
+    compared: list[Course]
+    held_out: Row
+
+    def as_candidate(self) -> Row:
+        """The held-out row under the name of the kind, for the table of `auto`."""
+        return replace(self.held_out, part="candidate", model=self.fitted.front.name)
+
+
+def _try(
+    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress, begins: Sequence[int] = ()
+) -> _Tried:
+    """Fit one kind to courses and compare it with others, which begin at `begins` (by default where all do)."""
+    fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, how.skip, bar.tick)
+    largest = float(fitted.solution.thresholds[-1])
+    starts = list(begins) or [how.skip] * len(held)
+    settled = [
+        replace(item, first=pi.resettled(fitted.inner(item), largest, start).first)
+        for item, start in zip(held, starts, strict=True)
+    ]
+    for item in settled:
+        if item.used < SHORTEST:
+            raise IdentificationError(
+                f"{item.name} is held out, but only {item.used} of its samples can be compared once its start "
+                f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
+            )
+    errors = [_compare(item, fitted) for item in settled]
+    return _Tried(fitted, compared, pi.row("held out", "written", errors, starts))
+
+
+def _choose(tried: Sequence[_Tried]) -> int:
+    """The first, that is the simplest, whose held-out error is about as small as any."""
+    enough = PARSIMONY * min(each.held_out.rms for each in tried)
+    return next(k for k, each in enumerate(tried) if each.held_out.rms <= enough)
+
+
+def _compare(item: Course, fitted: Fitted) -> pi.Errors:
+    return pi.compare(fitted.inner(item), fitted.solution.thresholds, fitted.solution.weights)
 
 
 def _several(sources: Source | Iterable[Source]) -> list[Source]:
     return [sources] if isinstance(sources, Record | str | os.PathLike) else list(sources)
 
 
+def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | tuple[float, ...] | None:
+    """None, a number of breaks, or their places. Raises ValueError."""
+    if breaks is None:
+        return None
+    if model not in ("gpi-deadzone", "auto"):
+        raise ValueError(f"breaks are those of a dead-zone sum, model {model} has none")
+    if isinstance(breaks, int | np.integer) and not isinstance(breaks, bool):
+        if not 1 <= breaks <= MOST_BREAKS:
+            raise ValueError(f"breaks is a number from 1 to {MOST_BREAKS}, not {breaks}")
+        return int(breaks)
+    if isinstance(breaks, str | float | bool):
+        raise ValueError("breaks is a whole number or a list of drive values")
+    places = tuple(float(x) for x in breaks if float(x) != 0.0)
+    if not places or not all(map(math.isfinite, places)) or any(b <= a for a, b in itertools.pairwise(places)):
+        raise ValueError("breaks are finite drive values that rise strictly, at least one beside 0")
+    return places
+
+
 def _trial(
-    courses: Sequence[Course], wanted: int | tuple[float, ...] | None, floor: float, skip: int, bar: Progress
-) -> tuple[list[Row], str]:
-    """Rows of a model fitted to the first part of each record and compared with the rest, or why there is none."""
+    courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
+) -> tuple[list[Row], str, str]:
+    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, and
+    why there are none."""
     short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
+    instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
     fronts, splits = [], []
     for item in courses:
         split = round(len(item.v) * (1.0 - HELD_OUT))
-        front = pi.resettled(replace(item, last=split), math.inf, skip)
+        front = pi.resettled(replace(item, last=split), math.inf, how.skip)
         if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
-            return [], f"{item.name}: {short}"
+            return [], kinds[0], f"{item.name}: {short}{instead}"
         fronts.append(front)
         splits.append(split)
     try:
-        solution, compared = pi.solve(fronts, wanted, floor, skip, bar.tick)
+        tried = [_try(fronts, courses, kind, how, bar, splits) for kind in kinds]
     except IdentificationError as failure:
-        return [], f"nothing was held out: {failure}"
-    r, p = solution.thresholds, solution.weights
-    rests = [pi.resettled(item, float(r[-1]), split) for item, split in zip(courses, splits, strict=True)]
-    for item in rests:
-        if item.used < SHORTEST:
-            return [], f"{item.name}: {short}"
-    fit_errors = [pi.compare(item, r, p) for item in compared]
-    held_errors = [pi.compare(item, r, p) for item in rests]
-    return [
-        pi.row("fit", "trial", fit_errors, [skip] * len(compared)),
-        pi.row("held out", "trial", held_errors, splits),
-    ], ""
-
-
-def _about_model(
-    solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
-) -> list[str]:
-    """What the user should know about the model itself."""
-    told = []
-    p, made = solution.weights, solution.fitted
-    if made.free_p0 is not None and made.free_rms is not None:
-        told.append(
-            f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
-            f"hardly tell: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement lowers "
-            "p_0: record more slowly if you can"
-        )
-    elif p[0] == 0.0:
-        told.append(
-            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
-            "of use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
-        )
-    elif np.sum(p) > AMPLIFIES * p[0]:
-        told.append(
-            f"p_0 is small: the inverse amplifies small movements {np.sum(p) / p[0]:.0f} times as much as large ones"
-        )
-    low = min(item.drive_range[0] for item in compared)
-    high = max(item.drive_range[1] for item in compared)
-    if solution.reach < SMALL_REACH * (high - low):
-        told.append(
-            f"the records tell little about hysteresis: no play above {solution.reach:.3g} moves enough in them; "
-            "record full cycles, several times, or give --history"
-        )
-    if isinstance(wanted, tuple):
-        beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
-        if beyond:
-            told.append(
-                f"{len(beyond)} threshold{'' if len(beyond) == 1 else 's'} above {solution.reach:.6g} hardly move in "
-                "these records; their weights are not to be trusted for larger drives"
-            )
-    outputs = [item.y[item.first : item.last] for item in compared]
-    spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
-    share = 1.0 - own.rms**2 / spread
-    if share < 0.9:
-        told.append(
-            f"the model explains only {100 * max(share, 0.0):.0f} % of the measured variance; check which column is "
-            "which, and the units"
-        )
-    return told
-
-
-def _about_start(errors: pi.Errors, largest: float) -> str:
-    """Whether a record's start disagrees with the history it was given."""
-    item = errors.course
-    end = reduction.settled(item.v, largest) - item.first
-    if item.history is None or end < STARTS or len(errors.error) - end < STARTS:
-        return ""
-    start, rest = (float(np.sqrt(np.mean(part**2))) for part in (errors.error[:end], errors.error[end:]))
-    if start <= UNLIKE * rest:
-        return ""
-    return (
-        f"{item.name}: the first {end} samples, whose output depends on the history, are off by {start:.3g} rms "
-        f"against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out if in doubt"
+        return [], kinds[0], f"nothing was held out: {failure}{instead}"
+    chosen = _choose(tried)
+    best = tried[chosen]
+    own = pi.row(
+        "fit", "trial", [_compare(item, best.fitted) for item in best.compared], [how.skip] * len(best.compared)
     )
-
-
-def _outside(name: str, v: NDArray[np.float64], allowed: tuple[float, float]) -> str:
-    number = int(np.count_nonzero((v < allowed[0]) | (v > allowed[1])))
-    if not number:
-        return ""
-    return (
-        f"{name}: {number} samples have a drive outside the fitted range {allowed[0]:.6g} to {allowed[1]:.6g}; "
-        "the model is a guess there"
-    )
-
-
-def _history(values: Sequence[float]) -> tuple[float, ...]:
-    visited = tuple(float(x) for x in values)
-    if not all(math.isfinite(x) for x in visited):
-        raise ValueError("history is a list of finite drive values")
-    return visited
+    rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
+    return [*rows, own, replace(best.held_out, model="trial")], kinds[chosen], ""
 
 
 def _parameters(
     name: str,
     units: Mapping[str, str] | None,
     drive: tuple[float, float],
-    r: NDArray[np.float64],
-    p: NDArray[np.float64],
+    fitted: Fitted,
     offset: float,
-    history: tuple[float, ...] | None,
+    first: Course,
 ) -> Parameters:
     from hystgen.params import make_parameters
 
+    r, p = fitted.solution.thresholds, fitted.solution.weights
     content: dict[str, object] = {"hystgen": 1, "name": name}
     if units:
         content["units"] = dict(units)
     content["input_range"] = list(drive)
-    content["model"] = {
-        "pi": {"thresholds": r.tolist(), "weights": p.tolist(), "initial_state": _start(r, history)},
+    described: dict[str, object] = {
+        "pi": {
+            "thresholds": r.tolist(),
+            "weights": p.tolist(),
+            "initial_state": _start(r, fitted.inner(first).history),
+        },
         "output_offset": offset,
     }
+    stages = [_stage_content(stage) for stage in fitted.stages]
+    if stages:
+        described["memoryless"] = stages[0] if len(stages) == 1 else stages
+    content["model"] = described
     return make_parameters(content)
+
+
+def _stage_content(stage: Stage) -> dict[str, object]:
+    if isinstance(stage, DeadZone):
+        return {"kind": "dead_zone", "thresholds": list(stage.thresholds), "weights": list(stage.weights)}
+    assert isinstance(stage, TanhEnvelope)
+    content: dict[str, object] = {"kind": "tanh"}
+    for name, branch in (("ascending", stage.ascending), ("descending", stage.branch(False))):
+        if name == "ascending" or stage.branches_differ:
+            content[name] = dict(zip(("a0", "a1", "a2", "a3"), branch, strict=True))
+    return content
 
 
 def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float | list[float]:

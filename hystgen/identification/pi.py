@@ -41,6 +41,11 @@ class Solution:
     reach: float
     fitted: Weights
 
+    def without_idle_plays(self) -> Solution:
+        """The same without plays that have no weight: they are no part of the model."""
+        kept = (self.weights > 0.0) | (self.thresholds == 0.0)
+        return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
+
 
 def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
     """The record as it takes part, its start ignored as far as the start memory is unknown.
@@ -111,11 +116,8 @@ def solve(
             "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the "
             "sign of y, else check which column is which"
         )
-    if wanted is None:
-        # A play without weight is no part of the model
-        kept = (p > 0.0) | (r == 0.0)
-        p, r = p[kept], r[kept]
-    return Solution(r, p, reach, fitted), compared
+    solution = Solution(r, p, reach, fitted)
+    return (solution if wanted is not None else solution.without_idle_plays()), compared
 
 
 @dataclass(frozen=True)

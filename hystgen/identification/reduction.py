@@ -1,12 +1,14 @@
 """From records to a small triangular system: what a fit needs to know of any number of samples.
 
 The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
-samples at a time and reduced by QR (a sequential TSQR), so that memory does not grow with samples times thresholds.
+samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
+2012, A206-A239), so that memory does not grow with samples times thresholds.
 The column of ones stands first: what is left below its row is the system with the offset projected out exactly.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -14,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import operators
+from hystgen.identification import segments
 
 Array = NDArray[np.float64]
 
-CHUNK = 2048
-"""Samples whose plays are held at a time; larger ones gain nothing and invite linear algebra threads to contend."""
+CHUNK = 8192
+"""Samples that are reduced at a time."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
@@ -112,28 +115,51 @@ class Reduced:
         return sum(self.counts)
 
 
-def reduce(courses: Sequence[Course], thresholds: Array, tick: Callable[[int], None] | None = None) -> Reduced:
-    """Reduce the records; `tick` is told the number of samples done, chunk by chunk."""
-    width = len(thresholds) + 1
+Source = Callable[[int, int, bool], Array]
+"""Rows `[1, columns.., y]` with the normal equations of the samples from start to stop of one course.
+
+Asked for in order, from sample 0; without rows where the samples are not compared.
+"""
+
+
+def play_rows(course: Course, thresholds: Array) -> Source:
+    """Rows of the plays of one course, far fewer than samples where the drive runs smoothly (`segments`)."""
+    states = start_states(course.v, course.history, thresholds)
+
+    def rows(start: int, stop: int, compared: bool) -> Array:
+        return segments.rows(course.v[start:stop], course.y[start:stop], thresholds, states, compared)
+
+    return rows
+
+
+def reduce(
+    courses: Sequence[Course],
+    thresholds: Array,
+    tick: Callable[[int], None] | None = None,
+    source: Callable[[Course, Array], Source] = play_rows,
+    further: int = 0,
+) -> Reduced:
+    """Reduce the records; `tick` is told the number of samples done, chunk by chunk.
+
+    `source`: where the rows of a course come from, with `further` columns behind those of the plays of `thresholds`.
+    """
+    width = len(thresholds) + further + 1
     whole = np.empty((0, width))
     folds = [np.empty((0, width)) for _ in range(FOLDS)]
     counts = [0] * FOLDS
     for course in courses:
-        edges = np.linspace(course.first, course.last, FOLDS + 1).astype(int)
+        edges = np.linspace(course.first, course.last, FOLDS + 1).astype(int).tolist()
         blocks = [np.empty((0, width + 1)) for _ in range(FOLDS)]
-        states = start_states(course.v, course.history, thresholds)
-        for start in range(0, course.last, CHUNK):
-            stop = min(start + CHUNK, course.last)
-            moved = operators.plays(course.v[start:stop], thresholds, states)
-            states = np.ascontiguousarray(moved[:, -1])
-            for k in range(FOLDS):
-                a, b = max(start, int(edges[k])), min(stop, int(edges[k + 1]))
-                if a < b:
-                    rows = np.column_stack([np.ones(b - a), moved[:, a - start : b - start].T, course.y[a:b]])
-                    blocks[k] = _triangle(blocks[k], rows)
-                    counts[k] += b - a
-            if tick is not None:
-                tick(stop - start)
+        rows = source(course, thresholds)
+        for k, (begin, end) in enumerate(itertools.pairwise([0, *edges])):
+            for start in range(begin, end, CHUNK):
+                stop = min(start + CHUNK, end)
+                found = rows(start, stop, k > 0)
+                if k > 0:
+                    blocks[k - 1] = _triangle(blocks[k - 1], found)
+                    counts[k - 1] += stop - start
+                if tick is not None:
+                    tick(stop - start)
         whole = _triangle(whole, _without_offset(_triangle(*blocks)))
         folds = [_triangle(fold, _without_offset(block)) for fold, block in zip(folds, blocks, strict=True)]
     return Reduced(thresholds, whole, tuple(folds), tuple(counts))

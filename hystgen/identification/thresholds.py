@@ -32,6 +32,9 @@ POWERS = (1.0, 1.5, 2.0)
 PARSIMONY = 1.01
 """The fewest plays whose validation error is within this factor of the best are chosen."""
 
+DENSE = 16
+"""Plays of the list that other parts of a model are sought with."""
+
 MANY = 100
 """More plays than this are spaced evenly."""
 
@@ -86,6 +89,11 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
     return lists
 
 
+def dense(reach: float, samples: int) -> Candidate:
+    """One list that leaves little to wish for, to judge by what else there is in a record."""
+    return candidates(reach, samples, min(DENSE, max(1, samples // SAMPLES_A_PLAY)))[1]
+
+
 def rounded(x: float, digits: int) -> float:
     """x to so many significant digits."""
     return float(f"{x:.{digits}g}") if math.isfinite(x) else x
@@ -96,7 +104,7 @@ def union(lists: Sequence[Candidate]) -> Array:
     return np.array(sorted({r for candidate in lists for r in candidate.thresholds}))
 
 
-def columns(reduced: Reduced, candidate: Candidate) -> Array:
+def columns(reduced: Reduced, candidate: Candidate) -> weights.Columns:
     """Where the candidate's plays are among the reduced ones."""
     return np.asarray(np.searchsorted(reduced.thresholds, candidate.thresholds))
 

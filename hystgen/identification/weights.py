@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hystgen.identification.reduction import Reduced
 
 Array = NDArray[np.float64]
+Columns = NDArray[np.intp]
 
 STILL = 1e-9
 """A play that moves less than this share of the drive is one that does not move."""
@@ -31,7 +32,7 @@ FLOOR_COST = 0.05
 """How much the rms error may grow, as a share of itself, for p_0 to be raised to its floor."""
 
 
-def non_negative(system: Array, columns: Array) -> Array:
+def non_negative(system: Array, columns: Columns) -> Array:
     """Weights >= 0 of the chosen plays that minimise `|system[:, columns] p - system[:, -1]|`."""
     return _solve(system[:, columns], system[:, -1])
 
@@ -53,7 +54,7 @@ def _solve(matrix: Array, target: Array) -> Array:
     return weights
 
 
-def residual(system: Array, columns: Array, weights: Array) -> float:
+def residual(system: Array, columns: Columns, weights: Array) -> float:
     """Sum of squared errors of the weights on a system."""
     return float(np.sum((system[:, columns] @ weights - system[:, -1]) ** 2))
 
@@ -71,7 +72,7 @@ class Weights:
     free_rms: float | None = None
 
 
-def fit(reduced: Reduced, columns: Array, floor: float) -> Weights:
+def fit(reduced: Reduced, columns: Columns, floor: float) -> Weights:
     """Weights for the chosen plays, with p_0 at least the share `floor` of their sum where the data allow it.
 
     p_0 is the slope just after a reversal, and the inverse divides by it. A record shows it only over the first,

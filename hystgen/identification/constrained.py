@@ -1,0 +1,75 @@
+"""Linear least squares under linear inequalities.
+
+Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor turns the problem into the
+one of the shortest vector under inequalities (LDP), and that one's dual is a non-negative least-squares problem.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RIDGE = 1e-7
+"""Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
+
+STILL = 1e-9
+"""A column of less than this share of the longest one is rounding and nothing else."""
+
+INFEASIBLE = 1e-10
+
+
+class InfeasibleError(ValueError):
+    """The inequalities contradict each other."""
+
+
+def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array) -> Array:
+    """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
+
+    `matrix`: (rows, k); `bounds`: (inequalities, k). Where the matrix does not determine x the shortest one, in the
+    measure of its columns, is taken. Raises InfeasibleError.
+    """
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
+    k = matrix.shape[1]
+    size = np.linalg.norm(matrix, axis=0)
+    idle = size <= STILL * np.max(size)
+    size[idle] = 1.0
+    stacked = np.concatenate([np.where(idle, 0.0, matrix / size), RIDGE * np.eye(k)])
+    q, triangle = np.linalg.qr(stacked)
+    free = q.T @ np.concatenate([target, np.zeros(k)])
+    # In the coordinates e = triangle (x size) - free the objective is |e|
+    rows = np.asarray(solve_triangular(triangle, (bounds / size).T, trans="T")).T
+    least = limits - rows @ free
+    if np.all(least <= 0.0):
+        shortest = np.zeros(k)
+    else:
+        length = np.linalg.norm(rows, axis=1)
+        length[length == 0.0] = 1.0
+        scale = float(np.max(np.abs(least / length)))
+        dual_matrix = np.vstack([(rows / length[:, None]).T, least / length / scale])
+        dual_target = np.zeros(k + 1)
+        dual_target[-1] = 1.0
+        multipliers, rest = nnls(dual_matrix, dual_target, maxiter=100 * (k + len(bounds)))
+        if rest < INFEASIBLE:
+            raise InfeasibleError("the inequalities contradict each other")
+        residual = dual_target - dual_matrix @ multipliers
+        shortest = -residual[:k] / residual[-1] * scale
+    return np.asarray(solve_triangular(triangle, shortest + free) / size)
+
+
+def at_least(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Bounds on single unknowns, infinite ones left out, as the inequalities of `least_squares`."""
+    k = len(lower)
+    eye = np.eye(k)
+    below, above = np.isfinite(lower), np.isfinite(upper)
+    return np.concatenate([eye[below], -eye[above]]), np.concatenate([lower[below], -upper[above]])
+
+
+def root_mean_square(squares: float, samples: int) -> float:
+    """rms of so many samples from the sum of their squares."""
+    return math.sqrt(squares / max(samples, 1))

@@ -1,0 +1,131 @@
+"""A fitted model: its figures, its predictions and its parameter file."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings as python_warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.identification import joint, reduction, remarks
+from hystgen.identification.reduction import Course
+from hystgen.identification.report import Row, table
+from hystgen.records import Record, read_record, write_atomically
+
+if TYPE_CHECKING:
+    from hystgen.params import Parameters
+
+HELD_OUT = 0.25
+"""Share of each record, its end, that is held out for the figures when no record is given for that."""
+
+Source = Record | str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model and how good it is.
+
+    `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
+    sentence each; `history`: drive values visited before each record, None when unknown.
+    """
+
+    parameters: Parameters
+    rows: tuple[Row, ...]
+    warnings: tuple[str, ...]
+    history: tuple[float, ...] | None = None
+
+    def table(self) -> str:
+        """The fit table as text: rms and largest error, absolute and in % of the output range."""
+        return table(self.rows, self._unit, self._remarks)
+
+    def predict(
+        self, record: Source, history: Sequence[float] | None = None, free_offset: bool = False
+    ) -> NDArray[np.float64]:
+        """Free-run output (N,) of the model along a record's drive, in output units.
+
+        The start memory comes from `history`, else from the history of the fit, else the plays are at rest at the
+        first drive value: then the samples before the drive has swept its range count little. `free_offset` shifts the
+        result to the mean of the record's `y`. Warns when the drive leaves the fitted range.
+        """
+        data = _read(record)
+        outside = remarks.outside(data.name, data.v, self.parameters.input_range)
+        if outside:
+            python_warnings.warn(outside, stacklevel=2)
+        inner = self._inner(data, self.history if history is None else visited(history))
+        part = self.parameters.model.pi
+        predicted = reduction.prediction(inner.v, inner.history, np.array(part.thresholds), np.array(part.weights))
+        if free_offset:
+            if data.y is None:
+                raise ValueError(f"{data.name} has no measured column y to take the offset from")
+            return np.asarray(predicted + float(np.mean(data.y - predicted)))
+        return np.asarray(predicted + self.parameters.model.output_offset)
+
+    def settled(self, record: Source) -> int:
+        """First sample of a record at which no play remembers an unknown start; 0 where a history was given."""
+        if self.history is not None:
+            return 0
+        largest = self.parameters.model.pi.thresholds[-1]
+        return reduction.settled(self._inner(_read(record), None).v, largest)
+
+    def _inner(self, record: Record, history: tuple[float, ...] | None) -> Course:
+        """The record's drive as the plays see it."""
+        from hystgen.api import cascade_of
+
+        v = np.ascontiguousarray(record.v, dtype=np.float64)
+        course = Course(record.name, v, v, history, 0, len(v), 0.0)
+        return joint.through_front(course, cascade_of(self.parameters).stages)
+
+    def text(self) -> str:
+        """The parameter file: what was fitted on what as comments, then the parameters."""
+        from hystgen.params import dump_parameters
+
+        lines = ["Identified by hystgen; errors have a free offset a record."]
+        lines += [row.sentence() for row in self.rows]
+        lines += [f"Warning: {warning}" for warning in self.warnings]
+        return dump_parameters(self.parameters, header="\n".join(lines))
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the parameter file, all or nothing."""
+        write_atomically(path, self.text())
+
+    @property
+    def _unit(self) -> str:
+        units = self.parameters.units
+        return (units.output or "") if units is not None else ""
+
+    @property
+    def _remarks(self) -> list[str]:
+        n = len(self.parameters.model.pi.thresholds) - 1
+        told = [
+            f"{n} play{'' if n == 1 else 's'}. Errors of a free run with a free offset a record; % of the largest "
+            "peak-to-peak output of the row's records, each taken whole."
+        ]
+        if any(row.model == "trial" for row in self.rows):
+            told.append(
+                f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the "
+                "rest (row held out). written: fitted to everything."
+            )
+        elif any(row.part == "held out" for row in self.rows):
+            told.append("written: fitted to the records of row fit only.")
+        if any(row.ignored for row in self.rows):
+            told.append("ignored: samples at the start, before the drive had wiped an unknown start memory.")
+        return told
+
+
+
+
+def _read(source: Source) -> Record:
+    return source if isinstance(source, Record) else read_record(source, need=("v",))
+
+
+def visited(values: Sequence[float]) -> tuple[float, ...]:
+    """A history as plain numbers. Raises ValueError unless all are finite."""
+    places = tuple(float(x) for x in values)
+    if not all(math.isfinite(x) for x in places):
+        raise ValueError("history is a list of finite drive values")
+    return places

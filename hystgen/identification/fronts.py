@@ -1,0 +1,225 @@
+"""The memoryless part in front of the plays as a fit sees it: a few shape numbers, within bounds.
+
+A front and the play sum behind it share a scale: `a G` with thresholds `a r` and weights `p / a` is the same model.
+Every front here maps the fitted drive range onto a range of the same length and 0 onto 0, so that thresholds keep the
+meaning they have without one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.identification.thresholds import rounded
+from hystgen.models import DeadZone, Stage, TanhEnvelope
+
+Array = NDArray[np.float64]
+
+DIGITS = 10
+"""Significant digits of the stage's numbers."""
+
+STEEPEST = math.log(20.0)
+"""Largest ratio of two slopes of a dead-zone sum, as its logarithm."""
+
+FLATTEST = 3.0
+"""Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
+
+CURVED = (0.02, 3.0)
+"""Least and largest half drive range in units of the tanh's argument."""
+
+
+class Front(Protocol):
+    """A family of memoryless parts, a member for every `shape` (m,)."""
+
+    @property
+    def name(self) -> str:
+        """What the fit table calls it."""
+
+    @property
+    def straight(self) -> Array:
+        """The shape that is (nearly) a straight line: where a search starts."""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of every shape number."""
+
+    def slack(self, shape: Array) -> Array:
+        """What must not be negative for the front to be invertible, beyond the bounds; empty when there is nothing."""
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The stages of the model."""
+
+
+@dataclass(frozen=True)
+class Straight:
+    """No memoryless part: a plain play sum."""
+
+    name: str = "pi"
+
+    @property
+    def straight(self) -> Array:
+        """No shape numbers."""
+        return np.empty(0)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """None."""
+        return np.empty(0), np.empty(0)
+
+    def slack(self, shape: Array) -> Array:
+        """Nothing to hold."""
+        return np.empty(0)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """No stage."""
+        return ()
+
+
+@dataclass(frozen=True)
+class DeadZones:
+    """Dead-zone sums with given breaks (41); the shape is the logarithm of each piece's slope over the first one's.
+
+    `drive`: the fitted range; `breaks`: places inside it where the slope may change, strictly rising, none of them 0:
+    a threshold of 0 is the line that every dead-zone sum has.
+    """
+
+    drive: tuple[float, float]
+    breaks: tuple[float, ...]
+    name: str = "gpi-deadzone"
+
+    @property
+    def straight(self) -> Array:
+        """All slopes alike."""
+        return np.zeros(len(self.breaks))
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Every piece rises, none is far steeper than another."""
+        most = np.full(len(self.breaks), STEEPEST)
+        return -most, most
+
+    def slack(self, shape: Array) -> Array:
+        """The logarithms keep all slopes positive."""
+        return np.empty(0)
+
+    def slopes(self, shape: Array) -> Array:
+        """Slopes of the pieces, from the lowest drive up."""
+        ratio = np.exp(np.concatenate([[0.0], shape]))
+        low, high = self.drive
+        length = np.diff([low, *self.breaks, high])
+        return np.asarray(ratio * (high - low) / float(ratio @ length))
+
+    def shape(self, slopes: Array) -> Array:
+        """The shape of given slopes, brought within the bounds."""
+        least = float(np.max(slopes)) * math.exp(-STEEPEST)
+        logs = np.log(np.maximum(slopes, least))
+        return np.asarray(np.clip(logs[1:] - logs[0], -STEEPEST, STEEPEST))
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The dead-zone sum; its weight at 0 is the slope of the piece that 0 lies in."""
+        slopes = self.slopes(shape)
+        middle = int(np.searchsorted(self.breaks, 0.0, side="right"))
+        terms = {0.0: float(slopes[middle])}
+        for j, place in enumerate(self.breaks):
+            outer, inner = (slopes[j], slopes[j + 1]) if j < middle else (slopes[j + 1], slopes[j])
+            terms[place] = float(outer - inner)
+        places = sorted(terms)
+        return (DeadZone(places, [rounded(terms[place], DIGITS) for place in places]),)
+
+
+@dataclass(frozen=True)
+class Tanh:
+    """Tanh envelopes with one branch or two (45).
+
+    The shape of a branch is `a1` times half the drive range, and the place of its steepest point, from the middle of
+    the range in units of its half length. The descending branch has two more: the logarithm of its length over the
+    ascending one's and its lift above it in the middle of the range, as a share of the range.
+    """
+
+    drive: tuple[float, float]
+    branches: int = 1
+
+    @property
+    def name(self) -> str:
+        """With the number of branches, which the table tells apart."""
+        return "gpi-tanh" if self.branches == 1 else "gpi-tanh, two branches"
+
+    @property
+    def straight(self) -> Array:
+        """A gently bent branch, so that the derivative to its place is not zero; no gap between two."""
+        return np.array([0.3, 0.0] if self.branches == 1 else [0.3, 0.0, 0.3, 0.0, 0.0, 0.0])
+
+    def doubled(self, single: Array) -> Array:
+        """Two branches that are both the single one of that shape."""
+        return np.concatenate([single, single, [0.0, 0.0]])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Curvature and place of each branch, then length and lift."""
+        low = [CURVED[0], -20.0] * self.branches + [-0.5, 0.0] * (self.branches - 1)
+        high = [CURVED[1], 20.0] * self.branches + [0.5, 0.3] * (self.branches - 1)
+        return np.array(low), np.array(high)
+
+    def slack(self, shape: Array) -> Array:
+        """How far the ends stay from where a branch is flat, and the descending branch above the ascending one."""
+        held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
+        if self.branches == 2:
+            stage = self._stage(shape, None)
+            places = self._places
+            gap = stage.forward(places, False) - stage.forward(places, True)
+            held += list(gap / (self.drive[1] - self.drive[0]))
+        return np.array(held)
+
+    @cached_property
+    def _places(self) -> Array:
+        return np.linspace(*self.drive, 61)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The envelope, its numbers rounded; the descending branch is lifted by what rounding lets it fall short."""
+        return (self._stage(shape, DIGITS),)
+
+    def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
+        low, high = self.drive
+        half = 0.5 * (high - low)
+        middle = 0.5 * (low + high)
+
+        def branch(curvature: float, place: float, length: float) -> tuple[float, float, float]:
+            a1 = curvature / half
+            a2 = -a1 * (middle + place * half)
+            a0 = 2.0 * half * length / (math.tanh(a1 * high + a2) - math.tanh(a1 * low + a2))
+            return a0, a1, a2
+
+        def value(numbers: tuple[float, float, float], v: float) -> float:
+            return numbers[0] * math.tanh(numbers[1] * v + numbers[2])
+
+        up = branch(shape[0], shape[1], 1.0)
+        up_all = (*up, -value(up, 0.0))
+        if self.branches == 1:
+            return TanhEnvelope(_numbers(up_all, digits))
+        down = branch(shape[2], shape[3], math.exp(shape[4]))
+        lift = value(up, middle) + up_all[3] - value(down, middle) + shape[5] * 2.0 * half
+        stage = TanhEnvelope(_numbers(up_all, digits), _numbers((*down, lift), digits))
+        if digits is not None:
+            places = np.linspace(low, high, 20001)
+            short = float(np.max(stage.forward(places, True) - stage.forward(places, False)))
+            if short > 0.0:
+                stage = TanhEnvelope(stage.ascending, _numbers((*down, lift + 1.01 * short + 1e-9 * half), digits))
+        return stage
+
+
+def _numbers(values: tuple[float, ...], digits: int | None) -> tuple[float, float, float, float]:
+    a0, a1, a2, a3 = (float(x) if digits is None else rounded(float(x), digits) for x in values)
+    return a0, a1, a2, a3
+
+
+def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
+    """So many breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside by a little."""
+    low, high = drive
+    step = (high - low) / (count + 1)
+    places = [rounded(low + step * (j + 1), 6) for j in range(count)]
+    return tuple(rounded(0.05 * step, 6) if abs(x) < 0.05 * step else x for x in places)

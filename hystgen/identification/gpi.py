@@ -1,0 +1,217 @@
+"""Fitting a play sum with a memoryless part in front of it.
+
+The front's shape and the weights are found together (`joint`); then the plays are placed and weighted as for a plain
+play sum, on the drive as it comes out of the front (`pi`), and both are polished once more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import operators
+from hystgen.identification import constrained, joint, pi, reduction, thresholds, weights
+from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh, even_breaks
+from hystgen.identification.pi import IdentificationError, Solution
+from hystgen.identification.reduction import Course, Source
+from hystgen.models import Stage
+
+Array = NDArray[np.float64]
+Tick = Callable[[int], None] | None
+
+KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
+"""Names of what can be fitted; `auto` chooses among them."""
+
+BREAKS = (1, 2, 4, 8)
+"""Numbers of breaks of a dead-zone sum that are tried."""
+
+PARSIMONY = 1.02
+"""A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
+
+INVERSE_PLAYS = 10
+"""Plays of the measured output in the convex problem that gives a dead-zone sum its start."""
+
+LEAST_SLOPE = 0.1
+"""Least slope of a piece of the drive, and of the inverse play sum, in that problem; as a share of the mean slope."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A front, its shape and the play sum behind it."""
+
+    front: Front
+    shape: Array
+    solution: Solution
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The stages of the model."""
+        return self.front.stages(self.shape)
+
+    def inner(self, item: Course) -> Course:
+        """A course as the plays see it."""
+        return joint.through_front(item, self.stages)
+
+
+def solve(
+    courses: Sequence[Course],
+    kind: str,
+    wanted: int | tuple[float, ...] | None,
+    breaks: int | tuple[float, ...] | None,
+    floor: float,
+    skip: int,
+    tick: Tick = None,
+) -> tuple[Fitted, list[Course]]:
+    """Fit a model of one kind; also the courses, their drive as measured, over the samples that were compared.
+
+    Of several fronts of a kind the one with the fewest shape numbers is taken that predicts blocks of the records left
+    out of the fit about as well as any. Raises IdentificationError.
+    """
+    plain, compared = pi.solve(courses, wanted, floor, skip, tick)
+    if kind == "pi":
+        return Fitted(Straight(), np.empty(0), plain), compared
+    # What a play sum alone would choose is bent by the front that it lacks: the shape is sought over a dense list
+    fine = plain.thresholds
+    if not isinstance(wanted, tuple) and plain.reach > 0.0:
+        fine = np.array(thresholds.dense(plain.reach, sum(item.used for item in compared)).thresholds)
+    best: tuple[float, Front, Array] | None = None
+    before: Array | None = None
+    for front in fronts_of(kind, compared, breaks):
+        shaped = _shaped(compared, front, fine, before, tick)
+        before = shaped.shape
+        error = validation(shaped, front)
+        if best is None or error * PARSIMONY < best[0]:
+            best = error, front, shaped.shape
+    assert best is not None
+    _, front, shape = best
+    fitted = _solve_behind(courses, front, shape, wanted, floor, skip, tick)
+    # the plays may have moved, and the shape is to be the best one for them
+    r = fitted.solution.thresholds
+    shape = joint.refine(compared, front, shape, r, tick).shape
+    fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, skip, tick)
+    if wanted is None:
+        fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
+    largest = float(fitted.solution.thresholds[-1])
+    firsts = [pi.resettled(fitted.inner(item), largest, skip).first for item in courses]
+    return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
+
+
+def _solve_behind(
+    courses: Sequence[Course],
+    front: Front,
+    shape: Array,
+    wanted: int | tuple[float, ...] | None,
+    floor: float,
+    skip: int,
+    tick: Tick,
+) -> Fitted:
+    stages = front.stages(shape)
+    solution, _ = pi.solve([joint.through_front(item, stages) for item in courses], wanted, floor, skip, tick)
+    return Fitted(front, shape, solution)
+
+
+def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, ...] | None) -> list[Front]:
+    """The fronts of a kind, those with fewer shape numbers first."""
+    drive = (min(item.drive_range[0] for item in courses), max(item.drive_range[1] for item in courses))
+    if kind == "gpi-tanh":
+        return [Tanh(drive), Tanh(drive, 2)]
+    if isinstance(breaks, tuple):
+        if not all(drive[0] < place < drive[1] for place in breaks):
+            raise IdentificationError(
+                f"breaks have to lie inside the drive range of the records, {drive[0]:.6g} to {drive[1]:.6g}"
+            )
+        return [DeadZones(drive, breaks)]
+    return [DeadZones(drive, even_breaks(drive, count)) for count in ([breaks] if breaks is not None else BREAKS)]
+
+
+def _shaped(
+    courses: Sequence[Course], front: Front, thresholds: Array, before: Array | None, tick: Tick
+) -> joint.Shaped:
+    """The best of what is found from several starts; `before`: the shape of the front tried before this one."""
+    starts = [front.straight]
+    if isinstance(front, Tanh) and front.branches == 2 and before is not None:
+        starts = [front.doubled(before)]
+    if isinstance(front, DeadZones):
+        start = convex_start(courses, front)
+        if start is not None:
+            starts.append(start)
+    found = [joint.refine(courses, front, start, thresholds, tick) for start in starts]
+    return min(found, key=lambda shaped: shaped.rms)
+
+
+def validation(shaped: joint.Shaped, front: Front) -> float:
+    """rms error on blocks of the records that the weights and the last step of the shape have not seen."""
+    squares = 0.0
+    for fold, left_out in enumerate(shaped.system.folds):
+        training = reduction.others(shaped.system, fold)
+        change, p = joint.solve_linear(training, shaped.weights, shaped.shape, front, 0.0)
+        unknowns = np.concatenate([p, change])
+        squares += weights.residual(left_out, np.arange(len(unknowns)), unknowns)
+    return constrained.root_mean_square(squares, shaped.system.samples)
+
+
+def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
+    """Shape of a dead-zone sum from the problem that is linear in it and in the inverse play sum together.
+
+    `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on the one side, pieces of the
+    drive with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless
+    part lies behind the plays). It is convex, but the error that it makes small is one of the drive, and noise of the
+    output enters the plays: a start for the fit of the output, no more. None where no sample is left.
+    """
+    low, high = front.drive
+    places = np.array([low, *front.breaks, high])
+    length = np.diff(places)
+    m = len(length)
+    swing = max(item.output_range for item in courses)
+    z = np.linspace(0.0, 0.4 * swing, INVERSE_PLAYS + 1)
+    turned = []
+    for item in courses:
+        # the memory of the inverse is not known even where that of the plays is
+        first = max(item.first, reduction.settled(item.y[: item.last], math.inf))
+        pieces = np.clip(item.v[None, :], places[:-1, None], places[1:, None]) - places[:-1, None]
+        target = pieces[-1] * ((high - low) / length[-1])
+        turned.append((replace(item, v=item.y, y=target, history=None, first=first), pieces))
+    if not sum(item.used for item, _ in turned):
+        return None
+    of_course = {id(item): pieces for item, pieces in turned}
+
+    def source(item: Course, thresholds: Array) -> Source:
+        pieces = of_course[id(item)]
+        states = reduction.start_states(item.v, None, thresholds)
+
+        def rows(start: int, stop: int, compared: bool) -> Array:
+            nonlocal states
+            moved = operators.plays(item.v[start:stop], thresholds, states)
+            states = np.ascontiguousarray(moved[:, -1])
+            # the mean slope is 1: the last piece makes up for the others
+            part = pieces[:, start:stop]
+            others = part[:-1] - part[-1] * (length[:-1] / length[-1])[:, None]
+            found = np.vstack([np.ones(stop - start), moved, -others, item.y[start:stop]]).T
+            return found if compared else found[:0]
+
+        return rows
+
+    system = reduction.reduce([item for item, _ in turned], z, None, source, m - 1).whole
+    k = len(z)
+    q_least = LEAST_SLOPE * (high - low) / swing
+    least = LEAST_SLOPE
+    bounds = [np.eye(k + m - 1)[0], np.concatenate([np.ones(k), np.zeros(m - 1)])]
+    limits = [q_least, q_least]
+    for i in range(1, k):
+        bounds.append(-np.eye(k + m - 1)[i])
+        limits.append(0.0)
+    for j in range(m - 1):
+        bounds.append(np.eye(k + m - 1)[k + j])
+        limits.append(least)
+    bounds.append(np.concatenate([np.zeros(k), -length[:-1] / length[-1]]))
+    limits.append(least - (high - low) / length[-1])
+    try:
+        solution = constrained.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits))
+    except constrained.InfeasibleError:
+        return None
+    slopes = np.append(solution[k:], ((high - low) - float(length[:-1] @ solution[k:])) / length[-1])
+    return front.shape(slopes)

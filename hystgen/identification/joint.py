@@ -1,0 +1,208 @@
+"""The shape of the front and the weights of the plays fitted together: least squares on the free-run output error.
+
+The weights enter linearly, the shape does not: a Gauss-Newton method with a trust region, whose every step solves for
+all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives by
+the shape are differences of free runs, so that they count what the plays remember of earlier samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import operators
+from hystgen.identification import constrained, reduction, weights
+from hystgen.identification.constrained import root_mean_square
+from hystgen.identification.fronts import Front
+from hystgen.identification.reduction import Course, Reduced, Source
+from hystgen.models import Stage
+
+Array = NDArray[np.float64]
+
+DIFFERENCE = 1e-6
+"""Change of a shape number for a derivative; shapes are of the order of one."""
+
+MOST_STEPS = 25
+
+ENOUGH = 1e-4
+"""The search ends when the error falls by less than this share of itself."""
+
+LEAST_CHANGE = 1e-8
+"""It ends too when no shape number changes by more than this."""
+
+COMPARED = 200_000
+"""Samples that are compared while the shape is sought; of longer records each so many-th, all run through the plays."""
+
+Tick = Callable[[int], None] | None
+
+
+@dataclass(frozen=True)
+class Shaped:
+    """A shape, weights over a list of thresholds, and the system that is linear about both.
+
+    `rms`: error of the best weights for the shape, to which `weights` are near.
+    """
+
+    shape: Array
+    weights: Array
+    rms: float
+    system: Reduced
+
+
+def directions(v: Array, ascending: bool) -> NDArray[np.bool_]:
+    """Whether the drive rises at each sample; where it stands still the last direction, at first `ascending`."""
+    moved = np.diff(v, prepend=v[:1])
+    last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(v)), -1))
+    return np.asarray(np.where(last >= 0, moved[np.maximum(last, 0)] > 0.0, ascending))
+
+
+def through_stages(stages: Sequence[Stage], v: Array, rising: NDArray[np.bool_] | None) -> Array:
+    """`w = G[v]` sample by sample; `rising` may be None where no stage has two branches."""
+    w = v
+    for stage in stages:
+        if stage.branches_differ:
+            assert rising is not None
+            w = np.where(rising, stage.forward(w, True), stage.forward(w, False))
+        else:
+            w = stage.forward(w)
+    return np.ascontiguousarray(w)
+
+
+def through_front(item: Course, stages: Sequence[Stage]) -> Course:
+    """The course as the plays see it: their input in place of the drive, in the history too."""
+    if not stages:
+        return item
+    rising, history = _session(item, stages)
+    return replace(item, v=through_stages(stages, item.v, rising), history=history)
+
+
+def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] | None, tuple[float, ...] | None]:
+    """Directions of the drive along the course, and the history behind the front."""
+    branched = any(stage.branches_differ for stage in stages)
+    if item.history is None:
+        return (directions(item.v, True) if branched else None), None
+    before = np.array([0.0, *item.history])
+    whole = directions(np.concatenate([before, item.v]), True) if branched else None
+    visited = through_stages(stages, before[1:], None if whole is None else whole[1 : len(before)])
+    return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
+
+
+def refine(
+    courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None
+) -> Shaped:
+    """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
+    stages = front.stages(shape)
+    plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
+    columns = np.arange(len(thresholds))
+    now = _linear(courses, front, shape, weights.non_negative(plain.whole, columns), thresholds, tick)
+    low, high = front.bounds
+    damping = 1e-3
+    for _ in range(MOST_STEPS):
+        if damping > 1e6 or now.rms == 0.0:
+            break
+        try:
+            change, p = solve_linear(now.system.whole, now.weights, now.shape, front, damping)
+        except constrained.InfeasibleError:
+            break
+        moved = np.clip(now.shape + change, low, high)
+        if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
+            break
+        trial = _linear(courses, front, moved, p, thresholds, tick) if _allowed(front, moved) else None
+        if trial is not None and trial.rms < now.rms:
+            done = now.rms - trial.rms < ENOUGH * now.rms
+            now, damping = trial, damping * 0.2
+            if done:
+                break
+        else:
+            damping = max(damping, 1e-4) * 5.0
+    return now
+
+
+def _allowed(front: Front, shape: Array) -> bool:
+    slack = front.slack(shape)
+    return not len(slack) or float(np.min(slack)) > -1e-6
+
+
+def _linear(
+    courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick
+) -> Shaped:
+    """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
+    versions = [front.stages(shape)]
+    for j in range(len(shape)):
+        one = shape.copy()
+        one[j] += DIFFERENCE
+        versions.append(front.stages(one))
+    every = max(1, sum(item.used for item in courses) // COMPARED)
+
+    def source(course: Course, r: Array) -> Source:
+        return _rows_with_derivatives(course, r, versions, p, every)
+
+    system = reduction.reduce(courses, thresholds, tick, source, len(shape))
+    columns = np.arange(len(thresholds))
+    best = weights.non_negative(system.whole, columns)
+    rms = root_mean_square(weights.residual(system.whole, columns, best), system.samples)
+    # About the weights that the derivatives were taken with: they are what the next step of the shape refers to
+    return Shaped(shape, p, rms, system)
+
+
+def _rows_with_derivatives(
+    course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
+) -> Source:
+    """The plays behind the first version of a front, and by how much each other version changes their weighted sum."""
+    carried = []
+    for stages in versions:
+        rising, history = _session(course, stages)
+        first = through_stages(stages, course.v[:1], None if rising is None else rising[:1])
+        carried.append((stages, rising, reduction.start_states(first, history, thresholds)))
+    n1 = len(thresholds)
+
+    def rows(start: int, stop: int, compared: bool) -> Array:
+        found = np.empty((stop - start, n1 + len(versions) + 1))
+        sums = []
+        for k, (stages, rising, states) in enumerate(carried):
+            part = None if rising is None else rising[start:stop]
+            moved = operators.plays(through_stages(stages, course.v[start:stop], part), thresholds, states)
+            carried[k] = (stages, rising, np.ascontiguousarray(moved[:, -1]))
+            if k == 0:
+                found[:, 1 : n1 + 1] = moved.T
+            sums.append(p @ moved)
+        for k, total in enumerate(sums[1:]):
+            found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
+        found[:, 0] = 1.0
+        found[:, -1] = course.y[start:stop]
+        # every so many-th sample stands for all of them
+        return found[-start % every :: every] * math.sqrt(every) if compared else found[:0]
+
+    return rows
+
+
+def solve_linear(
+    system: Array, p: Array, shape: Array, front: Front, damping: float
+) -> tuple[Array, Array]:
+    """Change of the shape and new weights that fit a linear system best, under the constraints."""
+    k, m = len(p), len(shape)
+    matrix, target = system[:, :-1], system[:, -1]
+    tied = np.zeros((m, k + m))
+    size = np.linalg.norm(matrix[:, k:], axis=0)
+    tied[:, k:] = np.diag(np.sqrt(damping) * np.maximum(size, 1e-12))
+    low, high = front.bounds
+    bounds, limits = constrained.at_least(
+        np.concatenate([np.zeros(k), low - shape]), np.concatenate([np.full(k, np.inf), high - shape])
+    )
+    slack = front.slack(shape)
+    if len(slack):
+        slope = np.empty((len(slack), m))
+        for j in range(m):
+            one = shape.copy()
+            one[j] += DIFFERENCE
+            slope[:, j] = (front.slack(one) - slack) / DIFFERENCE
+        bounds = np.concatenate([bounds, np.concatenate([np.zeros((len(slack), k)), slope], axis=1)])
+        limits = np.concatenate([limits, np.minimum(-slack, 0.0)])
+    solution = constrained.least_squares(
+        np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, limits
+    )
+    return solution[k:], solution[:k]

@@ -1,0 +1,95 @@
+"""What the user should know about a fit, one sentence each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.identification import pi, reduction
+from hystgen.identification.pi import Solution
+from hystgen.identification.reduction import Course
+from hystgen.identification.report import Row
+
+AMPLIFIES = 100.0
+"""Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""
+
+SMALL_REACH = 0.1
+"""Largest threshold, as a share of the drive range, below which a record is said to show little hysteresis."""
+
+STARTS, UNLIKE = 8, 3.0
+"""A start of so many samples whose rms error is so many times that of the rest tells of a wrong history."""
+
+
+def about_model(
+    solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
+) -> list[str]:
+    """What the user should know about the model itself."""
+    told = []
+    p, made = solution.weights, solution.fitted
+    if made.free_p0 is not None and made.free_rms is not None:
+        told.append(
+            f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
+            f"hardly tell: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement lowers "
+            "p_0: record more slowly if you can"
+        )
+    elif p[0] == 0.0:
+        told.append(
+            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
+            "of use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
+        )
+    elif np.sum(p) > AMPLIFIES * p[0]:
+        told.append(
+            f"p_0 is small: the inverse amplifies small movements {np.sum(p) / p[0]:.0f} times as much as large ones"
+        )
+    low = min(item.drive_range[0] for item in compared)
+    high = max(item.drive_range[1] for item in compared)
+    if solution.reach < SMALL_REACH * (high - low):
+        told.append(
+            f"the records tell little about hysteresis: no play above {solution.reach:.3g} moves enough in them; "
+            "record full cycles, several times, or give --history"
+        )
+    if isinstance(wanted, tuple):
+        beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
+        if beyond:
+            told.append(
+                f"{len(beyond)} threshold{'' if len(beyond) == 1 else 's'} above {solution.reach:.6g} hardly move in "
+                "these records; their weights are not to be trusted for larger drives"
+            )
+    outputs = [item.y[item.first : item.last] for item in compared]
+    spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
+    share = 1.0 - own.rms**2 / spread
+    if share < 0.9:
+        told.append(
+            f"the model explains only {100 * max(share, 0.0):.0f} % of the measured variance; check which column is "
+            "which, and the units"
+        )
+    return told
+
+
+def about_start(errors: pi.Errors, largest: float) -> str:
+    """Whether a record's start disagrees with the history it was given."""
+    item = errors.course
+    end = reduction.settled(item.v, largest) - item.first
+    if item.history is None or end < STARTS or len(errors.error) - end < STARTS:
+        return ""
+    start, rest = (float(np.sqrt(np.mean(part**2))) for part in (errors.error[:end], errors.error[end:]))
+    if start <= UNLIKE * rest:
+        return ""
+    return (
+        f"{item.name}: the first {end} samples, whose output depends on the history, are off by {start:.3g} rms "
+        f"against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out if in doubt"
+    )
+
+
+def outside(name: str, v: NDArray[np.float64], allowed: tuple[float, float]) -> str:
+    number = int(np.count_nonzero((v < allowed[0]) | (v > allowed[1])))
+    if not number:
+        return ""
+    return (
+        f"{name}: {number} samples have a drive outside the fitted range {allowed[0]:.6g} to {allowed[1]:.6g}; "
+        "the model is a guess there"
+    )
+
+

@@ -1,0 +1,12 @@
+"""Linear algebra on small matrices: one thread is faster than several that wait for each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def alone() -> Any:
+    """Context in which the linear algebra library uses a single thread."""
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+    return threadpool_limits(1)

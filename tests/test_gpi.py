@@ -1,0 +1,276 @@
+"""Identification with a memoryless part in front: against plants of loops and textbook formulas, and other solvers."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from recordings import (
+    brute_output,
+    brute_plays,
+    columns,
+    error_figures,
+    noisy,
+    part_of_file,
+    record,
+    wander,
+    write_csv,
+    written,
+)
+from scipy.optimize import minimize
+
+import hystgen
+from hystgen.identification import Fit, constrained, segments
+from hystgen.identification.pi import IdentificationError
+from hystgen.verification import compilers
+
+Array = NDArray[np.float64]
+Run = Callable[..., tuple[int, str, str]]
+
+THRESHOLDS = (0.0, 2.0, 5.0, 10.0, 20.0, 35.0)
+WEIGHTS = (0.6, 0.1, 0.1, 0.08, 0.06, 0.05)
+SWING = float(np.ptp(brute_output(wander(1), THRESHOLDS, WEIGHTS, 0.0)))
+NOISE = 1e-3 * SWING
+BREAKS = (20.0, 40.0, 60.0, 80.0)
+
+
+def bent(v: Array) -> Array:
+    """A front of straight pieces over 0 .. 100, of mean slope 1, by its points."""
+    return np.asarray(np.interp(v, [0, 20, 40, 60, 80, 100], np.array([0, 27, 50, 66, 81, 100])))
+
+
+def tanh_front(v: Array, a1: float = 0.018, middle: float = 35.0) -> Array:
+    """An S over 0 .. 100 through both ends of the diagonal."""
+    low, high = np.tanh(-a1 * middle), np.tanh(a1 * (100.0 - middle))
+    return np.asarray(100.0 * (np.tanh(a1 * (v - middle)) - low) / (high - low))
+
+
+def branched(v: Array, lift: float = 3.0) -> Array:
+    """The S while the drive rises, another one above it while it falls; the last one where it stands still."""
+    w, rising = np.empty_like(v), True
+    for k, x in enumerate(v):
+        if k and x != v[k - 1]:
+            rising = x > v[k - 1]
+        up = float(tanh_front(x))
+        w[k] = up if rising else up + lift * (1.0 + 0.2 * np.tanh(0.02 * (x - 50.0)))
+    return w
+
+
+def plant(front: Callable[[Array], Array], seed: int, noise: float = NOISE) -> tuple[Array, Array]:
+    v = wander(seed)
+    return v, noisy(brute_output(front(v), THRESHOLDS, WEIGHTS, 0.0), noise, seed + 100)
+
+
+def held_out(fit: Fit, front: Callable[[Array], Array], seed: int = 77) -> float:
+    """rms error on another, noise-free record of the same plant."""
+    v, y = plant(front, seed, 0.0)
+    known = fit.settled(record(v, y))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it may leave the fitted range by a little
+        error = (y - fit.predict(record(v, y)))[known:]
+    return float(np.std(error))
+
+
+def pieces(fit: Fit) -> Array:
+    """Slopes of the dead-zone sum between 0 and 100, and the weights times the mean of them, for any scale of it."""
+    (stage,) = fit.parameters.model.memoryless
+    v = np.array([10.0, 30.0, 50.0, 70.0, 90.0])
+    value = np.zeros((2, len(v)))
+    for side in (0, 1):
+        x = v - 1.0 + 2.0 * side
+        for rho, eta in zip(stage.thresholds, stage.weights, strict=True):
+            beyond = np.maximum(x - rho, 0.0) if rho > 0.0 else np.minimum(x - rho, 0.0)
+            value[side] += eta * (beyond if rho else x)
+    return np.asarray((value[1] - value[0]) / 2.0)
+
+
+class TestDeadZone:
+    @pytest.mark.parametrize("history", [None, ()])
+    def test_same_model_without_noise(self, history: tuple[float, ...] | None) -> None:
+        v, y = plant(bent, 3, 0.0)
+        fit = hystgen.identify(
+            record(v, y), model="gpi-deadzone", thresholds=THRESHOLDS, breaks=BREAKS, history=history, p0_floor=0.0
+        )
+        np.testing.assert_allclose(fit.parameters.model.pi.weights, WEIGHTS, rtol=0, atol=1e-6)
+        np.testing.assert_allclose(pieces(fit), [27 / 20, 23 / 20, 16 / 20, 15 / 20, 19 / 20], rtol=0, atol=1e-6)
+
+    def test_same_model_with_noise(self) -> None:
+        v, y = plant(bent, 3)
+        fit = hystgen.identify(record(v, y), model="gpi-deadzone", thresholds=THRESHOLDS, breaks=BREAKS)
+        # noise and error together at most 1.1 times the noise
+        assert held_out(fit, bent) <= np.sqrt(1.1**2 - 1.0) * NOISE
+
+    def test_everything_chosen(self) -> None:
+        v, y = plant(bent, 3)
+        plain = hystgen.identify(record(v, y))
+        fit = hystgen.identify(record(v, y), model="gpi-deadzone")
+        assert held_out(plain, bent) > 10.0 * NOISE
+        assert held_out(fit, bent) < 1.0 * NOISE
+        assert len(fit.parameters.model.memoryless[0].thresholds) == 5
+
+    def test_range_on_both_sides_of_zero(self) -> None:
+        v, y = plant(bent, 5)
+        fit = hystgen.identify(record(v - 50.0, y), model="gpi-deadzone", breaks=(-30.0, -10.0, 10.0, 30.0))
+        w, z = plant(bent, 6, 0.0)
+        error = (z - fit.predict(record(w - 50.0, z)))[fit.settled(record(w - 50.0, z)) :]
+        assert np.std(error) < 2.0 * NOISE
+        (stage,) = fit.parameters.model.memoryless
+        assert stage.thresholds == (-30.0, -10.0, 0.0, 10.0, 30.0)
+
+    def test_breaks_outside_the_drive(self) -> None:
+        v, y = plant(bent, 3)
+        with pytest.raises(IdentificationError, match="breaks have to lie inside the drive range"):
+            hystgen.identify(record(v, y), model="gpi-deadzone", breaks=(50.0, 120.0))
+
+    def test_from_the_command_line_to_equal_bits(self, tmp_path: Path, run: Run) -> None:
+        v, y = plant(bent, 3)
+        data, target = write_csv(tmp_path / "data.csv", v, y), tmp_path / "stage.yaml"
+        code, out, err = run("identify", data, "--model", "gpi-deadzone", "--breaks", "4", "-o", target)
+        assert (code, err) == (0, "")
+        assert "written" in out
+        assert written(target)["model"]["memoryless"][0]["kind"] == "dead_zone"
+        report = hystgen.verify(
+            hystgen.load(target), operator="both", compiler=(compilers.available()[0].name,), length=3000
+        )
+        assert report.ok, report.table()
+
+
+class TestTanh:
+    def test_one_branch(self) -> None:
+        v, y = plant(tanh_front, 3)
+        fit = hystgen.identify(record(v, y), model="gpi-tanh", thresholds=THRESHOLDS)
+        assert held_out(fit, tanh_front) <= np.sqrt(1.1**2 - 1.0) * NOISE
+        (stage,) = fit.parameters.model.memoryless
+        assert stage.ascending == stage.descending
+        assert stage.ascending.a1 == pytest.approx(0.018, rel=0.01)
+        assert -stage.ascending.a2 / stage.ascending.a1 == pytest.approx(35.0, abs=0.5)
+
+    def test_two_branches(self) -> None:
+        v, y = plant(branched, 3)
+        single = hystgen.identify(record(v, y), model="pi", thresholds=THRESHOLDS)
+        fit = hystgen.identify(record(v, y), model="gpi-tanh", thresholds=THRESHOLDS)
+        (stage,) = fit.parameters.model.memoryless
+        assert stage.ascending != stage.descending
+        assert held_out(fit, branched) < 0.5 * NOISE
+        assert held_out(single, branched) > 20.0 * NOISE
+        places = np.linspace(*fit.parameters.input_range, 5001)
+        up, down = (b.a0 * np.tanh(b.a1 * places + b.a2) + b.a3 for b in (stage.ascending, stage.descending))
+        assert np.all(down >= up)
+
+    def test_branches_never_cross(self) -> None:
+        """A plant whose falling branch lies below the rising one has no such model: what is fitted is invertible."""
+        v, y = plant(lambda x: branched(x, -3.0), 3)
+        fit = hystgen.identify(record(v, y), model="gpi-tanh", thresholds=THRESHOLDS)
+        (stage,) = fit.parameters.model.memoryless
+        places = np.linspace(*fit.parameters.input_range, 5001)
+        up, down = (
+            b.a0 * np.tanh(b.a1 * places + b.a2) + b.a3 for b in (stage.ascending, stage.descending or stage.ascending)
+        )
+        assert np.all(down >= up - 1e-9)
+
+    def test_from_the_command_line_to_equal_bits(self, tmp_path: Path, run: Run) -> None:
+        v, y = plant(branched, 3)
+        data, target = write_csv(tmp_path / "data.csv", v, y), tmp_path / "stage.yaml"
+        code, _, err = run("identify", data, "--model", "gpi-tanh", "--thresholds", "6", "-o", target)
+        assert (code, err) == (0, "")
+        report = hystgen.verify(
+            hystgen.load(target), operator="both", compiler=(compilers.available()[0].name,), length=3000
+        )
+        assert report.ok, report.table()
+
+
+class TestAuto:
+    @pytest.mark.parametrize(
+        ("front", "kind"),
+        [(np.asarray, "pi"), (bent, "gpi-deadzone"), (tanh_front, "gpi-tanh"), (branched, "gpi-tanh, two branches")],
+        ids=lambda value: value if isinstance(value, str) else "",
+    )
+    def test_the_plant_tells(self, front: Callable[[Array], Array], kind: str) -> None:
+        v, y = plant(front, 3)
+        w, z = plant(front, 4)
+        fit = hystgen.identify(record(v, y, "a"), model="auto", holdout=[record(w, z, "b")])
+        rows = [row for row in fit.rows if row.part == "candidate"]
+        assert [row.model.partition(",")[0] for row in rows] == ["pi", "gpi-deadzone", "gpi-tanh"]
+        assert {row.records for row in rows} == {("b",)}
+        (chosen,) = [row for row in fit.rows if row.part == "held out"]
+        assert chosen.rms == next(row.rms for row in rows if row.model == kind)
+        assert chosen.rms <= 1.03 * min(row.rms for row in rows)
+        assert bool(fit.parameters.model.memoryless) == (kind != "pi")
+
+    def test_without_held_out_records_the_ends_tell(self) -> None:
+        v, y = plant(bent, 3)
+        fit = hystgen.identify(record(v, y), model="auto")
+        assert [row.part for row in fit.rows] == ["candidate"] * 3 + ["fit", "held out", "all"]
+        assert fit.parameters.model.memoryless[0].kind == "dead_zone"
+        assert "candidate" in fit.table()
+        assert "candidate" in fit.text()
+
+
+@pytest.mark.data
+def test_dead_zones_of_a_150_v_actuator(measured: Path, tmp_path: Path, run: Run) -> None:
+    """Fitted to two periods of a sine after a step that rings, compared with the later ones."""
+    source = measured / "piezo_150v_step_then_1hz.csv"
+    data = part_of_file(source, tmp_path / "first.csv", 17500, 27500)
+    held = part_of_file(source, tmp_path / "later.csv", 27500)
+    target = tmp_path / "piezo.yaml"
+    code, _, err = run("identify", data, "--holdout", held, "--model", "gpi-deadzone", "-o", target)
+    assert code == 0, err
+    model = written(target)["model"]
+    (stage,) = model["memoryless"]
+    _, v, y = columns(held)
+    w = np.zeros_like(v)
+    for rho, eta in zip(stage["thresholds"], stage["weights"], strict=True):
+        w += eta * (v if rho == 0.0 else np.maximum(v - rho, 0.0) if rho > 0.0 else np.minimum(v - rho, 0.0))
+    predicted = brute_output(w, model["pi"]["thresholds"], model["pi"]["weights"], float(w[0]))
+    first = max(int(np.argmax(v)), int(np.argmin(v)))
+    assert error_figures(y, predicted, first)[2] <= 0.23
+
+
+class TestSolvers:
+    @pytest.mark.parametrize("seed", range(20))
+    def test_least_squares_under_inequalities(self, seed: int) -> None:
+        """Against sequential quadratic programming."""
+        rng = np.random.default_rng(seed)
+        k, m = int(rng.integers(2, 8)), int(rng.integers(1, 10))
+        matrix, target = rng.normal(size=(3 * k, k)), rng.normal(size=3 * k)
+        inside = rng.normal(size=k)
+        bounds = rng.normal(size=(m, k))
+        limits = bounds @ inside - rng.uniform(0.0, 0.5, m)
+        found = constrained.least_squares(matrix, target, bounds, limits)
+        assert np.all(bounds @ found >= limits - 1e-8)
+        other = minimize(
+            lambda x: float(np.sum((matrix @ x - target) ** 2)),
+            inside,
+            jac=lambda x: 2.0 * matrix.T @ (matrix @ x - target),
+            constraints=[{"type": "ineq", "fun": lambda x: bounds @ x - limits, "jac": lambda _: bounds}],
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 500},
+        )
+        np.testing.assert_allclose(found, other.x, rtol=0, atol=1e-5)
+
+    def test_inequalities_that_contradict_each_other(self) -> None:
+        with pytest.raises(constrained.InfeasibleError):
+            constrained.least_squares(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([1.0, 1.0]))
+
+    @pytest.mark.parametrize("noise", [0.0, 0.4])
+    @pytest.mark.parametrize("start", [0.0, 40.0])
+    def test_rows_of_segments_have_the_same_normal_equations(self, noise: float, start: float) -> None:
+        rng = np.random.default_rng(5)
+        v = np.repeat(wander(8, turns=20), rng.integers(1, 3, 761)) + start
+        v = v + noise * rng.normal(size=len(v))
+        y = rng.normal(size=len(v)) + 0.3 * v
+        states = np.full(len(THRESHOLDS), start)
+        expected = np.column_stack([np.ones(len(v)), brute_plays(v, THRESHOLDS, start), y])
+        parts = []
+        for a, b in ((0, 100), (100, 101), (101, len(v))):
+            parts.append(segments.rows(v[a:b], y[a:b], np.array(THRESHOLDS), states, True))
+        found = np.concatenate(parts)
+        np.testing.assert_allclose(found.T @ found, expected.T @ expected, rtol=1e-11)
+        assert len(found) <= len(v) + 3
+        if not noise:
+            assert len(found) < 0.5 * len(v)
+        np.testing.assert_allclose(states, expected[-1, 1:-1], rtol=0, atol=1e-12)
