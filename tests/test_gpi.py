@@ -26,6 +26,7 @@ from scipy.optimize import minimize
 import hystgen
 from hystgen.identification import Fit, constrained, segments
 from hystgen.identification.pi import IdentificationError
+from hystgen.records import Record
 from hystgen.verification import compilers
 
 Array = NDArray[np.float64]
@@ -274,3 +275,52 @@ class TestSolvers:
         if not noise:
             assert len(found) < 0.5 * len(v)
         np.testing.assert_allclose(states, expected[-1, 1:-1], rtol=0, atol=1e-12)
+
+
+class TestFaults:
+    def spoilt(self, seed: int = 4, fraction: int = 40) -> tuple[Array, Array, Array]:
+        v, y = plant(np.asarray, seed)
+        wrong = np.random.default_rng(seed).choice(np.arange(200, len(v) - 10), len(v) // 10 // fraction, replace=False)
+        y[wrong] += np.random.default_rng(seed).choice([-1.0, 1.0], len(wrong)) * 0.3 * SWING
+        return v, y, np.unique(wrong)
+
+    def test_outliers_are_left_out_and_counted(self) -> None:
+        v, y, wrong = self.spoilt()
+        fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS)
+        assert f"made: {len(wrong)} isolated samples of y far from their neighbours" in " ".join(fit.warnings)
+        assert f"the first is sample {wrong[0]}" in " ".join(fit.warnings)
+        assert held_out(fit, np.asarray) <= np.sqrt(1.1**2 - 1.0) * NOISE
+
+    def test_there_are_none_in_plain_noise(self) -> None:
+        for seed in range(20):
+            v, y = plant(bent, seed)
+            assert hystgen.identify(record(v, y)).warnings == ()
+
+    def test_spikes_of_the_drive_that_the_output_does_not_see(self) -> None:
+        v, y = plant(np.asarray, 4)
+        wrong = [300, 900, 901, 1500]
+        spoilt = v.copy()
+        spoilt[wrong] = 170.0
+        fit = hystgen.identify(record(spoilt, y), thresholds=THRESHOLDS)
+        assert "made: 4 isolated samples of v jump away and back unseen by y, bridged" in " ".join(fit.warnings)
+        assert held_out(fit, np.asarray) <= np.sqrt(1.1**2 - 1.0) * NOISE
+        assert fit.parameters.input_range[1] <= 100.0
+
+    def test_a_real_pulse_stays(self) -> None:
+        v = wander(4)
+        v[[300, 900, 901]] = 170.0
+        y = noisy(brute_output(v, THRESHOLDS, WEIGHTS, 0.0), NOISE)
+        fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS)
+        assert not any("isolated" in text for text in fit.warnings)
+        assert fit.parameters.input_range[1] == 170.0
+
+    def test_behind_a_gap_the_memory_is_unknown(self) -> None:
+        v, y = plant(np.asarray, 4)
+        keep = np.r_[0:1200, 1500 : len(v)]
+        t = np.arange(len(v)) * 0.001
+        cut = Record("cut", t[keep], v[keep], y[keep], sample_time=0.001)
+        fit = hystgen.identify(cut, thresholds=THRESHOLDS, history=())
+        assert "cut: cut at 1 gap of more than 25 steps" in " ".join(fit.warnings)
+        assert held_out(fit, np.asarray) <= np.sqrt(1.1**2 - 1.0) * NOISE
+        (own,) = [row for row in fit.rows if row.part == "all"]
+        assert own.ignored > 0

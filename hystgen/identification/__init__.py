@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import memory
-from hystgen.identification import gpi, pi, reduction, remarks, threads
+from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads
 from hystgen.identification.fit import HELD_OUT, Fit, Source, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError
@@ -104,11 +104,13 @@ def identify(
     if not fit_records:
         raise ValueError("there is no record to fit")
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
-    courses = [pi.course(record, before, skip) for record in fit_records]
-    held = [pi.course(record, before, skip) for record in held_records]
+    courses, notes = prepared.courses(fit_records, before, skip)
+    held, more = prepared.courses(held_records, before, skip)
+    told += notes + more
     kinds = gpi.KINDS if model == "auto" else (model,)
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     with threads.alone(), Progress(passes * sum(len(item.v) for item in courses), progress) as bar:
+        told += prepared.mask_outliers(courses, held, how.wanted, p0_floor, skip)
         if held:
             tried = [_try(courses, held, kind, how, bar) for kind in kinds]
             chosen = _choose(tried)

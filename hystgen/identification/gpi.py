@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import operators
-from hystgen.identification import constrained, joint, pi, reduction, thresholds, weights
+from hystgen.identification import constrained, faults, joint, pi, reduction, thresholds, weights
 from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
@@ -171,10 +171,11 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     turned = []
     for item in courses:
         # the memory of the inverse is not known even where that of the plays is
-        first = max(item.first, reduction.settled(item.y[: item.last], math.inf))
+        measured = faults.bridged(item.y, ~np.isfinite(item.y))
+        first = max(item.first, reduction.settled(measured[: item.last], math.inf))
         pieces = np.clip(item.v[None, :], places[:-1, None], places[1:, None]) - places[:-1, None]
         target = pieces[-1] * ((high - low) / length[-1])
-        turned.append((replace(item, v=item.y, y=target, history=None, first=first), pieces))
+        turned.append((replace(item, v=measured, y=target, history=None, first=first), pieces))
     if not sum(item.used for item, _ in turned):
         return None
     of_course = {id(item): pieces for item, pieces in turned}

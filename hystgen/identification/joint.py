@@ -175,7 +175,8 @@ def _rows_with_derivatives(
         found[:, 0] = 1.0
         found[:, -1] = course.y[start:stop]
         # every so many-th sample stands for all of them
-        return found[-start % every :: every] * math.sqrt(every) if compared else found[:0]
+        found = found[-start % every :: every]
+        return found[np.isfinite(found[:, -1])] * math.sqrt(every) if compared else found[:0]
 
     return rows
 

@@ -122,7 +122,7 @@ def solve(
 
 @dataclass(frozen=True)
 class Errors:
-    """Error samples of one course, its free offset taken out."""
+    """Error samples of one course from `first` to `last`, its free offset taken out; NaN where not compared."""
 
     course: Course
     offset: float
@@ -132,13 +132,14 @@ class Errors:
 def compare(item: Course, r: Array, p: Array) -> Errors:
     """Free run of the model along the drive, compared from `first` to `last`, with one free offset."""
     error = (item.y - reduction.prediction(item.v, item.history, r, p))[item.first : item.last]
-    offset = float(np.mean(error))
+    offset = float(np.nanmean(error))
     return Errors(item, offset, error - offset)
 
 
 def row(part: str, model: str, errors: Sequence[Errors], begins: Sequence[int]) -> Row:
     """The table's row; `begins`: where each course would begin if nothing were ignored."""
     joined = np.concatenate([e.error for e in errors])
+    joined = joined[np.isfinite(joined)]
     return Row(
         part,
         model,

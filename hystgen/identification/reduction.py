@@ -31,7 +31,8 @@ FOLDS = 4
 class Course:
     """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
 
-    The drive before `first` runs through the plays all the same. `history` are drive values visited before the record;
+    The drive before `first` runs through the plays all the same, as it does where `y` is NaN: such a sample is not
+    compared. `history` are drive values visited before the record;
     None when it is not known. `output_range`: peak-to-peak output of the whole record, which percentages refer to.
     """
 
@@ -46,7 +47,7 @@ class Course:
     @property
     def used(self) -> int:
         """Number of samples compared."""
-        return max(self.last - self.first, 0)
+        return int(np.count_nonzero(np.isfinite(self.y[self.first : self.last])))
 
     @property
     def drive_range(self) -> tuple[float, float]:
@@ -157,7 +158,7 @@ def reduce(
                 found = rows(start, stop, k > 0)
                 if k > 0:
                     blocks[k - 1] = _triangle(blocks[k - 1], found)
-                    counts[k - 1] += stop - start
+                    counts[k - 1] += int(np.count_nonzero(np.isfinite(course.y[start:stop])))
                 if tick is not None:
                     tick(stop - start)
         whole = _triangle(whole, _without_offset(_triangle(*blocks)))

@@ -57,7 +57,7 @@ def about_model(
                 f"{len(beyond)} threshold{'' if len(beyond) == 1 else 's'} above {solution.reach:.6g} hardly move in "
                 "these records; their weights are not to be trusted for larger drives"
             )
-    outputs = [item.y[item.first : item.last] for item in compared]
+    outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]
     spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
     share = 1.0 - own.rms**2 / spread
     if share < 0.9:
@@ -74,7 +74,7 @@ def about_start(errors: pi.Errors, largest: float) -> str:
     end = reduction.settled(item.v, largest) - item.first
     if item.history is None or end < STARTS or len(errors.error) - end < STARTS:
         return ""
-    start, rest = (float(np.sqrt(np.mean(part**2))) for part in (errors.error[:end], errors.error[end:]))
+    start, rest = (float(np.sqrt(np.nanmean(part**2))) for part in (errors.error[:end], errors.error[end:]))
     if start <= UNLIKE * rest:
         return ""
     return (

@@ -46,9 +46,10 @@ def _close_segment(
 
 
 def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Array, out: Array) -> int:
-    """Rows of the samples into `out`, none where it has no room; `states` of the plays run on. Returns their number.
+    """Rows of the samples whose y is a number into `out`, none where it has no room, and how many they are.
 
-    `sums`: room for seven numbers. The memory is admissible: a play that stands still keeps all larger ones still.
+    `states` of the plays run on. `sums`: room for seven numbers. The memory is admissible:
+    a play that stands still keeps all larger ones still.
     """
     wanted = len(out) > 0
     sums[:] = 0.0
@@ -73,7 +74,7 @@ def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Ar
             rising = up
         for i in range(moving):
             states[i] = x - thresholds[i] if up else x + thresholds[i]
-        if wanted:
+        if wanted and y[t] == y[t]:  # not NaN
             sums[0] += 1.0
             from_v = x - sums[1]
             from_y = y[t] - sums[2]
@@ -82,8 +83,9 @@ def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Ar
             sums[3] += from_v * (x - sums[1])
             sums[4] += from_v * (y[t] - sums[2])
             sums[5] += from_y * (y[t] - sums[2])
-    if wanted and sums[0] > 0.0:
-        row = _close_segment(thresholds, states, k, rising, sums, out, row)
+    if wanted:
+        if sums[0] > 0.0:
+            row = _close_segment(thresholds, states, k, rising, sums, out, row)
         out[row, :] = 0.0
         out[row, -1] = np.sqrt(sums[6])
         row += 1

@@ -1,0 +1,144 @@
+"""Faults of a recording that a fit has to be kept from: isolated wrong samples, and gaps.
+
+Samples that are not compared have no `y` (NaN) in a course; their drive still runs through the plays.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.records import Record
+
+Array = NDArray[np.float64]
+
+LONGEST = 4
+"""Most samples in a row that count as an isolated fault; more are something that the actuator or the sensor did."""
+
+FAR = 8.0
+"""An outlier lies so many standard deviations of its surroundings' scatter from their median."""
+
+WINDOW = 15
+"""Samples of the running median, more than twice `LONGEST`."""
+
+AROUND, CLEAR = 6, 2.5
+"""It jumps away and back by more than so many times what so many samples on either side move in a step."""
+
+TAIL, NORMAL_TAIL = 0.98, 2.326
+"""A quantile of the deviations, and what it is for normal ones of standard deviation one."""
+
+MOST = 0.01
+"""Largest share of samples that is left out as outliers; beyond it they are no outliers."""
+
+LOST = 25.0
+"""After a gap of so many median steps the drive in between, and with it the memory, counts as unknown."""
+
+ALONE = 20.0
+"""A drive spike jumps by so many times what the drive moves in a step elsewhere (its 99th percentile)."""
+
+
+def outliers(error: Array) -> NDArray[np.bool_]:
+    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN counts as none.
+
+    The scatter is taken from the median absolute deviation from a running median (Hampel identifier; Pearson, Control
+    Engineering Practice 2005), so that neither the outliers nor what a model misses widens it.
+    """
+    from scipy.ndimage import median_filter
+
+    known = np.flatnonzero(np.isfinite(error))
+    found = np.zeros(len(error), dtype=bool)
+    if len(known) < 4 * WINDOW:
+        return found
+    e = error[known]
+    from_middle = np.abs(e - median_filter(e, WINDOW, mode="nearest"))
+    # the quantile of a normal distribution with the same tail: a model that misses sharp corners has wide tails too
+    scatter = max(1.4826 * float(np.median(from_middle)), float(np.quantile(from_middle, TAIL)) / NORMAL_TAIL)
+    far = from_middle > FAR * max(scatter, 1e-9 * float(np.max(np.abs(e))))
+    for first, last in _runs(far):
+        if last - first <= LONGEST and _stands_out(e, first, last):
+            found[known[first:last]] = True
+    if np.count_nonzero(found) > MOST * len(known):
+        found[:] = False
+    return found
+
+
+def _stands_out(e: Array, first: int, last: int) -> bool:
+    """Whether samples [first, last) jump away and back by far more than the signal moves around them.
+
+    The tip of a triangle does not, where a model misses what happens at a reversal.
+    """
+    if first == 0 or last == len(e):
+        return False
+    jump = min(abs(e[first] - e[first - 1]), abs(e[last] - e[last - 1]))
+    before, after = np.diff(e[max(first - AROUND, 0) : first]), np.diff(e[last : last + AROUND])
+    around = np.sort(np.abs(np.concatenate([before, after])))
+    # another outlier near by makes two large steps
+    return len(around) > 2 and bool(jump > CLEAR * around[-3])
+
+
+def drive_spikes(v: Array, y: Array) -> NDArray[np.bool_]:
+    """Isolated samples of the drive that jump away and back while the output takes no notice.
+
+    A real pulse of the drive shows in the output; one that does not is a fault of the recording.
+    """
+    found = np.zeros(len(v), dtype=bool)
+    step = np.abs(np.diff(v))
+    if len(step) < 4 * WINDOW:
+        return found
+    usual = float(np.quantile(step, 0.99))
+    jumps = np.flatnonzero(step > ALONE * usual)
+    if len(jumps) > MOST * len(v):
+        return found
+    slope = float(np.ptp(y) / np.ptp(v))
+    for k in jumps:
+        for length in range(1, LONGEST + 1):
+            back = k + 1 + length
+            if back < len(v) and abs(v[back] - v[k]) <= 0.05 * step[k] + usual * (length + 1):
+                inside = slice(k + 1, back)
+                line = np.interp(np.arange(k + 1, back), [k, back], [y[k], y[back]])
+                if np.max(np.abs(y[inside] - line)) < 0.05 * slope * step[k]:
+                    found[inside] = True
+                break
+    return found
+
+
+def bridged(v: Array, wrong: NDArray[np.bool_]) -> Array:
+    """The drive with straight lines across wrong samples."""
+    good = np.flatnonzero(~wrong)
+    return np.interp(np.arange(len(v)), good, v[good])
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A part of a record without a gap in it, from sample `first` on. `after_gap`: its start memory is unknown."""
+
+    record: Record
+    first: int
+    after_gap: bool
+
+
+def between_gaps(record: Record) -> list[Piece]:
+    """The record, cut where so much time is missing that nothing is known of the drive in between."""
+    steps = np.diff(record.t)
+    cuts = [0, *(np.flatnonzero(steps > LOST * record.sample_time) + 1).tolist(), len(record)]
+    if len(cuts) == 2:
+        return [Piece(record, 0, False)]
+    return [
+        Piece(record.section(a, b, f"{record.name} from t = {record.t[a]:.6g} s"), a, a > 0)
+        for a, b in itertools.pairwise(cuts)
+    ]
+
+
+def told(name: str, wrong: NDArray[np.bool_], what: str) -> str:
+    """The sentence that counts them."""
+    number = int(np.count_nonzero(wrong))
+    first = int(np.argmax(wrong))
+    return f"{name}: {number} isolated sample{'' if number == 1 else 's'} of {what}; the first is sample {first}"
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
