@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import memory
-from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads
+from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads, uncertainty
 from hystgen.identification.fit import HELD_OUT, Fit, Source, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError
@@ -116,9 +116,9 @@ def identify(
             chosen = _choose(tried)
             rows = [tried[k].as_candidate() for k in range(len(tried))] if len(tried) > 1 else []
             done = tried[chosen]
-            kind, fitted, compared = kinds[chosen], done.fitted, done.compared
+            fitted, compared, held_errors = done.fitted, done.compared, done.errors
         else:
-            rows, kind, reason = _trial(courses, kinds, how, bar)
+            rows, kind, held_errors, reason = _trial(courses, kinds, how, bar)
             if reason:
                 told.append(reason)
             fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, skip, bar.tick)
@@ -136,8 +136,10 @@ def identify(
     ]
     told += [text for each in errors if (text := remarks.about_start(each, float(fitted.solution.thresholds[-1])))]
     told += remarks.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
+    with threads.alone():
+        sure = uncertainty.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
-    return Fit(_parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), before)
+    return Fit(_parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), sure, before)
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,7 @@ class _Tried:
 
     fitted: Fitted
     compared: list[Course]
+    errors: list[pi.Errors]
     held_out: Row
 
     def as_candidate(self) -> Row:
@@ -181,7 +184,7 @@ def _try(
                 f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
             )
     errors = [_compare(item, fitted) for item in settled]
-    return _Tried(fitted, compared, pi.row("held out", "written", errors, starts))
+    return _Tried(fitted, compared, errors, pi.row("held out", "written", errors, starts))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
@@ -218,9 +221,9 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
-) -> tuple[list[Row], str, str]:
-    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, and
-    why there are none."""
+) -> tuple[list[Row], str, list[pi.Errors], str]:
+    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, the
+    errors of the chosen one, and why there are none."""
     short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
     instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
     fronts, splits = [], []
@@ -228,20 +231,20 @@ def _trial(
         split = round(len(item.v) * (1.0 - HELD_OUT))
         front = pi.resettled(replace(item, last=split), math.inf, how.skip)
         if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
-            return [], kinds[0], f"{item.name}: {short}{instead}"
+            return [], kinds[0], [], f"{item.name}: {short}{instead}"
         fronts.append(front)
         splits.append(split)
     try:
         tried = [_try(fronts, courses, kind, how, bar, splits) for kind in kinds]
     except IdentificationError as failure:
-        return [], kinds[0], f"nothing was held out: {failure}{instead}"
+        return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)
     best = tried[chosen]
     own = pi.row(
         "fit", "trial", [_compare(item, best.fitted) for item in best.compared], [how.skip] * len(best.compared)
     )
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
-    return [*rows, own, replace(best.held_out, model="trial")], kinds[chosen], ""
+    return [*rows, own, replace(best.held_out, model="trial")], kinds[chosen], best.errors, ""
 
 
 def _parameters(

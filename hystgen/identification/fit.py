@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import textwrap
 import warnings as python_warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from hystgen.identification import joint, reduction, remarks
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
+from hystgen.identification.uncertainty import Intervals
 from hystgen.records import Record, read_record, write_atomically
 
 if TYPE_CHECKING:
@@ -31,12 +33,13 @@ class Fit:
     """A fitted model and how good it is.
 
     `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
-    sentence each; `history`: drive values visited before each record, None when unknown.
+    sentence each; `intervals`: 95 % confidence intervals; `history`: drive values visited before each record, None when unknown.
     """
 
     parameters: Parameters
     rows: tuple[Row, ...]
     warnings: tuple[str, ...]
+    intervals: Intervals
     history: tuple[float, ...] | None = None
 
     def table(self) -> str:
@@ -86,12 +89,24 @@ class Fit:
 
         lines = ["Identified by hystgen; errors have a free offset a record."]
         lines += [row.sentence() for row in self.rows]
+        sure = self.intervals
+        lines.append(f"95 % intervals from a bootstrap by blocks of {sure.block} samples: {self._interval_sentence()}")
         lines += [f"Warning: {warning}" for warning in self.warnings]
-        return dump_parameters(self.parameters, header="\n".join(lines))
+        ends = " ".join(f"{low:.4g}..{high:.4g}" for low, high in sure.weights)
+        comments = {"model.pi.weights": "\n".join(textwrap.wrap(f"95 %: {ends}", 90))}
+        return dump_parameters(self.parameters, comments, "\n".join(lines))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the parameter file, all or nothing."""
         write_atomically(path, self.text())
+
+    def _interval_sentence(self) -> str:
+        """Loop width and held-out error with their intervals."""
+        sure = self.intervals
+        said = f"widest loop {sure.width[0]:.4g} to {sure.width[1]:.4g}"
+        if sure.held_out is not None:
+            said += f", held-out rms error {sure.held_out[0]:.4g} to {sure.held_out[1]:.4g}"
+        return said
 
     @property
     def _unit(self) -> str:
@@ -114,6 +129,7 @@ class Fit:
             told.append("written: fitted to the records of row fit only.")
         if any(row.ignored for row in self.rows):
             told.append("ignored: samples at the start, before the drive had wiped an unknown start memory.")
+        told.append(f"95 % confidence: {self._interval_sentence()}.")
         return told
 
 

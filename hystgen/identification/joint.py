@@ -28,8 +28,11 @@ DIFFERENCE = 1e-6
 
 MOST_STEPS = 25
 
-ENOUGH = 1e-4
-"""The search ends when the error falls by less than this share of itself."""
+ENOUGH = 0.005
+"""The search ends when the sum of squares falls by less than this many times its share of one sample.
+
+A step of one standard deviation of an estimate changes it by one such share.
+"""
 
 LEAST_CHANGE = 1e-8
 """It ends too when no shape number changes by more than this."""
@@ -113,7 +116,7 @@ def refine(
             break
         trial = _linear(courses, front, moved, p, thresholds, tick) if _allowed(front, moved) else None
         if trial is not None and trial.rms < now.rms:
-            done = now.rms - trial.rms < ENOUGH * now.rms
+            done = now.rms - trial.rms < 0.5 * ENOUGH * now.rms / now.system.samples
             now, damping = trial, damping * 0.2
             if done:
                 break
@@ -131,22 +134,28 @@ def _linear(
     courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick
 ) -> Shaped:
     """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
-    versions = [front.stages(shape)]
-    for j in range(len(shape)):
-        one = shape.copy()
-        one[j] += DIFFERENCE
-        versions.append(front.stages(one))
     every = max(1, sum(item.used for item in courses) // COMPARED)
-
-    def source(course: Course, r: Array) -> Source:
-        return _rows_with_derivatives(course, r, versions, p, every)
-
+    source = linear_source(front, shape, p, every)
     system = reduction.reduce(courses, thresholds, tick, source, len(shape))
     columns = np.arange(len(thresholds))
     best = weights.non_negative(system.whole, columns)
     rms = root_mean_square(weights.residual(system.whole, columns, best), system.samples)
     # About the weights that the derivatives were taken with: they are what the next step of the shape refers to
     return Shaped(shape, p, rms, system)
+
+
+def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[[Course, Array], Source]:
+    """Rows of the system that is linear about a shape and weights, for one in `every` samples."""
+    versions = [front.stages(shape)]
+    for j in range(len(shape)):
+        one = shape.copy()
+        one[j] += DIFFERENCE
+        versions.append(front.stages(one))
+
+    def source(course: Course, thresholds: Array) -> Source:
+        return _rows_with_derivatives(course, thresholds, versions, p, every)
+
+    return source
 
 
 def _rows_with_derivatives(
