@@ -193,18 +193,22 @@ def _reading(columns: str | None, sample_time: float | None, delimiter: str | No
     from hystgen import records
 
     mapping = _shown("--columns", lambda: records.parse_columns(columns)) if columns else None
-    return {"columns": mapping, "sample_time": sample_time, "delimiter": delimiter}
+    return {"columns": mapping, "sample_time": sample_time, "delimiter": delimiter, "progress": True}
 
 
-def _write_record(target: Path, columns: dict[str, Any]) -> None:
+def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> None:
     from hystgen import records
 
     target.parent.mkdir(parents=True, exist_ok=True)
-    records.write_columns(target, list(columns), list(columns.values()))
+    records.write_columns(target, header, list(columns.values()))
 
 
 _RECORD_OPTIONS = [
-    click.option("--columns", metavar="t=Time,v=U,y=Pos", help="our names for the file's columns"),
+    click.option(
+        "--columns",
+        metavar="t=Time,v=U,y=Pos",
+        help="our names for the file's columns; in HDF5 v=run1/drive, of a MATLAB struct v=data.v",
+    ),
     click.option("--sample-time", type=float, help="seconds, for files without time"),
     click.option("--delimiter", help="default: a comma"),
     click.option("--history", metavar="V,V,..", help="drive values visited before"),
@@ -267,13 +271,16 @@ def simulate(
         answers, status = _shown(params, partial(session.run, signal))
         for sentence in simulation.remarks(record.name, session, operator, signal, status):
             click.echo(f"warning: {sentence}", err=True)
+        units = dict(record.units)
         if answer in columns:
             columns[f"{answer}_measured"] = columns.pop(answer)
+            units[f"{answer}_measured"] = units.pop(answer, "")
         columns[answer] = answers
+        header = records.headers(columns, units)
         if target is None:
-            click.echo(records.columns_text(list(columns), list(columns.values())), nl=False)
+            click.echo(records.columns_text(header, list(columns.values())), nl=False)
             continue
-        _shown(str(target), partial(_write_record, target, columns))
+        _shown(str(target), partial(_write_record, target, header, columns))
         click.echo(str(target))
 
 
@@ -286,7 +293,7 @@ def simulate(
 @click.option("--holdout", multiple=True, type=click.Path(), help="record that takes no part in the fit")
 @click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
 @click.option("--name", help="C identifier of the model; default: from the output file")
-@click.option("--units", metavar="V,um", help="units of drive and output")
+@click.option("--units", metavar="V,um", help="units of drive and output; default: the records'")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @record_options
 def identify(

@@ -23,12 +23,12 @@ from hystgen.identification import gpi, pi, prepared, reduction, remarks, thread
 from hystgen.identification.fit import HELD_OUT, Fit, Source, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError
-from hystgen.identification.progress import Progress
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
 from hystgen.identification.thresholds import rounded
 from hystgen.models import DeadZone, Stage, TanhEnvelope
-from hystgen.records import SHORTEST, Record, read_records
+from hystgen.progress import Progress
+from hystgen.records import SHORTEST, Record, agreed_units, read_records
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -79,8 +79,9 @@ def identify(
     before every record from a virgin state; without it the start of each record is ignored until the drive has wiped
     the memory that matters.
     `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
-    `name`: C identifier of the model. `units`: `input` and `output`. `skip`: samples at the start of every record that
-    are not compared, though their drive counts. `p0_floor`: see `weights.fit`; 0 leaves p_0 as it comes.
+    `name`: C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: samples
+    at the start of every record that are not compared, though their drive counts. `p0_floor`: see `weights.fit`; 0
+    leaves p_0 as it comes.
     `progress`: a bar on a terminal's stderr when it takes more than a second.
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
@@ -99,17 +100,20 @@ def identify(
         raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
 
     to_fit, to_hold = _several(records), _several(holdout)
-    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter)
+    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
+    units, conflicts = agreed_units(read, units)
+    told += conflicts
     courses, notes = prepared.courses(fit_records, before, skip)
     held, more = prepared.courses(held_records, before, skip)
     told += notes + more
     kinds = gpi.KINDS if model == "auto" else (model,)
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
-    with threads.alone(), Progress(passes * sum(len(item.v) for item in courses), progress) as bar:
+    samples = sum(len(item.v) for item in courses)
+    with threads.alone(), Progress(passes * samples, progress, "fitting") as bar:
         told += prepared.mask_outliers(courses, held, how.wanted, p0_floor, skip)
         if held:
             tried = [_try(courses, held, kind, how, bar) for kind in kinds]

@@ -33,7 +33,8 @@ class Fit:
     """A fitted model and how good it is.
 
     `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
-    sentence each; `intervals`: 95 % confidence intervals; `history`: drive values visited before each record, None when unknown.
+    sentence each; `intervals`: 95 % confidence intervals; `history`: drive values visited before each record, None
+    when unknown.
     """
 
     parameters: Parameters

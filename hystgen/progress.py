@@ -12,12 +12,16 @@ PATIENCE = 1.0
 
 
 class Progress:
-    """Context manager; `tick` counts samples. Silent unless `shown`, stderr is a terminal and time has passed."""
+    """Context manager; `tick` counts work, in the unit of `total`, under a `title`.
 
-    def __init__(self, total: float, shown: bool) -> None:
+    A `total` of 0 is one that is not known. Silent unless `shown`, stderr is a terminal and time has passed.
+    """
+
+    def __init__(self, total: float, shown: bool, title: str) -> None:
         self._total = total
         self._shown = shown and sys.stderr.isatty()
-        self._done = 0
+        self._title = title
+        self._done = 0.0
         self._began = time.monotonic()
         self._bar: Any = None
         self._task: Any = None
@@ -31,9 +35,9 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def tick(self, samples: int) -> None:
-        """So many more samples are done."""
-        self._done += samples
+    def tick(self, work: float) -> None:
+        """So much more is done."""
+        self._done += work
         if not self._shown or time.monotonic() - self._began < PATIENCE:
             return
         if self._bar is None:
@@ -42,5 +46,5 @@ class Progress:
 
             self._bar = Bar(console=Console(stderr=True), transient=True)
             self._bar.start()
-            self._task = self._bar.add_task("identify", total=self._total)
+            self._task = self._bar.add_task(self._title, total=self._total or None)
         self._bar.update(self._task, completed=self._done)

@@ -1,0 +1,152 @@
+"""Measured data in, computed columns out: one file is one experiment.
+
+CSV with a header row (`t` in seconds, `v` drive, `y` measured, any further columns), and `.npz`, MATLAB `.mat`, HDF5
+and Parquet files with the same names. What is wrong with a file is refused, all of it at once and each with its
+place; small faults of a recording are repaired and counted in `Record.notes`.
+
+A format is a file of this package and an entry of `FORMATS`.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import IO
+
+from hystgen.problems import RecordError, printable
+from hystgen.progress import Progress
+from hystgen.records.array_files import read_mat, read_npz
+from hystgen.records.columns import parse_columns
+from hystgen.records.csv_file import read_csv
+from hystgen.records.hdf5 import read_hdf5, read_mat_73
+from hystgen.records.parquet import read_parquet
+from hystgen.records.reading import CountingFile, Reading, Table
+from hystgen.records.record import Record
+from hystgen.records.repair import SHORTEST, repaired
+from hystgen.records.units import agreed_units, headers
+from hystgen.records.writing import columns_text, write_atomically, write_columns
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def _any_mat(reading: Reading, stream: IO[bytes]) -> Table:
+    """A MATLAB file of either kind: v7.3 is HDF5 behind 512 bytes of MATLAB's own."""
+    start = stream.read(520)
+    stream.seek(0)
+    if start[:10] == b"MATLAB 7.3" or _HDF5 in (start[:8], start[512:]):
+        return read_mat_73(reading, stream)
+    return read_mat(reading, stream)
+
+
+FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
+    ".npz": read_npz,
+    ".mat": _any_mat,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".parquet": read_parquet,
+    ".pq": read_parquet,
+}
+"""How a file is read, by its suffix in lower case; anything else is CSV."""
+
+
+def read_records(
+    sources: Iterable[Record | str | os.PathLike[str]],
+    columns: Mapping[str, str] | None = None,
+    sample_time: float | None = None,
+    delimiter: str | None = None,
+    need: Sequence[str] = ("v", "y"),
+    progress: bool = False,
+) -> list[Record]:
+    """Read several data files as `read_record` does; records that are in memory already are kept.
+
+    `progress`: a bar on a terminal's stderr when it takes more than a second. Raises RecordError with every problem in
+    all files.
+    """
+    everything = list(sources)
+    found: list[Record] = []
+    refused: list[str] = []
+    with Progress(sum(_size(source) for source in everything), progress, "reading") as bar:
+        for source in everything:
+            try:
+                if not isinstance(source, Record):
+                    source = _read(os.fspath(source), columns, sample_time, delimiter, need, bar.tick)
+                found.append(source)
+            except RecordError as error:
+                refused.extend(error.problems)
+    if refused:
+        raise RecordError(refused)
+    return found
+
+
+def read_record(
+    path: str | os.PathLike[str],
+    columns: Mapping[str, str] | None = None,
+    sample_time: float | None = None,
+    delimiter: str | None = None,
+    need: Sequence[str] = ("v", "y"),
+) -> Record:
+    """Read one data file.
+
+    `columns`: our names to the file's (`{"t": "Time"}`), each the whole name (`session1/drive` in HDF5, `data.v` for
+    the field of a MATLAB struct), its last part or that without a unit, as long as only one column is meant; `t`, `v`
+    and `y` are found the same way. `sample_time`: seconds, for a file without time; `delimiter`: one character, default
+    a comma; `need`: the columns that must be there. When `y` is among them the record is meant for a fit: it then has
+    at least 16 samples and a drive that moves. Samples without a value in `t` or a needed column, and samples whose
+    time does not rise, are dropped with a note up to 5 % of the record. A time in another unit is converted to seconds.
+
+    Raises RecordError with every problem in the file.
+    """
+    return read_records([path], columns, sample_time, delimiter, need)[0]
+
+
+def _read(
+    file: str,
+    columns: Mapping[str, str] | None,
+    sample_time: float | None,
+    delimiter: str | None,
+    need: Sequence[str],
+    tick: Callable[[float], None],
+) -> Record:
+    reading = Reading(file, columns or {}, sample_time, delimiter or ",", tuple(need), tick)
+    if len(reading.delimiter) != 1 or reading.delimiter in "\"'.\r\n" or reading.delimiter.isalnum():
+        reading.problem(f'the delimiter "{printable(reading.delimiter)}" is not usable; give one character such as ;')
+    if sample_time is not None and not (0.0 < sample_time < float("inf")):
+        reading.problem(f"the sample time {sample_time:g} is not positive; give seconds per sample")
+    reading.refuse_if_any()
+    try:
+        stream = io.BufferedReader(CountingFile(file, tick))
+    except OSError as failure:
+        raise reading.refuse(
+            f"cannot be read ({failure.strerror or failure}); give the path of a data file"
+        ) from None
+    with stream:
+        if not stream.peek(1):
+            raise reading.refuse("is empty; record again or give another file")
+        table = FORMATS.get(Path(file).suffix.lower(), read_csv)(reading, stream)
+    return repaired(reading, table)
+
+
+def _size(source: Record | str | os.PathLike[str]) -> int:
+    """Bytes to read; 0 where there is no file, which is told when it is opened."""
+    try:
+        return 0 if isinstance(source, Record) else os.stat(source).st_size
+    except OSError:
+        return 0
+
+
+__all__ = [
+    "FORMATS",
+    "SHORTEST",
+    "Record",
+    "RecordError",
+    "agreed_units",
+    "columns_text",
+    "headers",
+    "parse_columns",
+    "read_record",
+    "read_records",
+    "write_atomically",
+    "write_columns",
+]

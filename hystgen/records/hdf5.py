@@ -1,0 +1,100 @@
+"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; by h5py."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.records.array_files import MATLAB_NUMBERS
+from hystgen.records.columns import Column, column
+from hystgen.records.reading import INSTALL, Reading, Table, one_dimension
+
+SLICE = 1 << 20
+"""Samples read at a time."""
+
+_UNITS = ("units", "unit", "Units", "Unit")
+
+_MATLAB_OWN = ("#refs#", "#subsystem#")
+"""Groups in which MATLAB keeps what its cell arrays and objects refer to."""
+
+
+def read_hdf5(reading: Reading, _stream: IO[bytes]) -> Table:
+    """Read an HDF5 file: every dataset that is a vector of numbers, by its path."""
+    return _read(reading, "an HDF5 file", matlab=False)
+
+
+def read_mat_73(reading: Reading, _stream: IO[bytes]) -> Table:
+    """Read a MATLAB v7.3 file: vectors, and fields of structs as `struct.field`."""
+    return _read(reading, "a MATLAB v7.3 .mat file", matlab=True)
+
+
+def _read(reading: Reading, kind: str, matlab: bool) -> Table:
+    try:
+        import h5py
+    except ImportError:
+        what = "MATLAB v7.3" if matlab else "HDF5"
+        raise reading.refuse(
+            f"{what} files need the package h5py; {INSTALL}, or export CSV, .npz or MATLAB .mat (v7)"
+        ) from None
+    with reading.parsing(kind), h5py.File(reading.file, "r") as file:
+        columns: list[Column] = []
+        ignored: list[str] = []
+
+        def visit(path: str, found: Any) -> None:
+            if not isinstance(found, h5py.Dataset) or (matlab and path.split("/")[0] in _MATLAB_OWN):
+                return
+            *folders, name = path.split("/")
+            # MATLAB writes a field of a struct with a point
+            join = "." if matlab else "/"
+            folder = "".join(part + join for part in folders)
+            length = _length(found, matlab)
+            if length:
+                unit = "" if matlab else _unit(found)
+                columns.append(column(name, folder, unit, length, partial(_vector, reading, found)))
+            else:
+                ignored.append(folder + name)
+
+        file.visititems(visit)
+        return reading.table(columns, ignored)
+
+
+def _length(dataset: Any, matlab: bool) -> int:
+    """Length of a vector of numbers; 0 for anything else, among it MATLAB's text, which is stored as numbers."""
+    if dataset.shape is None or dataset.dtype.kind not in "fiub":
+        return 0
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    if matlab and (bytes(kind).decode("ascii", "replace") not in MATLAB_NUMBERS or "MATLAB_empty" in dataset.attrs):
+        return 0
+    return one_dimension(dataset.shape)
+
+
+def _unit(dataset: Any) -> str:
+    for name in _UNITS:
+        value = dataset.attrs.get(name)
+        if isinstance(value, np.ndarray) and value.size == 1:
+            value = value.flat[0]
+        if isinstance(value, bytes):
+            value = value.decode("utf-8", "replace")
+        if isinstance(value, str) and value.strip():
+            return value.strip()
+    return ""
+
+
+def _vector(reading: Reading, dataset: Any) -> NDArray[np.float64]:
+    """A vector, slice by slice: HDF5's own buffers stay small, and a bar can move."""
+    axis = int(np.argmax(dataset.shape))
+    length = dataset.shape[axis]
+    # Whole chunks, as a part of a compressed one costs as much as all of it
+    chunk = dataset.chunks[axis] if dataset.chunks else 1
+    step = chunk * max(1, SLICE // chunk)
+    numbers = np.empty(length, dtype=np.float64)
+    for start in range(0, length, step):
+        where: list[Any] = [0] * dataset.ndim
+        where[axis] = slice(start, start + step)
+        part = dataset[tuple(where)]
+        numbers[start : start + step] = part
+        reading.tick(dataset.id.get_storage_size() * part.size / length)
+    return numbers

@@ -1,0 +1,87 @@
+"""Parquet files, by pyarrow."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.records.columns import Column, column
+from hystgen.records.reading import INSTALL, Reading, Table
+
+BATCH = 1 << 18
+"""Samples read at a time."""
+
+_UNITS = (b"units", b"unit")
+
+_PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+
+
+def read_parquet(reading: Reading, stream: IO[bytes]) -> Table:
+    """Read a Parquet file: its columns of numbers, and times and durations in seconds; nothing is a NaN."""
+    try:
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise reading.refuse(
+            f"Parquet files need the package pyarrow; {INSTALL}, or export CSV, .npz or MATLAB .mat (v7)"
+        ) from None
+    with reading.parsing("a Parquet file"), pq.ParquetFile(stream, pre_buffer=False) as file:
+        columns: list[Column] = []
+        ignored: list[str] = []
+        for field in file.schema_arrow:
+            if _is_number(field.type):
+                length = file.metadata.num_rows
+                columns.append(column(field.name, "", _unit(field), length, partial(_vector, reading, file, field)))
+            else:
+                ignored.append(field.name)
+        return reading.table(columns, ignored)
+
+
+def _is_number(kind: Any) -> bool:
+    from pyarrow import types
+
+    return any(
+        test(kind)
+        for test in (
+            types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_timestamp,
+            types.is_duration,
+        )
+    )  # fmt: skip
+
+
+def _unit(field: Any) -> str:
+    from pyarrow import types
+
+    if types.is_timestamp(field.type) or types.is_duration(field.type):
+        return "s"
+    metadata = field.metadata or {}
+    return next((metadata[key].decode("utf-8", "replace").strip() for key in _UNITS if key in metadata), "")
+
+
+def _vector(reading: Reading, file: Any, field: Any) -> NDArray[np.float64]:
+    """A column batch by batch; a time stamp counts from the first of its column."""
+    import pyarrow as pa
+    from pyarrow import compute, types
+
+    numbers = np.empty(file.metadata.num_rows, dtype=np.float64)
+    timed = types.is_timestamp(field.type) or types.is_duration(field.type)
+    origin = None if types.is_timestamp(field.type) else 0
+    row = 0
+    for batch in file.iter_batches(BATCH, columns=[field.name], use_threads=False):
+        values = batch.column(0)
+        if timed:
+            values = values.cast(pa.int64())
+            if origin is None and values.null_count < len(values):
+                origin = values.drop_null()[0].as_py()
+                reading.notes.append(f"{field.name} holds times of day; it was converted to seconds from its first")
+            if origin:
+                # Before rounding to a double: nanoseconds since 1970 need more than 53 bits
+                values = compute.subtract_checked(values, origin)
+        part = values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
+        if timed:
+            part = part / _PER_SECOND[field.type.unit]
+        numbers[row : row + len(part)] = part
+        row += len(part)
+    return numbers

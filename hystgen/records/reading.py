@@ -1,0 +1,183 @@
+"""What every format shares while a file is read: the request, the problems found, and the columns chosen."""
+
+from __future__ import annotations
+
+import io
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.problems import RecordError, printable
+from hystgen.records.columns import LISTED, Column, Finder, further_names
+from hystgen.records.record import Array
+from hystgen.records.units import to_seconds
+
+INSTALL = "pip install 'hystgen[formats]'"
+
+
+class Lines:
+    """Line of the file that each row of a table came from, kept by stretches of rows."""
+
+    def __init__(self) -> None:
+        self._rows: list[int] = []
+        self._lines: list[int | NDArray[np.int64]] = []
+
+    def add(self, first_row: int, lines: int | NDArray[np.int64]) -> None:
+        """Rows from `first_row` on: their lines, or the first line where the others follow one by one."""
+        self._rows.append(first_row)
+        self._lines.append(lines)
+
+    def line(self, row: int) -> int:
+        """Line of a row, counted from 1."""
+        stretch = bisect_right(self._rows, row) - 1
+        lines = self._lines[stretch]
+        after = row - self._rows[stretch]
+        return lines + after if isinstance(lines, int) else int(lines[after])
+
+
+@dataclass
+class Table:
+    """What a file holds before it is judged: columns under our names, NaN where there is no value.
+
+    `units`: those the file gives; `lines`: where the file has lines.
+    """
+
+    numbers: dict[str, Array]
+    units: dict[str, str] = field(default_factory=dict)
+    lines: Lines | None = None
+
+    def line(self, row: int) -> int | None:
+        """Line of the file that a row came from; None where the file has no lines."""
+        return None if self.lines is None else self.lines.line(row)
+
+
+class Reading:
+    """One file being read: what was asked for, and what is found to be wrong or worth a note."""
+
+    def __init__(
+        self,
+        file: str,
+        columns: Mapping[str, str],
+        sample_time: float | None,
+        delimiter: str,
+        need: tuple[str, ...],
+        tick: Callable[[float], None],
+    ) -> None:
+        self.file = file
+        self.columns = columns
+        self.sample_time = sample_time
+        self.delimiter = "\t" if delimiter in ("\\t", "tab") else delimiter
+        self.need = need
+        self.tick = tick
+        self.problems: list[str] = []
+        self.notes: list[str] = []
+
+    def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
+        """Something for which the file is refused, with its place where it has lines."""
+        place = self.file if line is None else f"{self.file}:{line}:{column or 1}"
+        self.problems.append(f"{place}: error: {text}")
+
+    def refuse(self, text: str, line: int | None = None) -> RecordError:
+        """The error to raise for a problem that ends the reading."""
+        self.problem(text, line)
+        return RecordError(self.problems)
+
+    def refuse_if_any(self) -> None:
+        """Raise RecordError with the problems found so far."""
+        if self.problems:
+            raise RecordError(self.problems)
+
+    @contextmanager
+    def parsing(self, kind: str) -> Iterator[None]:
+        """Whatever a library says about a file that it cannot read is a problem of the file."""
+        try:
+            yield
+        except RecordError:
+            raise
+        except MemoryError:
+            raise self.refuse("needs more memory than there is; export fewer samples or columns") from None
+        except Exception as failure:
+            raise self.refuse(f"is not {kind} ({printable(str(failure))}); export it again") from None
+
+    def chosen(
+        self, columns: Sequence[Column], ignored: Sequence[str] = (), line: int | None = None
+    ) -> dict[str, Column]:
+        """The columns that are asked for, by our names. Raises RecordError for those that are not there."""
+        finder = Finder(columns, self.columns, ignored)
+        found = finder.find(self.need, self.sample_time is not None)
+        for text in finder.problems:
+            self.problem(text, line)
+        self.refuse_if_any()
+        return found
+
+    def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
+        """The columns that were not asked for, by the names they get; what finds none is noted."""
+        used = {c.name for c in chosen.values()}
+        others = [c for c in columns if c.name not in used]
+        names = further_names(others, list(chosen))
+        self.left_out("whose name is taken", [c.name for c in others if c not in names.values() and c.name])
+        return names
+
+    def left_out(self, which: str, names: Sequence[str]) -> None:
+        """Note columns that the record does not have."""
+        if names:
+            more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+            self.notes.append(f"columns {which} were left out: {', '.join(map(printable, names[:LISTED]))}{more}")
+
+    def table(self, columns: Sequence[Column], ignored: Sequence[str]) -> Table:
+        """The table of a file whose columns are read one by one.
+
+        Read are the columns asked for and, out of the groups that hold these, all others of the same length.
+        """
+        chosen = self.chosen(columns, ignored)
+        lengths = {c.length for c in chosen.values()}
+        if len(lengths) > 1:
+            told = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
+            raise self.refuse(f"the columns differ in length: {told} samples; export them with one length")
+        folders = {c.folder for c in chosen.values()}
+        self.left_out("without numbers", ignored)
+        self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
+        near = [c for c in columns if c.folder in folders]
+        self.left_out("of another length", [c.name for c in near if c.length not in lengths])
+        taken = {**chosen, **self.further([c for c in near if c.length in lengths], chosen)}
+        numbers: dict[str, Array] = {}
+        for name, c in taken.items():
+            assert c.read is not None
+            numbers[name] = np.require(c.read(), np.float64, ("C", "W"))
+        return self.finished(numbers, taken)
+
+    def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
+        """A table with NaN for every value that is none, time in seconds and units by name."""
+        for x in numbers.values():
+            x[~np.isfinite(x)] = np.nan
+        units = {name: taken[name].unit for name in numbers if taken[name].unit}
+        if "t" in units:
+            numbers["t"], note = to_seconds(numbers["t"], units["t"])
+            if note:
+                self.notes.append(note)
+            units["t"] = "s"
+        return Table(numbers, units, lines)
+
+
+def one_dimension(shape: tuple[int, ...]) -> int:
+    """Length of a vector, whether it is a row, a column or neither; 0 where it is no vector."""
+    length = int(np.prod(shape, dtype=np.int64))
+    return length if length > 1 and length == max(shape) else 0
+
+
+class CountingFile(io.FileIO):
+    """A file that tells how many bytes were read from it."""
+
+    def __init__(self, file: str, tick: Callable[[float], None]) -> None:
+        super().__init__(file)
+        self._tick = tick
+
+    def readinto(self, buffer: bytearray | memoryview) -> int | None:  # type: ignore[override]
+        """Read as usual, and count."""
+        number = super().readinto(buffer)
+        self._tick(number or 0)
+        return number

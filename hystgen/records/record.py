@@ -1,0 +1,55 @@
+"""One experiment in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Record:
+    """One experiment: arrays of N samples.
+
+    `name`: file name without its folder; `t`: seconds, strictly rising; `v`: drive (empty when the file has no such
+    column and none was needed); `y`: measured displacement or None; `extra`: further numeric columns by name;
+    `sample_time`: median step of `t`; `notes`: what was repaired or left out, one sentence each; `units`: the units
+    that the file gives, by column (`{"t": "s", "v": "V"}`), the numbers of `v` and `y` as they are in the file.
+    """
+
+    name: str
+    t: Array
+    v: Array
+    y: Array | None = None
+    extra: Mapping[str, Array] = field(default_factory=dict)
+    sample_time: float = 1.0
+    notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def columns(self) -> dict[str, Array]:
+        """Every column by name: t, v, y where there, then the further ones."""
+        found = {"t": self.t}
+        if len(self.v) or not len(self.t):
+            found["v"] = self.v
+        if self.y is not None:
+            found["y"] = self.y
+        return {**found, **self.extra}
+
+    def section(self, first: int | None = None, last: int | None = None, name: str | None = None) -> Record:
+        """Samples `first` to `last` (exclusive, both as in a slice) as a record of their own."""
+        part = slice(first, last)
+        return replace(
+            self,
+            name=name or self.name,
+            t=self.t[part],
+            v=self.v[part],
+            y=None if self.y is None else self.y[part],
+            extra={key: values[part] for key, values in self.extra.items()},
+        )

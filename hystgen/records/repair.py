@@ -1,0 +1,116 @@
+"""What a record has to be: small faults of a table are repaired and counted, larger ones refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.records.reading import Reading, Table
+from hystgen.records.record import Array, Record
+
+SHORTEST = 16
+"""Fewest samples of a record that a model is fitted to."""
+
+REPAIRABLE = 0.05
+"""Largest share of samples that is dropped with a note; beyond it a file is refused."""
+
+GAP = 3.0
+"""A step longer than this many median steps is a gap."""
+
+
+def repaired(reading: Reading, table: Table) -> Record:
+    """The record of a table, which is used up. Raises RecordError with every problem."""
+    columns = table.numbers
+    length = len(next(iter(columns.values()), ()))
+    keep = np.ones(length, dtype=bool)
+    needed = [name for name in reading.need if name in columns]
+    if "t" in columns:
+        needed.append("t")
+    for name in dict.fromkeys(needed):
+        keep &= np.isfinite(columns[name])
+    _drop(reading, table, length, ~keep, "without a value in " + " or ".join(dict.fromkeys(needed)))
+    if "t" in columns:
+        keep = _rising(reading, table, columns["t"], keep)
+    samples = int(np.count_nonzero(keep))
+    if samples < length:
+        # One at a time, so that only one column is there twice
+        for name in columns:
+            columns[name] = columns[name][keep]
+    fit = "y" in reading.need
+    shortest = SHORTEST if fit else 1
+    if samples < shortest and not reading.problems:
+        reading.problem(f"has {count(samples, 'sample')}, at least {shortest} are needed; record for longer")
+    elif fit and samples and "v" in columns and float(np.ptp(columns["v"])) == 0.0:
+        reading.problem(
+            f"the drive v is {columns['v'][0]:g} throughout; a fit needs a drive that moves, check the columns"
+        )
+    reading.refuse_if_any()
+    t: Array
+    if "t" in columns:
+        t = columns.pop("t")
+        step = _step(reading, t)
+    else:
+        step = reading.sample_time or 1.0
+        t = np.arange(samples, dtype=np.float64) * step
+    v: Array = columns.pop("v", np.empty(0, dtype=np.float64))
+    y = columns.pop("y", None)
+    return Record(Path(reading.file).name, t, v, y, columns, step, tuple(reading.notes), table.units)
+
+
+def count(number: int, what: str) -> str:
+    """`1 sample`, `2 samples`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:
+    """Note the samples that are dropped, or refuse when they are too many."""
+    number = int(np.count_nonzero(wrong))
+    if not number:
+        return
+    row = int(np.argmax(wrong))
+    line = table.line(row)
+    first = f"the first at index {row}" if line is None else f"the first in line {line}"
+    if number > REPAIRABLE * length:
+        reading.problem(
+            f"{number} of {length} samples are {which}, {first}; more than {100 * REPAIRABLE:g} % is not repaired, "
+            "record or export again",
+            line,
+        )
+    else:
+        reading.notes.append(f"{count(number, 'sample')} {which} dropped, {first}")
+
+
+def _rising(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Keep the samples whose time is later than all before them."""
+    if len(t) < 2 or (keep.all() and np.all(t[1:] > t[:-1])):
+        return keep
+    latest = np.where(keep, t, -np.inf)
+    np.maximum.accumulate(latest, out=latest)
+    late = np.zeros(len(t), dtype=bool)
+    late[1:] = keep[1:] & (t[1:] <= latest[:-1])
+    _drop(reading, table, int(np.count_nonzero(keep)), late, "not later than the sample before")
+    return keep & ~late
+
+
+def _step(reading: Reading, t: Array) -> float:
+    """Median time step; gaps are noted."""
+    if len(t) < 2:
+        return reading.sample_time or 1.0
+    steps = np.diff(t)
+    step = float(np.median(steps, overwrite_input=True))
+    number = int(np.count_nonzero(steps > GAP * step))
+    if number:
+        np.subtract(t[1:], t[:-1], out=steps)  # the median has put them in another order
+        worst = int(np.argmax(steps))
+        reading.notes.append(
+            f"{count(number, 'gap')} longer than {GAP:g} median steps kept, the largest {steps[worst]:.4g} s "
+            f"at t = {t[worst]:.6g} s"
+        )
+    given = reading.sample_time
+    if given is not None and abs(given - step) > 0.01 * step:
+        reading.notes.append(
+            f"the file has its own time with a step of {step:.6g} s; the sample time {given:g} s given was not used"
+        )
+    return step
