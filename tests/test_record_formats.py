@@ -603,6 +603,27 @@ def test_identify_takes_the_units_of_the_records(tmp_path: Path) -> None:
     assert (fit.parameters.units.input, fit.parameters.units.output) == ("V", "um")
 
 
+def test_identify_from_hdf5(tmp_path: Path) -> None:
+    with (swept(tmp_path / "one.csv", "tvy")).open() as text:
+        rows = np.array([[float(cell) for cell in row] for row in list(csv.reader(text))[1:]])
+    with h5py.File(tmp_path / "one.h5", "w") as file:
+        for name, x, unit in zip(("time", "drive", "sensor"), rows.T, ("ms", "V", "um"), strict=True):
+            file[f"run1/{name}"] = x * 1000 if unit == "ms" else x
+            file[f"run1/{name}"].attrs["units"] = unit
+    written = []
+    for name, option, value in (
+        ("one.h5", "--columns", "t=run1/time,v=drive,y=run1/sensor"),
+        ("one.csv", "--units", "V,um"),
+    ):
+        command = ["identify", str(tmp_path / name), "-o", str(tmp_path / "stage.yaml"), "--thresholds", "2"]
+        command += [option, value]
+        result = CliRunner().invoke(cli.main, command, catch_exceptions=False)
+        assert result.exit_code == 0, result.stderr
+        assert ("t is in ms" in result.stderr) == (name == "one.h5")
+        written.append(YAML(typ="safe").load((tmp_path / "stage.yaml").read_text()))
+    assert written[0] == written[1]
+
+
 def test_simulate_writes_the_units_back(tmp_path: Path) -> None:
     path = swept(tmp_path / "one.csv", ["t [ms]", "v (V)", "y [um]"])
     model = tmp_path / "m.yaml"

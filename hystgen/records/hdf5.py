@@ -12,7 +12,7 @@ from hystgen.records.array_files import MATLAB_NUMBERS
 from hystgen.records.columns import Column, column
 from hystgen.records.reading import INSTALL, Reading, Table, one_dimension
 
-SLICE = 1 << 20
+SLICE = 1 << 18
 """Samples read at a time."""
 
 _UNITS = ("units", "unit", "Units", "Unit")
