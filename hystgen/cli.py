@@ -292,14 +292,15 @@ def simulate(
 @click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
 @click.option("--holdout", multiple=True, type=click.Path(), help="record that takes no part in the fit")
 @click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
+@click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option("--units", metavar="V,um", help="units of drive and output; default: the records'")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
-    holdout: tuple[str, ...], skip: int,
-    name: str | None, units: str | None, plot: str | None, history: str | None, rest: float, **reading: Any,
+    holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None,
+    units: str | None, plot: str | None, history: str | None, rest: float, **reading: Any,
 ) -> None:
     """Fit a model to measured records and write its parameter file.
 
@@ -328,6 +329,7 @@ def identify(
             name=name or identification.identifier_from(Path(output).stem),
             units={"input": drive.strip(), "output": displacement.strip()},
             skip=skip,
+            loading_curve=loading_curve,
             progress=True,
         )
         for warning in fit.warnings:

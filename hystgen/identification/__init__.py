@@ -39,6 +39,9 @@ MODELS = (*gpi.KINDS, "auto")
 P0_FLOOR = 0.05
 """Share of the sum of weights below which p_0 is raised where the data allow it."""
 
+NEAR_ZERO = 0.01
+"""Share of the drive range by which a loading curve may miss 0 and fall back."""
+
 PASSES = 60.0
 """About so many times the search for a front runs through all samples, for the progress bar."""
 
@@ -60,6 +63,7 @@ def identify(
     name: str = "stage",
     units: Mapping[str, str] | None = None,
     skip: int = 0,
+    loading_curve: bool = False,
     p0_floor: float = P0_FLOOR,
     columns: Mapping[str, str] | None = None,
     sample_time: float | None = None,
@@ -77,12 +81,12 @@ def identify(
     choice but that of `auto`; without them the last quarter of each record gives the held-out figures, from a trial
     model that has not seen it, and the model written is then fitted to everything. `history`: drive values visited
     before every record from a virgin state; without it the start of each record is ignored until the drive has wiped
-    the memory that matters.
-    `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
-    `name`: C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: samples
-    at the start of every record that are not compared, though their drive counts. `p0_floor`: see `weights.fit`; 0
-    leaves p_0 as it comes.
-    `progress`: a bar on a terminal's stderr when it takes more than a second.
+    the memory that matters. `rest`: seconds of pause after the history; a PI model does not depend on time, so it
+    changes nothing here. `name`: C identifier of the model. `units`: `input` and `output`, by default those of the
+    records. `skip`: samples at the start of every record that are not compared, though their drive counts.
+    `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and nothing
+    is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `weights.fit`; 0 leaves p_0 as it
+    comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
     actuator: no record tells in which state the firmware will find it. Raises RecordError for unusable files,
@@ -92,6 +96,10 @@ def identify(
         raise ValueError(f"model {model!r} is none of {', '.join(MODELS)}")
     how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor, skip)
     before = None if history is None else visited(history)
+    if loading_curve:
+        if before:
+            raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
+        before = ()
     if not (math.isfinite(rest) and rest >= 0.0):
         raise ValueError(f"rest is a number of seconds, not negative, not {rest}")
     if skip < 0:
@@ -107,6 +115,8 @@ def identify(
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
     units, conflicts = agreed_units(read, units)
     told += conflicts
+    for record in fit_records if loading_curve else ():
+        _check_loading_curve(record)
     courses, notes = prepared.courses(fit_records, before, skip)
     held, more = prepared.courses(held_records, before, skip)
     told += notes + more
@@ -122,7 +132,7 @@ def identify(
             done = tried[chosen]
             fitted, compared, held_errors = done.fitted, done.compared, done.errors
         else:
-            rows, kind, held_errors, reason = _trial(courses, kinds, how, bar)
+            rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how, bar)
             if reason:
                 told.append(reason)
             fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, skip, bar.tick)
@@ -201,6 +211,17 @@ def _compare(item: Course, fitted: Fitted) -> pi.Errors:
     return pi.compare(fitted.inner(item), fitted.solution.thresholds, fitted.solution.weights)
 
 
+def _check_loading_curve(record: Record) -> None:
+    """Raise IdentificationError unless the drive rises from near 0 on."""
+    v = np.asarray(record.v)
+    top = float(np.max(v))
+    if not (top > 0.0 and abs(float(v[0])) <= NEAR_ZERO * top and np.all(np.diff(v) >= -NEAR_ZERO * top)):
+        raise IdentificationError(
+            f"{record.name} is no initial loading curve: the drive has to rise all the way from 0; give the part of "
+            "the record up to the first turn, or leave loading_curve out"
+        )
+
+
 def _several(sources: Source | Iterable[Source]) -> list[Source]:
     return [sources] if isinstance(sources, Record | str | os.PathLike) else list(sources)
 
@@ -228,6 +249,10 @@ def _trial(
 ) -> tuple[list[Row], str, list[pi.Errors], str]:
     """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, the
     errors of the chosen one, and why there are none."""
+    if not courses:
+        if len(kinds) > 1:
+            raise ValueError("model auto needs something held out: give holdout records beside the loading curve")
+        return [], kinds[0], [], ""
     short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
     instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
     fronts, splits = [], []

@@ -104,7 +104,7 @@ class Fit:
     def _interval_sentence(self) -> str:
         """Loop width and held-out error with their intervals."""
         sure = self.intervals
-        said = f"widest loop {sure.width[0]:.4g} to {sure.width[1]:.4g}"
+        said = f"widest loop (input of the plays) {sure.width[0]:.4g} to {sure.width[1]:.4g}"
         if sure.held_out is not None:
             said += f", held-out rms error {sure.held_out[0]:.4g} to {sure.held_out[1]:.4g}"
         return said

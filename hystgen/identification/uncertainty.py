@@ -10,7 +10,7 @@ constraints of the fit. The cost does not grow with the number of samples.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +43,14 @@ SEED = 1
 class Intervals:
     """95 % intervals, and what they come from.
 
-    `weights`: (n+1, 2), low and high of each; `width`: of the widest loop; `held_out`: of the held-out rms error, None
+    `weights`: low and high of each; `width`: of the widest loop; `held_out`: of the held-out rms error, None
     where nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples in a block.
     """
 
-    weights: Array
+    weights: tuple[tuple[float, float], ...]
     width: tuple[float, float]
     held_out: tuple[float, float] | None
-    redrawn: Array
+    redrawn: Array = field(compare=False)
     block: int
 
     def loading_curve(self, thresholds: Array, x: Array) -> tuple[Array, Array]:
@@ -92,7 +92,7 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
     total = redrawn.sum(axis=1)
     width = np.quantile(2.0 * (redrawn @ r)[total > 0.0] / total[total > 0.0], TAILS)
     return Intervals(
-        np.column_stack([low, high]),
+        tuple(zip(low.tolist(), high.tolist(), strict=True)),
         (float(width[0]), float(width[1])),
         _rms_interval([each.error for each in held], random) if held else None,
         redrawn,

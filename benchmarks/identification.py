@@ -1,0 +1,116 @@
+"""How fast and how small a fit is, beside non-negative least squares on the whole regressor matrix.
+
+    python benchmarks/identification.py [--check] [--large]
+
+200 000 samples and 64 thresholds: seconds of both in the same run on one thread, the regressor matrix of the other
+counted in since it has to be made for it, and the residuals of both. `--large` fits a record of 10^7 samples as well
+and says how much memory that took beyond the record. `--check`: exit 1 unless the ratio is at least 10, the residuals
+agree to 1e-6 of themselves, and the large fit takes less than four times the memory of its record.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+import hystgen
+from hystgen import operators
+from hystgen.identification import pi, reduction, weights
+from hystgen.records import Record
+
+Array = NDArray[np.float64]
+
+SAMPLES, PLAYS = 200_000, 64
+LARGE = 10_000_000
+RUNS = 5
+FASTER, MOST_MEMORY = 10.0, 4.0
+
+
+def drives(samples: int) -> dict[str, Array]:
+    """Drives in volts: ramps between random turning points, a decaying sine, and the ramps with converter noise."""
+    rng = np.random.default_rng(1)
+    turns = rng.uniform(0.0, 100.0, samples // 500 + 2)
+    ramps = np.interp(np.arange(samples) / 500.0, np.arange(len(turns)), turns)
+    t = np.arange(samples) / samples
+    sine = 50.0 + 50.0 * np.exp(-3.0 * t) * np.sin(2.0 * np.pi * 200.0 * t)
+    return {"ramps": ramps, "decaying sine": sine, "noisy ramps": ramps + rng.normal(0.0, 0.02, samples)}
+
+
+def best(run: Callable[[], object]) -> float:
+    """Least seconds of a few runs."""
+    times = []
+    for _ in range(RUNS):
+        began = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - began)
+    return min(times)
+
+
+def compare(v: Array) -> tuple[float, float, float]:
+    """Seconds of the other and of ours, and by how much the residuals differ, as a share."""
+    from scipy.optimize import nnls
+
+    r = np.linspace(0.0, 45.0, PLAYS + 1)
+    rng = np.random.default_rng(2)
+    y = operators.plays(v, r, 0.0).T @ rng.uniform(0.0, 1.0, PLAYS + 1) + rng.normal(0.0, 0.5, len(v)) - 30.0
+    course = pi.course(Record("made", np.arange(len(v)) * 1e-4, v, y), (), 0)
+    columns = np.arange(PLAYS + 1)
+    found: list[float] = [0.0, 0.0]
+
+    def theirs() -> None:
+        one = np.ones((len(v), 1))
+        # an offset of either sign
+        _, found[0] = nnls(np.column_stack([operators.plays(v, r, 0.0).T, one, -one]), y)
+
+    def ours() -> None:
+        reduced = reduction.reduce([course], r)
+        found[1] = weights.residual(reduced.whole, columns, weights.non_negative(reduced.whole, columns)) ** 0.5
+
+    ours()  # compiles
+    return best(theirs), best(ours), abs(found[1] / found[0] - 1.0)
+
+
+def large() -> tuple[float, float]:
+    """Seconds of a fit to 10^7 samples, and the memory it took at its peak, as a share of the record's."""
+    v = drives(LARGE)["noisy ramps"]
+    y = operators.plays(v, [0.0, 5.0, 20.0], 0.0).T @ [0.5, 0.2, 0.1]
+    record = Record("made", np.arange(LARGE) * 1e-5, v, y, sample_time=1e-5)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.perf_counter()
+    hystgen.identify(record, holdout=record.section(0, 100_000))
+    grown = 1024.0 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    return time.perf_counter() - began, grown / (24.0 * LARGE)
+
+
+def main() -> int:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--large", action="store_true")
+    options = parser.parse_args()
+    met = True
+    print(f"{SAMPLES} samples, {PLAYS} thresholds")
+    print(f"{'drive':15s} {'nnls s':>8s} {'hystgen s':>10s} {'ratio':>6s}  residuals differ by")
+    with threadpool_limits(1):
+        for name, v in drives(SAMPLES).items():
+            other, own, differ = compare(v)
+            print(f"{name:15s} {other:8.3f} {own:10.3f} {other / own:6.1f}  {differ:.1e}")
+            met = met and other >= FASTER * own and differ < 1e-6
+    if options.large:
+        seconds, share = large()
+        print(f"{LARGE} samples: {seconds:.1f} s, {share:.2f} of the record's memory beyond it")
+        met = met and share < MOST_MEMORY
+    if options.check:
+        print("met" if met else "missed")
+    return int(options.check and not met)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
