@@ -80,7 +80,8 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 
     const hystgen_real_t *p = hystgen_atanh_row[i];
     const hystgen_real_t *q = hystgen_atanh_row[j];
-    hystgen_real_t lower = p[10], upper = q[10];
+    hystgen_real_t lower = p[10];
+    hystgen_real_t upper = q[10];
     for (unsigned int n = 10u; n > 1u; --n) {
         lower = p[n - 1u] + d * lower;
         upper = q[n - 1u] + e * upper;

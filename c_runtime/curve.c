@@ -18,6 +18,7 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, con
     unsigned int high = pieces - 1u;
     int64_t y = 0;
     uint32_t h;
+    unsigned int first;
     unsigned int i;
     while (low < high) {
         const unsigned int middle = (low + high + 1u) / 2u;
@@ -28,7 +29,8 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, con
         }
     }
     h = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
-    coefficient = &coefficient[low * (degree + 1u)];
+    first = low * (degree + 1u);
+    coefficient = &coefficient[first];
     for (i = degree + 1u; i > 0; --i) {
         y = coefficient[i - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
     }

@@ -11,15 +11,19 @@ typedef struct {
     const uint32_t *reciprocal;       /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
     hystgen_sum_t all_lift;           /* p_0 r_0 + ... + p_n r_n */
-    hystgen_reach_t least, most;      /* no input of the plays is asked for beyond these */
+    hystgen_reach_t least;            /* no input of the plays is asked for beyond these */
+    hystgen_reach_t most;
     uint_least16_t n;                 /* plays without r_0 */
 } hystgen_tables_t;
 
 /* Ends of the way back from the input of the plays to the drive, one branch. */
 typedef struct {
-    int64_t envelope_least, envelope_most; /* inputs of the plays that an envelope can give */
-    hystgen_reach_t least, most;           /* up to here an input beyond the range's is no more than rounding */
-    int32_t first, last;                   /* inputs of the plays that the drive range gives */
+    int64_t envelope_least; /* inputs of the plays that an envelope can give */
+    int64_t envelope_most;
+    hystgen_reach_t least;  /* up to here an input beyond the range's is no more than rounding */
+    hystgen_reach_t most;
+    int32_t first;          /* inputs of the plays that the drive range gives */
+    int32_t last;
 } hystgen_ends_t;
 
 #endif

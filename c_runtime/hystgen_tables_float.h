@@ -16,9 +16,13 @@ typedef struct {
 
 /* Hyperbolic tangent envelope a0 tanh(a1 x + a2) + a3, one branch. */
 typedef struct {
-    hystgen_real_t a0, a1, a2, a3;
-    hystgen_real_t inverse_a0, inverse_a1;
-    hystgen_real_t limit;  /* largest |argument| that atanh is given */
+    hystgen_real_t a0;
+    hystgen_real_t a1;
+    hystgen_real_t a2;
+    hystgen_real_t a3;
+    hystgen_real_t inverse_a0;
+    hystgen_real_t inverse_a1;
+    hystgen_real_t limit;      /* largest |argument| that atanh is given */
 } hystgen_envelope_t;
 
 /* Dead-zone sum as the straight pieces it consists of, piece j between break points j-1 and j. */

@@ -5,19 +5,19 @@
 
 HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w)
 {
-    volatile hystgen_play_t *all = play;
+    volatile hystgen_play_t *entry = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
-        all[i] = w;
+        entry[i] = w;
     }
 }
 
 HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play, const hystgen_play_t *start)
 {
-    volatile hystgen_play_t *all = play;
+    volatile hystgen_play_t *entry = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
-        all[i] = start[i];
+        entry[i] = start[i];
     }
 }
 

@@ -80,10 +80,10 @@ static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t
 
 static void bent_loop_rest(const bent_tables_t *t, bent_real_t *play, bent_real_t w)
 {
-    volatile bent_real_t *all = play;
+    volatile bent_real_t *entry = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
-        all[i] = w;
+        entry[i] = w;
     }
 }
 

@@ -12,7 +12,7 @@
 
 /* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and status. */
 typedef struct {
-    char call;
+    char kind;
     bent_real_t argument;
     bent_real_t answer;
     unsigned int status;
@@ -407,9 +407,9 @@ int bent_selftest(void)
     bent_forward_t forward;
     bent_inverse_t inverse;
     bent_forward_init(&forward);
-    for (i = 0; i < 178u; ++i, ++index) {
+    for (i = 0; i < 178u; ++i) {
         const bent_selftest_sample_t *sample = &bent_selftest_forward[i];
-        if (sample->call == 'r') {
+        if (sample->kind == 'r') {
             bent_forward_reset(&forward, sample->argument);
         } else if (!bent_selftest_same(bent_forward_step(&forward, sample->argument), sample->answer)) {
             return index + 1;
@@ -417,13 +417,14 @@ int bent_selftest(void)
         if (bent_forward_status(&forward) != sample->status) {
             return index + 1;
         }
+        ++index;
     }
     bent_inverse_init(&inverse);
-    for (i = 0; i < 185u; ++i, ++index) {
+    for (i = 0; i < 185u; ++i) {
         const bent_selftest_sample_t *sample = &bent_selftest_inverse[i];
-        if (sample->call == 'r') {
+        if (sample->kind == 'r') {
             bent_inverse_reset(&inverse, sample->argument);
-        } else if (sample->call == 'c') {
+        } else if (sample->kind == 'c') {
             bent_inverse_commit(&inverse, sample->argument);
         } else if (!bent_selftest_same(bent_inverse_step(&inverse, sample->argument), sample->answer)) {
             return index + 1;
@@ -431,6 +432,7 @@ int bent_selftest(void)
         if (bent_inverse_status(&inverse) != sample->status) {
             return index + 1;
         }
+        ++index;
     }
     return 0;
 }

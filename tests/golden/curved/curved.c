@@ -21,15 +21,19 @@ typedef struct {
     const uint32_t *reciprocal;       /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
     curved_sum_t all_lift;           /* p_0 r_0 + ... + p_n r_n */
-    curved_reach_t least, most;      /* no input of the plays is asked for beyond these */
+    curved_reach_t least;            /* no input of the plays is asked for beyond these */
+    curved_reach_t most;
     uint_least16_t n;                 /* plays without r_0 */
 } curved_tables_t;
 
 /* Ends of the way back from the input of the plays to the drive, one branch. */
 typedef struct {
-    int64_t envelope_least, envelope_most; /* inputs of the plays that an envelope can give */
-    curved_reach_t least, most;           /* up to here an input beyond the range's is no more than rounding */
-    int32_t first, last;                   /* inputs of the plays that the drive range gives */
+    int64_t envelope_least; /* inputs of the plays that an envelope can give */
+    int64_t envelope_most;
+    curved_reach_t least;  /* up to here an input beyond the range's is no more than rounding */
+    curved_reach_t most;
+    int32_t first;          /* inputs of the plays that the drive range gives */
+    int32_t last;
 } curved_ends_t;
 
 /* Down to a whole number: reaches the same whole numbers that x reaches twice. */
@@ -436,6 +440,7 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
     unsigned int high = pieces - 1u;
     int64_t y = 0;
     uint32_t h;
+    unsigned int first;
     unsigned int i;
     while (low < high) {
         const unsigned int middle = (low + high + 1u) / 2u;
@@ -446,7 +451,8 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
         }
     }
     h = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
-    coefficient = &coefficient[low * (degree + 1u)];
+    first = low * (degree + 1u);
+    coefficient = &coefficient[first];
     for (i = degree + 1u; i > 0; --i) {
         y = coefficient[i - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
     }

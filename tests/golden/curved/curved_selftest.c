@@ -12,7 +12,7 @@
 
 /* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and status. */
 typedef struct {
-    char call;
+    char kind;
     curved_real_t argument;
     curved_real_t answer;
     unsigned int status;
@@ -225,11 +225,11 @@ int curved_selftest(void)
     unsigned int i;
     curved_inverse_t inverse;
     curved_inverse_init(&inverse);
-    for (i = 0; i < 185u; ++i, ++index) {
+    for (i = 0; i < 185u; ++i) {
         const curved_selftest_sample_t *sample = &curved_selftest_inverse[i];
-        if (sample->call == 'r') {
+        if (sample->kind == 'r') {
             curved_inverse_reset(&inverse, sample->argument);
-        } else if (sample->call == 'c') {
+        } else if (sample->kind == 'c') {
             curved_inverse_commit(&inverse, sample->argument);
         } else if (!curved_selftest_same(curved_inverse_step(&inverse, sample->argument), sample->answer)) {
             return index + 1;
@@ -237,6 +237,7 @@ int curved_selftest(void)
         if (curved_inverse_status(&inverse) != sample->status) {
             return index + 1;
         }
+        ++index;
     }
     return 0;
 }

@@ -12,7 +12,7 @@
 
 /* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and status. */
 typedef struct {
-    char call;
+    char kind;
     plain_real_t argument;
     plain_real_t answer;
     unsigned int status;
@@ -225,11 +225,11 @@ int plain_selftest(void)
     unsigned int i;
     plain_inverse_t inverse;
     plain_inverse_init(&inverse);
-    for (i = 0; i < 185u; ++i, ++index) {
+    for (i = 0; i < 185u; ++i) {
         const plain_selftest_sample_t *sample = &plain_selftest_inverse[i];
-        if (sample->call == 'r') {
+        if (sample->kind == 'r') {
             plain_inverse_reset(&inverse, sample->argument);
-        } else if (sample->call == 'c') {
+        } else if (sample->kind == 'c') {
             plain_inverse_commit(&inverse, sample->argument);
         } else if (!plain_selftest_same(plain_inverse_step(&inverse, sample->argument), sample->answer)) {
             return index + 1;
@@ -237,6 +237,7 @@ int plain_selftest(void)
         if (plain_inverse_status(&inverse) != sample->status) {
             return index + 1;
         }
+        ++index;
     }
     return 0;
 }

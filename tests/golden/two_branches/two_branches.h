@@ -23,6 +23,7 @@
 
 #include <float.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
@@ -122,8 +123,6 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #if defined(TWO_BRANCHES_IMPLEMENTATION) && !defined(TWO_BRANCHES_IMPLEMENTED)
 #define TWO_BRANCHES_IMPLEMENTED
 
-#include <stddef.h>
-
 /* Products are rounded before they are added, whatever the compiler's default is. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
@@ -148,9 +147,13 @@ typedef struct {
 
 /* Hyperbolic tangent envelope a0 tanh(a1 x + a2) + a3, one branch. */
 typedef struct {
-    two_branches_real_t a0, a1, a2, a3;
-    two_branches_real_t inverse_a0, inverse_a1;
-    two_branches_real_t limit;  /* largest |argument| that atanh is given */
+    two_branches_real_t a0;
+    two_branches_real_t a1;
+    two_branches_real_t a2;
+    two_branches_real_t a3;
+    two_branches_real_t inverse_a0;
+    two_branches_real_t inverse_a1;
+    two_branches_real_t limit;      /* largest |argument| that atanh is given */
 } two_branches_envelope_t;
 
 /*

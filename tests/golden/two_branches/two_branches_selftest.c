@@ -12,7 +12,7 @@
 
 /* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and status. */
 typedef struct {
-    char call;
+    char kind;
     two_branches_real_t argument;
     two_branches_real_t answer;
     unsigned int status;
@@ -225,11 +225,11 @@ int two_branches_selftest(void)
     unsigned int i;
     two_branches_inverse_t inverse;
     two_branches_inverse_init(&inverse);
-    for (i = 0; i < 185u; ++i, ++index) {
+    for (i = 0; i < 185u; ++i) {
         const two_branches_selftest_sample_t *sample = &two_branches_selftest_inverse[i];
-        if (sample->call == 'r') {
+        if (sample->kind == 'r') {
             two_branches_inverse_reset(&inverse, sample->argument);
-        } else if (sample->call == 'c') {
+        } else if (sample->kind == 'c') {
             two_branches_inverse_commit(&inverse, sample->argument);
         } else if (!two_branches_selftest_same(two_branches_inverse_step(&inverse, sample->argument), sample->answer)) {
             return index + 1;
@@ -237,6 +237,7 @@ int two_branches_selftest(void)
         if (two_branches_inverse_status(&inverse) != sample->status) {
             return index + 1;
         }
+        ++index;
     }
     return 0;
 }
