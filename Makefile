@@ -26,6 +26,7 @@ test: $(VENV)/ready lint
 lint: $(VENV)/ready
 	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime
 	$(BIN)/mypy
+	$(BIN)/python tests/static_checks.py
 
 clean:
 	rm -rf $(VENV) build dist

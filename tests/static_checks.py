@@ -1,0 +1,174 @@
+"""Static checks of the emitted C: cppcheck with its MISRA C:2012 addon, clang-tidy, gcc -fanalyzer.
+
+    python tests/static_checks.py
+
+Emits the modules of MODULES and fails on every finding of a rule or check that `deviations.yaml` does not list with a
+reason, and on every one listed there that no module shows any more. gcc has to find nothing at all.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from modelfiles import FILES
+from ruamel.yaml import YAML
+
+import hystgen
+from hystgen.api import Model
+from hystgen.params import parse_parameters
+from hystgen.verification.compilers import C_WARNINGS
+
+DEVIATIONS = Path(__file__).parent / "deviations.yaml"
+TOOLS = ("cppcheck", "clang-tidy", "gcc")
+
+MODULES = (  # every kind of model, operator, arithmetic, engine and layout
+    ("plain", "inverse", "float32", "corners", "self-contained"),
+    ("plain", "both", "q31", "corners", "shared-runtime"),
+    ("plain", "inverse", "q15", "loop", "self-contained"),
+    ("listed", "both", "float32", "corners", "single-header"),
+    ("listed", "both", "q15", "corners", "self-contained"),
+    ("bent", "both", "float64", "loop", "self-contained"),
+    ("bent", "inverse", "q31", "corners", "self-contained"),
+    ("curved", "both", "float32", "loop", "shared-runtime"),
+    ("curved", "inverse", "float64", "corners", "self-contained"),
+    ("two_branches", "both", "float32", "corners", "self-contained"),
+    ("two_branches", "both", "float64", "corners", "shared-runtime"),
+    ("mixed", "both", "q31", "loop", "single-header"),
+    ("mixed", "forward", "float32", "corners", "single-header"),
+    ("linear", "both", "float32", "corners", "self-contained"),
+    ("linear", "both", "q15", "corners", "shared-runtime"),
+)
+
+# cppcheck reads no system header; these are what <float.h> says on every target, and the core whose code has most to
+# look at. `unix32` is a 32-bit target: int and long of 32 bits
+CPPCHECK = [
+    "--enable=all", "--inconclusive", "--check-level=exhaustive", "--addon=misra", "--std=c99", "--platform=unix32",
+    "--quiet", "--suppress=missingIncludeSystem", "--template={file}:{line}: [{id}] {message}",
+    "-DFLT_RADIX=2", "-DFLT_MANT_DIG=24", "-DDBL_MANT_DIG=53", "-DFLT_EVAL_METHOD=0", "-DFLT_MAX=3.40282347e+38F",
+    "-DDBL_MAX=1.7976931348623157e+308", "-D__ARM_ARCH_6M__=1",
+]  # fmt: skip
+CLANG_TIDY = [
+    "--quiet",
+    "--checks=-*,bugprone-*,cert-*,clang-analyzer-*,misc-*,performance-*,portability-*,readability-non-const-parameter,"
+    "readability-inconsistent-declaration-parameter-name,readability-misleading-indentation,readability-redundant-*",
+]
+GCC = ["-std=c99", "-O2", "-fanalyzer", *C_WARNINGS, "-c", "-o", os.devnull]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a tool says about a line; `rule` is the name in `deviations.yaml`, None where nothing may deviate."""
+
+    tool: str
+    rule: str | None
+    text: str
+
+
+def emit(folder: Path, name: str, operator: str, arithmetic: str, engine: str, layout: str) -> list[Path]:
+    """Emit a module into `folder` and return the C files to compile."""
+    model = Model(parse_parameters(FILES[name], f"{name}.yaml"))
+    hystgen.emit(model, folder, operator=operator, arithmetic=arithmetic, engine=engine, layout=layout)
+    if layout == "single-header":
+        (folder / f"{name}.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')
+    return sorted(folder.glob("*.c"))
+
+
+def find(tool: str) -> str | None:
+    """The tool beside this Python, as its wheel installs it, or on the path."""
+    return shutil.which(tool, path=os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")]))
+
+
+def _run(command: Sequence[str | Path]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+
+
+def cppcheck(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
+    """All files of a module at once, since some rules speak of the whole program."""
+    done = _run([tool, *CPPCHECK, *sources])
+    if done.returncode:
+        yield Finding("cppcheck", None, done.stdout + done.stderr)
+    for line in done.stderr.splitlines():
+        found = re.search(r": \[(?:misra-c2012-(?P<misra>[\d.]+)|(?P<check>\w+))\] ", line)
+        if found and found["misra"]:
+            yield Finding("misra", found["misra"], line)
+        elif found and found["check"] == "checkersReport" and "critical errors" not in line:
+            continue
+        else:
+            yield Finding("cppcheck", found["check"] if found else None, line)
+
+
+def clang_tidy(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
+    """Each file alone."""
+    done = _run([tool, *CLANG_TIDY, *sources, "--", "-std=c99", "-ffreestanding"])
+    said = [re.search(r" (warning|error): .* \[([\w.,-]+)\]$", line) for line in done.stdout.splitlines()]
+    for found in filter(None, said):
+        for check in found[2].split(","):
+            yield Finding("clang-tidy", check if found[1] == "warning" else None, found.string)
+    if done.returncode and not any(said):
+        yield Finding("clang-tidy", None, done.stdout + done.stderr)
+
+
+def gcc(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
+    """Warnings are errors here."""
+    for source in sources:
+        done = _run([tool, *GCC, source])
+        if done.returncode:
+            yield Finding("gcc", None, done.stderr)
+
+
+RUN = {"cppcheck": cppcheck, "clang-tidy": clang_tidy, "gcc": gcc}
+
+
+def problems(findings: Sequence[Finding], listed: Mapping[str, Mapping[str, str]], complete: bool = True) -> list[str]:
+    """Findings that are no listed deviation, one of a rule, and, for a complete run, deviations without a finding."""
+    first: dict[tuple[str, str], list[str]] = {}
+    for f in findings:
+        if f.rule is None or f.rule not in listed.get(f.tool, {}):
+            first.setdefault((f.tool, f.rule or f.text), []).append(f.text)
+    said = []
+    for (tool, _), texts in first.items():
+        more = f"\n    and {len(texts) - 1} more" if len(texts) > 1 else ""
+        said.append(f"{tool}: {texts[0].strip()}{more}")
+    seen = {(f.tool, f.rule) for f in findings}
+    if complete:
+        for tool, rules in listed.items():
+            said += [f"{tool}: {rule} is listed as a deviation and no longer found" for rule in rules
+                     if (tool, rule) not in seen]  # fmt: skip
+    return said
+
+
+def deviations() -> dict[str, dict[str, str]]:
+    """Tool to rule to reason."""
+    listed = YAML(typ="safe").load(DEVIATIONS.read_text(encoding="utf-8"))
+    assert all(len(str(reason).split()) > 5 for rules in listed.values() for reason in rules.values())
+    return {tool: {str(rule): reason for rule, reason in rules.items()} for tool, rules in listed.items()}
+
+
+def main() -> int:
+    """Exit code: 0 where there is nothing to say."""
+    tools = {name: path for name in TOOLS if (path := find(name))}
+    missing = [name for name in TOOLS if name not in tools]
+    if missing:
+        print(f"static checks: {', '.join(missing)} not installed", file=sys.stderr)
+        if os.environ.get("CI") or missing != ["gcc"]:
+            return 1
+    with tempfile.TemporaryDirectory(prefix="hystgen-static-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
+        emitted = [emit(Path(name) / "-".join(module), *module) for module in MODULES]
+        jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in tools]
+        findings = [finding for job in jobs for finding in job.result()]
+    said = problems(findings, deviations())
+    print("\n".join(said) or f"static checks: {', '.join(tools)} find nothing in {len(MODULES)} modules but deviations")
+    return 1 if said else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
