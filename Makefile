@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint fuzz clean
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -27,6 +27,10 @@ lint: $(VENV)/ready
 	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime
 	$(BIN)/mypy
 	$(BIN)/python tests/static_checks.py
+
+# Eight modules, five minutes each
+fuzz: $(VENV)/ready
+	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
 
 clean:
 	rm -rf $(VENV) build dist

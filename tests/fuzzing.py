@@ -1,0 +1,159 @@
+"""Fuzzing of the emitted C with libFuzzer, and the replay of what it found through the bit reference."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+from modelfiles import FILES
+
+import hystgen
+from hystgen import reference
+from hystgen.api import Model
+from hystgen.params import parse_parameters
+from hystgen.verification import comparison, compilers
+
+CALLS = {
+    "step": reference.OP_STEP,
+    "init": reference.OP_INIT,
+    "reset": reference.OP_RESET,
+    "commit": reference.OP_COMMIT,
+}
+SANITIZERS = "address,undefined,float-cast-overflow"
+FLAGS = ["-std=c99", "-g", "-O1", f"-fsanitize=fuzzer,{SANITIZERS}", "-fno-sanitize-recover=all"]
+LONGEST = 2048
+SEEDS = 16
+
+
+class FuzzError(AssertionError):
+    """A crash, a sanitizer's report, or an answer that is not the reference's."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """A fuzzer of both operators of a model; in fixed point of both engines side by side, which have to agree."""
+
+    model: Model
+    arithmetic: str
+    engine: str
+    binary: Path
+
+    @cached_property
+    def numbers(self) -> Any:
+        """What the reference computes with."""
+        return self.model.tables(self.arithmetic, self.engine)
+
+    def run(self, corpus: Path, seconds: float) -> str:
+        """Fuzz, keeping in `corpus` what reached something new. Returns libFuzzer's figures. Raises FuzzError."""
+        artifacts = corpus.parent / "found"
+        artifacts.mkdir(exist_ok=True)
+        options = [
+            f"-max_total_time={seconds}", f"-max_len={LONGEST}", "-len_control=0", "-use_value_profile=1",
+            "-timeout=10", "-seed=1", "-print_final_stats=1", "-verbosity=0", f"-artifact_prefix={artifacts}{os.sep}",
+        ]  # fmt: skip
+        done = subprocess.run(
+            [self.binary, *options, corpus], capture_output=True, text=True, errors="replace", check=False
+        )
+        if done.returncode:
+            raise FuzzError(done.stderr)
+        return done.stderr
+
+    def replay(self, corpus: Path) -> int:
+        """Compare every input of `corpus` with the bit reference. Returns the number of calls; raises FuzzError."""
+        log = corpus.parent / "calls.txt"
+        files = sorted(path for path in corpus.iterdir())
+        done = subprocess.run(
+            [self.binary, *files], capture_output=True, text=True, errors="replace", check=False,
+            env={**os.environ, "HYSTGEN_FUZZ_LOG": str(log)},
+        )  # fmt: skip
+        if done.returncode:
+            raise FuzzError(done.stderr)
+        # libFuzzer runs an empty input before those it is given
+        inputs = log.read_text().split("input ")[-len(files) :]
+        assert len(inputs) == len(files)
+        return sum(self._compare(file.name, text.splitlines()) for file, text in zip(files, inputs, strict=True))
+
+    def _compare(self, name: str, lines: list[str]) -> int:
+        inverse = lines[0] == "1"
+        table = np.array([[int(number) for number in line.split()] for line in lines[1:]], dtype=object).reshape(-1, 4)
+        call = table[:, 0].astype(np.uint8)
+        real = comparison.REALS[self.arithmetic]
+        x, answer = (table[:, i].astype(f"u{real.itemsize}").view(real) for i in (1, 2))
+        with np.errstate(invalid="ignore"):  # a signalling NaN that changes its type
+            expected = comparison.expected_record(self.numbers, real, inverse, (name, call, x))
+        bits = f"u{real.itemsize}"
+        wrong = answer.view(bits) != expected.answer.view(bits)
+        gathered = 0
+        for i, read in enumerate(table[:, 3]):
+            if call[i] in (reference.OP_INIT, reference.OP_RESET):
+                gathered = 0
+            gathered |= int(expected.status[i])
+            if read >= 0:
+                wrong[i] |= read != gathered
+                gathered = 0
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            raise FuzzError(
+                f"{self.model.name}, {self.arithmetic}, {self.engine}, {'inverse' if inverse else 'forward'}, input "
+                f"{name}: call {i} ({call[i]} of {x[i]!r}) gave {answer[i]!r}, status {table[i, 3]}; the reference "
+                f"{expected.answer[i]!r}, its bits {expected.status[i]}"
+            )
+        return len(call)
+
+
+def build(
+    folder: Path,
+    name: str,
+    arithmetic: str,
+    engine: str,
+    change: Callable[[str], str] = lambda text: text,
+) -> Target:
+    """Emit a model, whose C `change` may alter, and build its fuzzer; in fixed point with both engines."""
+    clang = compilers.find("clang")
+    assert clang, "clang is not installed"
+    real = comparison.REALS[arithmetic]
+    fixed = real.kind == "i"
+    model = Model(parse_parameters(FILES[name], f"{name}.yaml"))
+    hystgen.emit(model, folder, operator="both", arithmetic=arithmetic, engine=engine)
+    source = folder / f"{name}.c"
+    source.write_text(change(source.read_text()))
+    sources = [source]
+    twin = f"{name}_twin" if fixed else ""
+    if fixed:
+        other = Model(parse_parameters(FILES[name].replace(f"name: {name}\n", f"name: {twin}\n"), f"{twin}.yaml"))
+        hystgen.emit(
+            other, folder, operator="both", arithmetic=arithmetic, engine="loop" if engine == "corners" else "corners"
+        )
+        sources.append(folder / f"{twin}.c")
+    template = jinja2.Template(
+        (Path(__file__).parent / "fuzz_harness.c.j2").read_text(), undefined=jinja2.StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    limits = np.iinfo(real) if fixed else np.iinfo(np.int32)
+    harness = folder / "fuzz_harness.c"
+    harness.write_text(
+        template.render(
+            name=name, NAME=name.upper(), twin=twin, fixed=fixed, size=real.itemsize, calls=CALLS,
+            FLT="FLT" if arithmetic == "float32" else "DBL", least=f"({limits.min + 1} - 1)", most=limits.max,
+        )
+    )  # fmt: skip
+    binary = folder / "fuzz"
+    clang.run([*FLAGS, *sources, harness, "-o", binary])
+    return Target(model, arithmetic, engine, binary)
+
+
+def seed(corpus: Path) -> None:
+    """Random sequences of calls to begin with, a few of each length."""
+    corpus.mkdir()
+    rng = np.random.default_rng(4)
+    for number in range(SEEDS):
+        data = rng.integers(0, 256, 2 ** (3 + number // 2), dtype=np.uint8)
+        data[0] = number % 2
+        (corpus / f"seed-{number}").write_bytes(data.tobytes())

@@ -1,0 +1,112 @@
+"""Any sequence of calls with any bits: no undefined behaviour, answers in range, and the bits of the reference."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import fuzzing
+import numpy as np
+import pytest
+from fuzzing import FuzzError
+
+from hystgen.verification import compilers
+
+SECONDS = float(os.environ.get("HYSTGEN_FUZZ_SECONDS", "10"))
+"""Of fuzzing a module; `make fuzz` takes longer."""
+
+needs_clang = pytest.mark.skipif(
+    not os.environ.get("CI") and compilers.find("clang") is None, reason="libFuzzer comes with clang"
+)
+
+
+def fuzz(folder: Path, seconds: float, *module: str, change: Callable[[str], str] | None = None) -> int:
+    """Build, fuzz, replay; returns the number of calls that were compared with the reference."""
+    target = fuzzing.build(folder, *module, **({"change": change} if change else {}))
+    corpus = folder / "corpus"
+    fuzzing.seed(corpus)
+    figures = target.run(corpus, seconds)
+    compared = target.replay(corpus)
+    runs = re.search(r"number_of_executed_units: (\d+)", figures)
+    inputs = len(list(corpus.iterdir()))
+    print(f"\n{' '.join(module)}: {runs and runs[1]} runs, {inputs} inputs, {compared} calls compared")
+    return compared
+
+
+@needs_clang
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "arithmetic", "engine"),
+    [
+        ("plain", "float32", "corners"),
+        ("bent", "float32", "corners"),
+        ("two_branches", "float32", "corners"),
+        ("mixed", "float64", "loop"),
+        ("listed", "q31", "corners"),
+        ("two_branches", "q31", "corners"),
+        ("curved", "q15", "loop"),
+        ("listed", "q15", "corners"),
+    ],
+)
+def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path: Path) -> None:
+    assert fuzz(tmp_path, SECONDS, name, arithmetic, engine) > 1000
+
+
+def changed_entry(text: str) -> str:
+    """One threshold by one unit in the last place."""
+    start = text.index("plain_threshold[")
+    number = re.compile(r"0\.9f").search(text, start)
+    assert number
+    other = np.nextafter(np.float32(0.9), np.float32(1))
+    return text[: number.start()] + f"{other!s}f" + text[number.end() :]
+
+
+def loose_clamp(text: str) -> str:
+    """A committed drive a little beyond the range is believed."""
+    found = text.replace("v > PLAIN_DRIVE_MAX ?", "v > 1.001f * PLAIN_DRIVE_MAX ?")
+    assert found != text
+    return found
+
+
+def beyond_the_range(text: str) -> str:
+    """A drive goes out that is more than what was solved and clamped."""
+    found = text.replace("self->stepped = true;\n    return v;", "self->stepped = true;\n    return 1.01f * v;")
+    assert found != text
+    return found
+
+
+def out_of_bounds(text: str) -> str:
+    """Corners two slots beyond the one that is free."""
+    found = text.replace("&corner[m->here.depth]", "&corner[m->here.depth + 2]")
+    assert found != text
+    return found
+
+
+@needs_clang
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (changed_entry, "the reference"),
+        (loose_clamp, "the reference"),
+        (beyond_the_range, "the drive is out of range"),
+        (out_of_bounds, "runtime error: index|AddressSanitizer"),
+    ],
+)
+def test_a_defect_is_found(change: Callable[[str], str], said: str, tmp_path: Path) -> None:
+    with pytest.raises(FuzzError, match=said):
+        fuzz(tmp_path, 5, "plain", "float32", "corners", change=change)
+
+
+@needs_clang
+def test_engines_that_differ_are_found(tmp_path: Path) -> None:
+    """In q31 a threshold that is off by one unit of 2^31 suffices."""
+
+    def change(text: str) -> str:
+        first = re.compile(r"(?<=    0, )\d+").search(text, text.index("plain_threshold["))
+        assert first
+        return text[: first.start()] + str(int(first[0]) + 1) + text[first.end() :]
+
+    with pytest.raises(FuzzError, match="the engines give different answers"):
+        fuzz(tmp_path, 5, "plain", "q31", "corners", change=change)
