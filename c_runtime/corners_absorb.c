@@ -224,12 +224,17 @@ HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, cons
 }
 
 /* Writes the corner that turning back leaves into slot c. */
-static void hystgen_push_corner(const hystgen_tables_t *t, const hystgen_memory_t *m, hystgen_corner_t *c)
+static void hystgen_write_corner(hystgen_corner_t *c, const hystgen_memory_t *m, hystgen_sum_t output)
 {
     c->extremum = m->w;
-    c->output = hystgen_corners_output(t, m);
+    c->output = output;
     c->end = m->here.k;
     c->side = m->here.rising ? -1 : 1;
+}
+
+static void hystgen_push_corner(const hystgen_tables_t *t, const hystgen_memory_t *m, hystgen_corner_t *c)
+{
+    hystgen_write_corner(c, m, hystgen_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */

@@ -34,6 +34,7 @@ typedef hystgen_real_t hystgen_sum_t;
 #define HYSTGEN_SUM_MAX HYSTGEN_REACH_MAX
 #endif
 #define HYSTGEN_API
+#define HYSTGEN_NOINLINE
 
 #include "hystgen_state.h"
 #ifdef HYSTGEN_FIXED
@@ -45,6 +46,8 @@ int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *
                       unsigned int degree, int32_t x);
 hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
                                bool *limited);
+hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                           hystgen_sum_t here, hystgen_sum_t output);
 #else
 #include "hystgen_tables_float.h"
 

@@ -109,6 +109,27 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
                 assert 0 <= (row.stack or 0) < 400
 
 
+@pytest.mark.parametrize(
+    ("name", "arithmetic", "engine"),
+    [
+        *(("plain", arithmetic, engine) for arithmetic in ("float32", "q31", "q15") for engine in ("corners", "loop")),
+        ("bent", "float32", "corners"),
+        ("curved", "float32", "corners"),
+        ("bent", "q15", "corners"),
+        ("curved", "q15", "corners"),
+    ],
+)
+def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(name: str, arithmetic: str, engine: str) -> None:
+    """Whatever is called, with every compiler and build; float64, without FPU there, and two branches need more."""
+    report = hystgen.verify(
+        model(name), operator="both", arithmetic=arithmetic, engine=engine, targets=["cortex-m4f"], target_length=1500
+    )
+    assert report.ok, report.table()
+    used = [row.stack for row in report.rows if row.stack is not None]
+    assert len(used) == (8 if shutil.which(targets.ARM_GCC) else 4)
+    assert max(used) <= 128, report.table()
+
+
 @pytest.mark.parametrize("core", ["cortex-m0plus", "cortex-m4f", "rv32imac"])
 def test_one_changed_table_entry_is_found_on_a_core(core: str, changed_c: Callable[..., None]) -> None:
     def change(text: str) -> str:

@@ -214,10 +214,11 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     roots = {f"hystgen_{engine}_rest", f"hystgen_{engine}_absorb"}
     if values.start_list:
         roots.add(f"hystgen_{engine}_start")
-    if options.forward or values.branches:
+    known = values.fast and family.fixed  # the output that a step begins at
+    if options.forward or values.branches or known:
         roots.add(f"hystgen_{engine}_output")
     if options.inverse:
-        roots.add(f"hystgen_{engine}_solve")
+        roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
     if values.fast:
         roots.add("hystgen_copy_place")
     if values.fast and family.fixed:

@@ -76,6 +76,9 @@ FAMILIES = {
 }
 
 
+NOINLINE = "#if defined(__GNUC__)\n__attribute__((noinline))\n#endif\n"
+
+
 def data_folder(name: str) -> Path:
     """`templates` or `c_runtime`: inside the installed package, or at the top of the checkout."""
     package = Path(__file__).resolve().parent.parent
@@ -159,6 +162,7 @@ def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
+    text = text.replace("HYSTGEN_NOINLINE ", NOINLINE)
     text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
     text = text.replace("HYSTGEN_SUM_MAX", family.sum_max)
     return _named(text, prefix, family)

@@ -276,12 +276,17 @@ static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved
 }
 
 /* Writes the corner that turning back leaves into slot c. */
-static void curved_push_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *c)
+static void curved_write_corner(curved_corner_t *c, const curved_memory_t *m, curved_sum_t output)
 {
     c->extremum = m->w;
-    c->output = curved_corners_output(t, m);
+    c->output = output;
     c->end = m->here.k;
     c->side = m->here.rising ? -1 : 1;
+}
+
+static void curved_push_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *c)
+{
+    curved_write_corner(c, m, curved_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */
@@ -371,55 +376,75 @@ static curved_sum_t curved_level(const curved_tables_t *t, const curved_corner_t
     return curved_from(c->output, c->side, t->start_level[k], rising);
 }
 
-/* Input of the plays that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the
-   others. Whole numbers decide which play follows last, so that every engine finds the same. */
-static curved_reach_t curved_corners_locate(const curved_tables_t *t, curved_memory_t *m,
-                                              const curved_corner_t *corner, unsigned int depth, unsigned int begun,
-                                              unsigned int k, bool rising, curved_sum_t output)
+/* Where a move to `output` leads that takes more plays along, or turns back: which plays follow there. */
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static void curved_corners_seek(const curved_tables_t *t, curved_memory_t *m,
+                                                  const curved_corner_t *corner, curved_sum_t output)
+{
+    const bool on = m->there.rising == m->here.rising;
+    const unsigned int depth = !on && m->here.k > 1 ? m->here.depth + 1u : m->here.depth;
+    curved_find_by_output(t, corner, depth, on ? m->here.k + 1u : 1, output, &m->there);
+}
+
+/* Input of the plays that gives `output` in the place that was found. Whole numbers decide which play follows last, so
+   that every engine finds the same. */
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static curved_reach_t curved_corners_land(const curved_tables_t *t, curved_memory_t *m,
+                                                             const curved_corner_t *corner, curved_sum_t output)
 {
     curved_place_t *there = &m->there;
-    curved_reach_t w; /* the last place known to be passed, and the output there */
+    const bool rising = there->rising;
+    const bool on = rising == m->here.rising;
+    const unsigned int k = there->k;
+    curved_reach_t w = m->w; /* the last place known to be passed, and the output there */
     curved_sum_t here;
-    there->rising = rising;
-    curved_find_by_output(t, corner, depth, k, output, there);
-    curved_corners_settle(t, there, corner);
-    k = there->k;
-    if (k > begun) {
+    if (k > (on ? m->here.k : 1u)) {
+        const unsigned int depth = !on && m->here.k > 1 ? m->here.depth + 1u : m->here.depth;
         const curved_corner_t *owner = curved_entered_by(corner, there->depth, depth, k);
         w = curved_activation(t, owner, k - 1, rising);
         here = curved_level(t, owner, k - 1, rising);
         there->anchor = w; /* the same line, from where it begins */
         there->anchor_output = here;
     } else {
-        w = m->w;
-        here = curved_corners_output(t, m);
+        here = m->here.k > 1 ? corner[m->here.depth].output : curved_corners_output(t, m);
     }
     return curved_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
-   that turning back would leave. */
-static curved_reach_t curved_corners_solve(const curved_tables_t *t, curved_memory_t *m,
-                                                  curved_corner_t *corner, curved_sum_t output)
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`, from the output `here` on.
+   Moves nothing, but leaves word for the next absorb of where the answer lies; the free slot above the corners is
+   scratch space for the corner that turning back would leave. One part after the other, so that only one of them is on
+   the stack. */
+static curved_reach_t curved_corners_solve_from(const curved_tables_t *t, curved_memory_t *m,
+                                                       curved_corner_t *corner, curved_sum_t here,
+                                                       curved_sum_t output)
 {
     const curved_place_t *p = &m->here;
-    const curved_sum_t here = curved_corners_output(t, m);
-    unsigned int depth = p->depth;
+    const bool rising = output > here;
     if (output == here) {
         return m->w;
     }
-    if (p->rising ? output > here : output < here) {
-        if (curved_passed(output, p->next_output, p->rising)) {
-            return curved_corners_locate(t, m, corner, depth, p->k, p->k + 1u, p->rising, output);
+    if (rising == p->rising) {
+        if (!curved_passed(output, p->next_output, rising)) {
+            return curved_going(t, m->w, rising ? output - here : here - output, p->k, rising);
         }
-        return curved_going(t, m->w, p->rising ? output - here : here - output, p->k, p->rising);
+    } else if (p->k > 1) {
+        curved_write_corner(&corner[p->depth], m, here);
     }
-    if (p->k > 1) {
-        curved_push_corner(t, m, &corner[depth]);
-        depth = depth + 1;
-    }
-    return curved_corners_locate(t, m, corner, depth, 1, 1, !p->rising, output);
+    m->there.rising = rising;
+    curved_corners_seek(t, m, corner, output);
+    curved_corners_settle(t, &m->there, corner);
+    return curved_corners_land(t, m, corner, output);
+}
+
+static curved_reach_t curved_corners_solve(const curved_tables_t *t, curved_memory_t *m,
+                                                  curved_corner_t *corner, curved_sum_t output)
+{
+    return curved_corners_solve_from(t, m, corner, curved_corners_output(t, m), output);
 }
 
 /* x / 2^bits to the nearest whole number, ties away from zero. */

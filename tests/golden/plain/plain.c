@@ -238,12 +238,17 @@ static plain_real_t plain_corners_output(const plain_tables_t *t, const plain_me
 }
 
 /* Writes the corner that turning back leaves into slot c. */
-static void plain_push_corner(const plain_tables_t *t, const plain_memory_t *m, plain_corner_t *c)
+static void plain_write_corner(plain_corner_t *c, const plain_memory_t *m, plain_real_t output)
 {
     c->extremum = m->w;
-    c->output = plain_corners_output(t, m);
+    c->output = output;
     c->end = m->here.k;
     c->side = m->here.rising ? -1 : 1;
+}
+
+static void plain_push_corner(const plain_tables_t *t, const plain_memory_t *m, plain_corner_t *c)
+{
+    plain_write_corner(c, m, plain_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */

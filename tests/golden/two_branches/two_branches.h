@@ -509,12 +509,17 @@ static two_branches_real_t two_branches_corners_output(const two_branches_tables
 }
 
 /* Writes the corner that turning back leaves into slot c. */
-static void two_branches_push_corner(const two_branches_tables_t *t, const two_branches_memory_t *m, two_branches_corner_t *c)
+static void two_branches_write_corner(two_branches_corner_t *c, const two_branches_memory_t *m, two_branches_real_t output)
 {
     c->extremum = m->w;
-    c->output = two_branches_corners_output(t, m);
+    c->output = output;
     c->end = m->here.k;
     c->side = m->here.rising ? -1 : 1;
+}
+
+static void two_branches_push_corner(const two_branches_tables_t *t, const two_branches_memory_t *m, two_branches_corner_t *c)
+{
+    two_branches_write_corner(c, m, two_branches_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */
