@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,21 +101,39 @@ def refine(
     """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
-    columns = np.arange(len(thresholds))
-    now = _linear(courses, front, shape, weights.non_negative(plain.whole, columns), thresholds, tick)
-    low, high = front.bounds
+    p = weights.non_negative(plain.whole, np.arange(len(thresholds)))
+    return search(lambda s, q: _linear(courses, front, s, q, thresholds, tick), front, shape, p)
+
+
+class Limits(Protocol):
+    """What a shape must keep to."""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of every shape number."""
+
+    def slack(self, shape: Array) -> Array:
+        """What must not be negative beyond the bounds."""
+
+
+def search(
+    linear: Callable[[Array, Array], Shaped], limits: Limits, shape: Array, p: Array, most: int = MOST_STEPS
+) -> Shaped:
+    """The best shape near `shape`; `linear` gives the system that is linear about a shape and weights."""
+    now = linear(shape, p)
+    low, high = limits.bounds
     damping = 1e-3
-    for _ in range(MOST_STEPS):
+    for _ in range(most):
         if damping > 1e6 or now.rms == 0.0:
             break
         try:
-            change, p = solve_linear(now.system.whole, now.weights, now.shape, front, damping)
+            change, p = solve_linear(now.system.whole, now.weights, now.shape, limits, damping)
         except constrained.InfeasibleError:
             break
         moved = np.clip(now.shape + change, low, high)
         if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
             break
-        trial = _linear(courses, front, moved, p, thresholds, tick) if _allowed(front, moved) else None
+        trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
             done = now.rms - trial.rms < 0.5 * ENOUGH * now.rms / now.system.samples
             now, damping = trial, damping * 0.2
@@ -125,8 +144,8 @@ def refine(
     return now
 
 
-def _allowed(front: Front, shape: Array) -> bool:
-    slack = front.slack(shape)
+def _allowed(limits: Limits, shape: Array) -> bool:
+    slack = limits.slack(shape)
     return not len(slack) or float(np.min(slack)) > -1e-6
 
 
@@ -191,7 +210,7 @@ def _rows_with_derivatives(
 
 
 def solve_linear(
-    system: Array, p: Array, shape: Array, front: Front, damping: float
+    system: Array, p: Array, shape: Array, limits: Limits, damping: float
 ) -> tuple[Array, Array]:
     """Change of the shape and new weights that fit a linear system best, under the constraints."""
     k, m = len(p), len(shape)
@@ -199,20 +218,20 @@ def solve_linear(
     tied = np.zeros((m, k + m))
     size = np.linalg.norm(matrix[:, k:], axis=0)
     tied[:, k:] = np.diag(np.sqrt(damping) * np.maximum(size, 1e-12))
-    low, high = front.bounds
-    bounds, limits = constrained.at_least(
+    low, high = limits.bounds
+    bounds, least = constrained.at_least(
         np.concatenate([np.zeros(k), low - shape]), np.concatenate([np.full(k, np.inf), high - shape])
     )
-    slack = front.slack(shape)
+    slack = limits.slack(shape)
     if len(slack):
         slope = np.empty((len(slack), m))
         for j in range(m):
             one = shape.copy()
             one[j] += DIFFERENCE
-            slope[:, j] = (front.slack(one) - slack) / DIFFERENCE
+            slope[:, j] = (limits.slack(one) - slack) / DIFFERENCE
         bounds = np.concatenate([bounds, np.concatenate([np.zeros((len(slack), k)), slope], axis=1)])
-        limits = np.concatenate([limits, np.minimum(-slack, 0.0)])
+        least = np.concatenate([least, np.minimum(-slack, 0.0)])
     solution = constrained.least_squares(
-        np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, limits
+        np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least
     )
     return solution[k:], solution[:k]
