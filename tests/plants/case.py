@@ -1,0 +1,293 @@
+"""What a seed gives: bench, session, plant, noise, the believed model, and the strength of its effects.
+
+Seeds below REPORT are for tuning, those from it on for reporting; nothing else separates the two blocks.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import base, bench, foreign, measure, refit, session
+from .effects import Effect, between, catalogue
+from .plant import Plant
+
+Array = NDArray[np.float64]
+
+KINDS = ("single", "pair", "none", "foreign", "poor", "snr")
+REPORT = 10_000
+"""First seed of the report block."""
+
+NOISE = (2.0e-4, 2.0e-3)
+"""Noise rms as a share of the output range: least, most."""
+
+PURE = 0.3
+"""Most that a fine play sum may leave of an effect-free plant, in units of the noise."""
+
+VISIBLE = 3.0
+SMALL, LARGE = 1300, 5200
+"""Samples a record."""
+
+MOST = {
+    "creep": 0.035,
+    "ageing": 0.3,
+    "thermal": 0.15,
+    "drift": 0.3,
+    "asymmetry": 0.2,
+    "saturation": 0.25,
+    "sensor_nonlinearity": 0.12,
+    "noncongruent": 0.8,
+}
+"""Strength beyond which an effect is no longer one of a real stage; where none is given, 20."""
+
+LEAST = {"resonance": 0.6, "delay": 0.3, "lag": 0.3}
+"""Strength below which the samples of the bench would no longer resolve an effect."""
+
+
+@dataclass(frozen=True)
+class Present:
+    """An effect of the plant, and the rms that it alone leaves after a refit of a fine play sum [output]."""
+
+    effect: Effect
+    unabsorbed: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """Everything about one case; only `measured`, `believed` and the session's known history go to the workflow.
+
+    `clean`: noise-free output of the plant a record, before any foreign fault; `twin`: the same of the plant without
+    its effects; `measured`: columns a record by name; `added`: what the converters added to `clean`; `unabsorbed`,
+    `remainder`: rms left by a fine play sum with and without the effects.
+    """
+
+    kind: str
+    seed: int
+    session: session.Session
+    plant: Plant
+    present: tuple[Present, ...]
+    fault: tuple[str, dict[str, float]] | None
+    converters: measure.Converters
+    clean: tuple[Array, ...]
+    twin: tuple[Array, ...]
+    measured: tuple[dict[str, Array], ...]
+    believed: Believed
+    unabsorbed: float
+    remainder: float
+    session_time: bool
+    rich: bool
+    added: tuple[Array, ...]
+
+    @property
+    def name(self) -> str:
+        """Tells nothing about what the case holds."""
+        return "case_" + hashlib.sha256(f"{self.kind}:{self.seed}".encode()).hexdigest()[:10]
+
+    def noise(self, held_out: bool | None = None) -> float:
+        """Rms of what the converters added [output], over all records or those held out or not; without any fault."""
+        rows = [k for k, r in enumerate(self.session.records) if held_out is None or r.held_out == held_out]
+        return float(np.sqrt(np.mean(np.concatenate([self.added[k] for k in rows]) ** 2)))
+
+
+@dataclass(frozen=True)
+class Believed:
+    """Parameters of the model that the workflow is given: about right, from the plant without effects."""
+
+    thresholds: tuple[float, ...]
+    weights: tuple[float, ...]
+    offset: float
+
+
+def make(kind: str, seed: int, samples: int = SMALL) -> Case:
+    """The case of a kind and seed; `samples` a record, about."""
+    streams = [
+        np.random.Generator(np.random.PCG64(s))
+        for s in np.random.SeedSequence([KINDS.index(kind), seed, samples]).spawn(6)
+    ]
+    names, fault = _contents(kind, seed)
+    stage, course, hysteresis, rich, session_time = _set_up(streams[0], kind, names, fault, samples, seed)
+    span_out = stage.bench.span_out
+    twin = _seen(stage, Plant(hysteresis))
+    remainder = refit.unabsorbed(course, [np.concatenate(twin)], stage.bench.span)[0]
+    noise = max(between(streams[1], *NOISE) * span_out, remainder / PURE)
+    colour = measure.COLOURS[(0, 0, 0, 1, 2)[int(streams[1].integers(5))]]
+    if kind == "none":
+        colour = measure.COLOURS[seed % 3]
+    present, noise = _effects(streams[2], kind, names, stage, course, hysteresis, noise, remainder)
+    plant = Plant(hysteresis, tuple(item.effect for item in present))
+    clean = _seen(stage, plant)
+    unabsorbed = refit.unabsorbed(course, [np.concatenate(clean)], stage.bench.span)[0] if present else remainder
+    converters = measure.draw(streams[3], noise, span_out, stage.bench.span, colour)
+    v = [converters.drive(streams[4], stage.sampled(stage.v, item)) for item in stage.records]
+    y = [converters.output(streams[4], part) for part in clean]
+    added = tuple(seen - part for seen, part in zip(y, clean, strict=True))
+    numbers: dict[str, float] = {}
+    if fault:
+        scenes = [
+            foreign.Scene(stage.times(item), v[k], clean[k], noise, span_out) for k, item in enumerate(stage.records)
+        ]
+        numbers = foreign.FAULTS[fault](streams[5], scenes, v, y)
+        if fault in ("hum", "stick_slip", "ripple"):
+            y = [measure.quantised(part, converters.output_step) for part in y]
+    logged = _logs_temperature(streams[5], stage, present)
+    measured = []
+    for k, item in enumerate(stage.records):
+        t = stage.times(item)
+        columns = {"t": t if session_time else t - t[0], "v": v[k], "y": y[k]}
+        if logged:
+            columns["temperature"] = _thermometer(streams[5], stage, item)
+        measured.append(columns)
+    believed = _believe(streams[5], course, np.concatenate(twin), stage.bench.span)
+    return Case(
+        kind,
+        seed,
+        stage,
+        plant,
+        tuple(present),
+        (fault, numbers) if fault else None,
+        converters,
+        tuple(clean),
+        tuple(twin),
+        tuple(measured),
+        believed,
+        unabsorbed,
+        remainder,
+        session_time,
+        rich,
+        added,
+    )
+
+
+def _contents(kind: str, seed: int) -> tuple[list[str], str | None]:
+    """Names of the effects, and of a foreign fault."""
+    kinds = catalogue()
+    names = sorted(kinds)
+    if kind == "foreign":
+        faults = list(foreign.FAULTS)
+        return [], faults[seed % len(faults)]
+    if kind == "none":
+        return [], None
+    if kind != "pair":
+        return [names[seed % len(names)]], None
+    pairs = [
+        [a, b]
+        for k, a in enumerate(names)
+        for b in names[k + 1 :]
+        if kinds[a].family != kinds[b].family and set(kinds[a].benches) & set(kinds[b].benches)
+        # Viscous and centre-dependent elements are two different kinds of base
+    ]
+    pairs = [pair for pair in pairs if pair != ["noncongruent", "rate_dependence"]]
+    return pairs[(seed * 7) % len(pairs)], None
+
+
+def _set_up(
+    rng: np.random.Generator, kind: str, names: list[str], fault: str | None, samples: int, seed: int
+) -> tuple[session.Session, refit.Track, base.Base, bool, bool]:
+    kinds = catalogue()
+    able = [k for k in bench.KINDS if all(k in kinds[name].benches for name in names)]
+    if fault == "hum":
+        able = ["dynamic", "mixed"]
+    chosen = able[int(rng.integers(len(able)))]
+    stand = bench.draw(rng, chosen, samples)
+    if fault == "hum":
+        stand = replace(stand, rates=(stand.rates[0], min(stand.rates[1], 5000.0)))
+        if chosen == "dynamic":
+            stand = replace(stand, rates=(stand.rates[1], stand.rates[1]))
+    known = bool(rng.uniform() < 0.5) if kind != "none" else seed % 2 == 0
+    rich = kind != "poor"
+    waveforms = session.rich(rng, int(rng.integers(9, 12))) if rich else session.poor(rng)
+    stage = session.plan(rng, stand, known, waveforms)
+    hysteresis = base.draw(rng, stand.low, stand.high, stand.span_out, base.KINDS[int(rng.integers(len(base.KINDS)))])
+    session_time = chosen != "dynamic" or bool(rng.uniform() < 0.5)
+    return stage, refit.track(stage), hysteresis, rich, session_time
+
+
+def _seen(stage: session.Session, plant: Plant) -> list[Array]:
+    fine = plant.respond(stage)
+    return [stage.sampled(fine, item) for item in stage.records]
+
+
+def _effects(
+    rng: np.random.Generator,
+    kind: str,
+    names: list[str],
+    stage: session.Session,
+    course: refit.Track,
+    hysteresis: base.Base,
+    noise: float,
+    remainder: float,
+) -> tuple[list[Present], float]:
+    """Effects of a strength that real stages have, with noise and strength fitted to a wanted ratio of the two."""
+    least = max(NOISE[0] * stage.bench.span_out, remainder / PURE)
+    most = max(NOISE[1] * stage.bench.span_out, least)
+    present: list[Present] = []
+    for name in names:
+        wanted = between(rng, 0.3, 12.0) if kind == "snr" else between(rng, 3.4, 30.0)
+        best: Present | None = None
+        for _ in range(5):
+            effect = catalogue()[name].draw(rng, stage.bench)
+            found = _left(stage, course, hysteresis, effect)
+            if not present:
+                noise = min(max(found / wanted, least), most)
+            effect, found = _scaled(stage, course, hysteresis, effect, found, wanted * noise)
+            if best is None or abs(np.log(found / wanted / noise)) < abs(np.log(best.unabsorbed / wanted / noise)):
+                best = Present(effect, found)
+            if 0.8 < found / (wanted * noise) < 1.25:
+                break
+        assert best is not None
+        present.append(best)
+    return present, noise
+
+
+def _left(stage: session.Session, course: refit.Track, hysteresis: base.Base, effect: Effect) -> float:
+    output = np.concatenate(_seen(stage, Plant(hysteresis, (effect,))))
+    return max(refit.unabsorbed(course, [output], stage.bench.span)[0], 1e-12 * stage.bench.span_out)
+
+
+def _scaled(
+    stage: session.Session, course: refit.Track, hysteresis: base.Base, effect: Effect, found: float, wanted: float
+) -> tuple[Effect, float]:
+    limit = MOST.get(effect.name, 20.0)
+    if effect.form == "soft_rails":
+        limit = 1.1
+    for _ in range(4):
+        if 0.8 < found / wanted < 1.25:
+            break
+        factor = float(np.clip(wanted / found, 0.25, 4.0))
+        factor = min(max(factor, LEAST.get(effect.name, 0.0) / abs(effect.strength)), limit / abs(effect.strength))
+        if abs(factor - 1.0) < 0.02:
+            break
+        effect = effect.scaled(factor)
+        found = _left(stage, course, hysteresis, effect)
+    return effect, found
+
+
+def _logs_temperature(rng: np.random.Generator, stage: session.Session, present: list[Present]) -> bool:
+    # Some benches log it though nothing follows it
+    decoy = bool(rng.uniform() < 0.25) and stage.bench.kind == "static"
+    return decoy or any(item.effect.form == "room" for item in present)
+
+
+def _thermometer(rng: np.random.Generator, stage: session.Session, item: session.Planned) -> Array:
+    true = stage.sampled(stage.temperature, item)
+    return measure.quantised(true + 0.01 * rng.standard_normal(len(true)), 0.01)
+
+
+def _believe(rng: np.random.Generator, course: refit.Track, output: Array, span: float) -> Believed:
+    number = int(rng.integers(8, 16))
+    thresholds = np.concatenate(([0.0], np.sort(rng.uniform(0.9, 1.1, number) * refit.radii(0.9 * span, number + 1)[1:])))
+    record = course.record[course.seen]
+    columns = refit.plays(course.v, thresholds)[course.seen]
+    y = refit.centred(output, record)
+    weights = refit.fit(refit.centred(columns, record), y)
+    weights[0] = max(weights[0], 0.05 * weights.sum())
+    weights = weights * rng.uniform(0.97, 1.03) * (1.0 + 0.04 * rng.standard_normal(len(weights)))
+    weights = np.maximum(weights, 0.0)
+    thresholds = thresholds * rng.uniform(0.97, 1.03)
+    offset = float(np.mean(output) - np.mean(columns @ weights))
+    return Believed(
+        tuple(float(f"{x:.5g}") for x in thresholds), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}")
+    )

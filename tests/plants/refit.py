@@ -1,0 +1,114 @@
+"""A fine play sum fitted to records by non-negative least squares: how much of a signal such a sum can swallow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from .session import Session
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FINE = 48
+"""Plays of the sum that decides what is left unabsorbed."""
+
+RIDGE = 1e-9
+
+
+@dataclass(frozen=True)
+class Track:
+    """Samples of all records in order, with the drive between the records: `record` is -1 there."""
+
+    t: Array
+    v: Array
+    record: Ints
+    held_out: NDArray[np.bool_]
+    """One a record."""
+
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        return self.record >= 0
+
+    def of(self, held_out: bool) -> NDArray[np.bool_]:
+        """Which of the seen samples belong to held-out records, or to the others."""
+        return self.held_out[self.record[self.seen]] == held_out
+
+
+def track(session: Session) -> Track:
+    t, v, record = [], [], []
+    last = 0
+    for k, item in enumerate(session.records):
+        t += [session.t[last : item.first], session.times(item)]
+        v += [session.v[last : item.first], session.sampled(session.v, item)]
+        record += [np.full(item.first - last, -1), np.full(item.samples, k)]
+        last = item.fine.stop
+    return Track(
+        np.concatenate(t), np.concatenate(v), np.concatenate(record), np.array([r.held_out for r in session.records])
+    )
+
+
+@njit(cache=True)
+def plays(v: Array, radii: Array) -> Array:
+    """Play of each half width, shape (N, n), all dragged from below at the start."""
+    out = np.empty((len(v), len(radii)))
+    for i in range(len(radii)):
+        r = radii[i]
+        s = v[0] - r
+        for k in range(len(v)):
+            s = max(v[k] - r, min(v[k] + r, s))
+            out[k, i] = s
+    return out
+
+
+def radii(span: float, number: int) -> Array:
+    """Half widths from 0 to half the span, denser at small ones."""
+    x = np.linspace(0.0, 1.0, number)
+    return np.asarray(0.5 * span * (0.35 * x + 0.65 * x * x) * (1.0 - 1e-6))
+
+
+def centred(columns: Array, record: Ints) -> Array:
+    """Columns less their mean over each record, whose samples lie together: a free offset a record."""
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(record)) + 1))
+    counts = np.diff(np.append(starts, len(record)))
+    means = np.add.reduceat(columns, starts, axis=0).T / counts
+    return np.asarray(columns - np.repeat(means.T, counts, axis=0))
+
+
+def fit(columns: Array, y: Array, free: int = 0) -> Array:
+    """Weights that are not negative but for the last `free`; columns (N, n) and y (N,) have no mean."""
+    scale = np.sqrt(np.mean(columns * columns, axis=0)) + 1e-300
+    scaled = columns / scale
+    if free:
+        scaled = np.hstack((scaled, -scaled[:, -free:]))
+    gram = scaled.T @ scaled
+    gram[np.diag_indices_from(gram)] += RIDGE * len(y)
+    factor = np.linalg.cholesky(gram)
+    found, _ = nnls(factor.T, np.linalg.solve(factor, scaled.T @ y), maxiter=50 * len(gram))
+    if free:
+        found[len(scale) - free : len(scale)] -= found[len(scale) :]
+    return np.asarray(found[: len(scale)] / scale)
+
+
+def unabsorbed(course: Track, outputs: Sequence[Array], span: float) -> list[float]:
+    """Rms that is left of each noise-free output (seen samples) after a joint refit to all records."""
+    record = course.record[course.seen]
+    columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
+    left = []
+    for output in outputs:
+        y = centred(output, record)
+        left.append(float(np.sqrt(np.mean((y - columns @ fit(columns, y)) ** 2))))
+    return left
+
+
+def residual(course: Track, output: Array, span: float) -> Array:
+    """What is left of an output (seen samples) after the refit of `unabsorbed`."""
+    record = course.record[course.seen]
+    columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
+    y = centred(output, record)
+    return np.asarray(y - columns @ fit(columns, y))

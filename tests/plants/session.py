@@ -1,0 +1,149 @@
+"""A session of records on a bench: the drive on a fine time grid, including what happens between the records."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import drives
+from .bench import Bench
+
+Array = NDArray[np.float64]
+
+FINER = 8
+"""Fine steps a sample of a record."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One record: waveform by name, held out or not, its rate [1/s], and its samples on the fine grid, which are
+    FINER steps each from fine index `first` on."""
+
+    waveform: str
+    held_out: bool
+    rate: float
+    first: int
+    samples: int
+
+    @property
+    def fine(self) -> slice:
+        return slice(self.first, self.first + FINER * self.samples)
+
+
+@dataclass(frozen=True)
+class Session:
+    """`t` [s], `v` [input] on the fine grid; `history`, `rest` before each record where they are known."""
+
+    bench: Bench
+    t: Array
+    v: Array
+    records: tuple[Planned, ...]
+    history: tuple[float, ...] | None
+    rest: float | None
+    temperature: Array
+    aperture: int
+    """Fine steps in the middle of a sample over which both converters average."""
+
+    @property
+    def dt(self) -> Array:
+        return np.diff(self.t, prepend=self.t[0])
+
+    def sampled(self, fine: Array, record: Planned) -> Array:
+        """A fine signal as the converter sees it, without noise."""
+        parts = fine[record.fine].reshape(record.samples, FINER)
+        half = self.aperture // 2
+        return np.asarray(parts[:, FINER // 2 - half : FINER // 2 + half].mean(axis=1))
+
+    def times(self, record: Planned) -> Array:
+        """Session time of the samples."""
+        parts = self.t[record.fine].reshape(record.samples, FINER)
+        return np.asarray(parts.mean(axis=1))
+
+
+def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: list[tuple[str, drives.Drive, bool]]) -> Session:
+    """Drive a bench through records with the given waveforms (name, generator, held out) in this order."""
+    pace = 0.06 * bench.short if bench.kind == "dynamic" else 0.06 * bench.long
+    rest = _round(rng.uniform(0.5, 4.0) * (bench.short if bench.kind == "dynamic" else 0.3 * bench.long))
+    history = None
+    if known:
+        ends = [[bench.high, bench.low], [bench.low, bench.high], [bench.high, bench.low, bench.middle]]
+        history = tuple(ends[int(rng.integers(3))])
+    t: list[Array] = [np.zeros(1)]
+    v: list[Array] = [np.array([bench.low + bench.span * rng.uniform(0.0, 1.0)])]
+    records = []
+
+    def now() -> tuple[float, float]:
+        return float(t[-1][-1]), float(v[-1][-1])
+
+    for name, waveform, held_out in waveforms:
+        turns = history or tuple(bench.low + bench.span * rng.uniform(0.0, 1.0, int(rng.integers(1, 4))))
+        for turn in turns:
+            clock, start = now()
+            t.append(clock + np.linspace(0.0, pace, 81)[1:])
+            v.append(np.linspace(start, turn, 81)[1:])
+        clock, start = now()
+        pause = rest if known else rest * rng.uniform(0.3, 2.0)
+        t.append(clock + pause * np.geomspace(1e-4, 1.0, 50))
+        v.append(np.full(50, start))
+        clock, start = now()
+        rate = bench.rates[1] if _is_fast(rng, bench, name) else bench.rates[0]
+        fine = (np.arange(FINER * bench.samples) + 0.5) / FINER
+        records.append(Planned(name, held_out, rate, sum(map(len, t)), bench.samples))
+        relative = waveform(rng, fine / bench.samples, (start - bench.low) / bench.span, 1.0 / bench.samples)
+        t.append(clock + (fine + 0.5) / rate)
+        v.append(bench.low + bench.span * relative)
+    clock = np.concatenate(t)
+    room = _room(rng, clock)
+    aperture = 2 if rng.uniform() < 0.6 else 4
+    return Session(bench, clock, np.concatenate(v), tuple(records), history, rest if known else None, room, aperture)
+
+
+def rich(rng: np.random.Generator, records: int) -> list[tuple[str, drives.Drive, bool]]:
+    """Waveforms that can show every effect of the bench; the held-out ones lie anywhere but at the very start."""
+    names = list(drives.FIT)
+    fit = [(name, drives.FIT[name], False) for name in names[: max(records - 3, 5)]]
+    fit = [fit[k] for k in rng.permutation(len(fit))]
+    others = list(drives.HELD_OUT)
+    chosen = ["staircase", "reversals", others[2 + int(rng.integers(2))]]
+    order = [*fit]
+    for name in chosen:
+        order.insert(int(rng.integers(2, len(order) + 1)), (name, drives.HELD_OUT[name], True))
+    return order
+
+
+def poor(rng: np.random.Generator) -> list[tuple[str, drives.Drive, bool]]:
+    """One waveform at one speed and size, again and again: one sine, or one slow triangle."""
+    if rng.uniform() < 0.6:
+        waveform = drives.sine(round(rng.uniform(4.0, 9.0)), rng.uniform(0.25, 0.5))
+        name = "sine"
+    else:
+        waveform, name = drives.triangle((2.0, 2.0)), "slow"
+    number = int(rng.integers(1, 3))
+    return [(name, waveform, k == number) for k in range(number + 1)]
+
+
+def _is_fast(rng: np.random.Generator, bench: Bench, name: str) -> bool:
+    if bench.kind != "mixed":
+        return True
+    if name in ("fast", "sweep", "staircase"):
+        return True
+    if name in ("slow", "holds", "minor", "reversals"):
+        return False
+    return bool(rng.uniform() < 0.5)
+
+
+def _room(rng: np.random.Generator, t: Array) -> Array:
+    """Temperature of the room [degC]: some degrees up and down over the session."""
+    x = (t - t[0]) / (t[-1] - t[0])
+    out = np.zeros_like(x)
+    for _ in range(3):
+        out += rng.uniform(0.4, 1.0) * np.sin(2.0 * math.pi * rng.uniform(0.5, 2.5) * x + rng.uniform(0.0, 6.0))
+    return np.asarray(22.0 + rng.uniform(-1.5, 1.5) + rng.uniform(0.5, 2.5) * out + rng.uniform(-2.0, 2.0) * x)
+
+
+def _round(x: float) -> float:
+    """Two significant digits: what somebody writes down."""
+    return float(f"{x:.2g}")
