@@ -224,8 +224,8 @@ def _relays(v: Array, radii: Array, origin: Array, pitch: float, totals: Array) 
     for k in range(len(v)):
         total = 0.0
         for i in range(rows):
-            switched_up = int(math.floor((v[k] - radii[i] - origin[i]) / pitch)) + 1
-            still_up = int(math.floor((v[k] + radii[i] - origin[i]) / pitch)) + 1
+            switched_up = math.floor((v[k] - radii[i] - origin[i]) / pitch) + 1
+            still_up = math.floor((v[k] + radii[i] - origin[i]) / pitch) + 1
             count = min(max(up[i], switched_up), still_up)
             count = min(max(count, 0), most)
             up[i] = count

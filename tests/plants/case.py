@@ -278,7 +278,8 @@ def _thermometer(rng: np.random.Generator, stage: session.Session, item: session
 
 def _believe(rng: np.random.Generator, course: refit.Track, output: Array, span: float) -> Believed:
     number = int(rng.integers(8, 16))
-    thresholds = np.concatenate(([0.0], np.sort(rng.uniform(0.9, 1.1, number) * refit.radii(0.9 * span, number + 1)[1:])))
+    even = refit.radii(0.9 * span, number + 1)[1:]
+    thresholds = np.concatenate(([0.0], np.sort(rng.uniform(0.9, 1.1, number) * even)))
     record = course.record[course.seen]
     columns = refit.plays(course.v, thresholds)[course.seen]
     y = refit.centred(output, record)

@@ -12,12 +12,12 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .case import VISIBLE
 from .effects import catalogue
 
 EDGES = (0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0, 12.0, float("inf"))
@@ -197,7 +197,7 @@ def curve(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Naming rate of single effects with rich excitation against unabsorbed rms over noise."""
     some = [*_of(outcomes, "single"), *_of(outcomes, "snr")]
     rows = []
-    for low, high in zip(EDGES, EDGES[1:], strict=False):
+    for low, high in pairwise(EDGES):
         bin_ = [x for x in some if low <= x.label["effects"][0]["ratio"] < high]
         if bin_:
             rows.append(
@@ -246,7 +246,11 @@ def main(cases: Path, labels: Path, results: Path, report: Path | None = None) -
 def text(outcomes: Sequence[Outcome], judged: Sequence[Figure]) -> str:
     """The whole report."""
     seeds = {block: [x.label["seed"] for x in outcomes if x.label["block"] == block] for block in ("tune", "report")}
-    lines = [f"{len(part)} cases of the {block} block, seeds {min(part)} to {max(part)}" for block, part in seeds.items() if part]
+    lines = [
+        f"{len(part)} cases of the {block} block, seeds {min(part)} to {max(part)}"
+        for block, part in seeds.items()
+        if part
+    ]
     lines += ["", *_matrix(confusion(outcomes)), ""]
     for x in judged:
         shown = f"{x.value:8.3f}" if x.at_least or x.value != int(x.value) or x.limit else f"{x.value:8.0f}"
@@ -257,9 +261,8 @@ def text(outcomes: Sequence[Outcome], judged: Sequence[Figure]) -> str:
         lines += ["", "unabsorbed rms over noise   cases   right   wrong  silent"]
         for row in rows:
             top = f"{row['to']:g}" if row["to"] else "more"
-            lines.append(
-                f"{row['from']:12g} to {top:10s}{row['cases']:8d}{row['right']:8.2f}{row['wrong']:8.2f}{row['silent']:8.2f}"
-            )
+            shares = "".join(f"{row[key]:8.2f}" for key in ("right", "wrong", "silent"))
+            lines.append(f"{row['from']:12g} to {top:10s}{row['cases']:8d}{shares}")
     times = _seconds(outcomes)
     if times:
         lines += ["", "seconds a case: median {median:.1f}, 90 % {most:.1f}, longest {longest:.1f}".format(**times)]
@@ -287,7 +290,8 @@ def _told(x: Outcome) -> str:
     answer = ", ".join(x.names) or x.column
     alike = "; alike " + ", ".join("/".join(sorted(group)) for group in x.groups) if x.groups else ""
     left = "" if x.residual is None else f", left {x.residual:.2f} noise"
-    return f"{x.label['case']} {x.label['kind']} {x.label['seed']} ({x.label['bench']}): {ratios} -> {answer}{alike}{left}"
+    which = f"{x.label['case']} {x.label['kind']} {x.label['seed']} ({x.label['bench']})"
+    return f"{which}: {ratios} -> {answer}{alike}{left}"
 
 
 def _matrix(table: dict[str, Counter[str]]) -> list[str]:

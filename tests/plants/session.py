@@ -63,8 +63,12 @@ class Session:
         return np.asarray(parts.mean(axis=1))
 
 
-def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: list[tuple[str, drives.Drive, bool]]) -> Session:
-    """Drive a bench through records with the given waveforms (name, generator, held out) in this order."""
+Waveforms = list[tuple[str, drives.Drive, bool]]
+"""Name, generator, held out or not, in the order of the session."""
+
+
+def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: Waveforms) -> Session:
+    """Drive a bench through records with the given waveforms."""
     pace = 0.06 * bench.short if bench.kind == "dynamic" else 0.06 * bench.long
     rest = _round(rng.uniform(0.5, 4.0) * (bench.short if bench.kind == "dynamic" else 0.3 * bench.long))
     history = None
@@ -101,7 +105,7 @@ def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: list[tu
     return Session(bench, clock, np.concatenate(v), tuple(records), history, rest if known else None, room, aperture)
 
 
-def rich(rng: np.random.Generator, records: int) -> list[tuple[str, drives.Drive, bool]]:
+def rich(rng: np.random.Generator, records: int) -> Waveforms:
     """Waveforms that can show every effect of the bench; the held-out ones lie anywhere but at the very start."""
     names = list(drives.FIT)
     fit = [(name, drives.FIT[name], False) for name in names[: max(records - 3, 5)]]
@@ -114,7 +118,7 @@ def rich(rng: np.random.Generator, records: int) -> list[tuple[str, drives.Drive
     return order
 
 
-def poor(rng: np.random.Generator) -> list[tuple[str, drives.Drive, bool]]:
+def poor(rng: np.random.Generator) -> Waveforms:
     """One waveform at one speed and size, again and again: one sine, or one slow triangle."""
     if rng.uniform() < 0.6:
         waveform = drives.sine(round(rng.uniform(4.0, 9.0)), rng.uniform(0.25, 0.5))

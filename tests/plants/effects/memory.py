@@ -36,7 +36,8 @@ def draw_noncongruent(rng: np.random.Generator, bench: Bench) -> Effect:
     sign = 1.0 if rng.uniform() < 0.5 else -1.0
     strength = between(rng, 0.1, 0.4) * (0.6 if form == "bend" else 1.0)
     middle = bench.low + bench.span * rng.uniform(0.3, 0.7)
-    return Effect("noncongruent", form, sign * strength, values(middle=middle, width=bench.span * rng.uniform(0.12, 0.3)))
+    numbers = values(middle=middle, width=bench.span * rng.uniform(0.12, 0.3))
+    return Effect("noncongruent", form, sign * strength, numbers)
 
 
 def centre(effect: Effect) -> base.Centre | None:
