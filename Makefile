@@ -3,7 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint fuzz clean
+# Seeds of each kind that `make blind` takes from the report block, and where it works
+BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
+BLIND_DIR := build/blind
+JOBS := 2
+
+.PHONY: demo test lint fuzz blind clean
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -31,6 +36,14 @@ lint: $(VENV)/ready
 # Eight modules, five minutes each
 fuzz: $(VENV)/ready
 	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
+
+# About two hours: an hour to make the cases, the rest to diagnose them
+blind: $(VENV)/ready
+	set -e; for part in $(BLIND); do $(BIN)/python -m tests.plants generate --block report --kind $${part%=*} \
+	    --seeds 0:$${part#*=} -o $(BLIND_DIR) --jobs $(JOBS); done
+	$(BIN)/python -m tests.plants run $(BLIND_DIR)/cases -o $(BLIND_DIR)/results --jobs $(JOBS)
+	$(BIN)/python -m tests.plants score $(BLIND_DIR)/cases $(BLIND_DIR)/labels $(BLIND_DIR)/results \
+	    --json $(BLIND_DIR)/score.json
 
 clean:
 	rm -rf $(VENV) build dist
