@@ -95,7 +95,7 @@ def draw(rng: np.random.Generator, low: float, high: float, span_out: float, kin
     if kind == "relays":
         base = replace(base, phases=rng.uniform(0.0, 1.0, ROWS))
     if kind == "bouc_wen":
-        share = scale * rng.uniform(0.002, 0.02)
+        share = scale * rng.uniform(0.001, 0.01)
         base = replace(base, bouc_wen=(share, span * rng.uniform(0.05, 0.2), rng.uniform(-0.3, 0.6), 1.0))
     return base
 

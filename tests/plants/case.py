@@ -6,6 +6,7 @@ Seeds below REPORT are for tuning, those from it on for reporting; nothing else 
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,10 +25,13 @@ REPORT = 10_000
 NOISE = (2.0e-4, 2.0e-3)
 """Noise rms as a share of the output range: least, most."""
 
-PURE = 0.3
+PURE = 0.25
 """Most that a fine play sum may leave of an effect-free plant, in units of the noise."""
 
 VISIBLE = 3.0
+CLOSE = 0.25
+"""Largest log of the ratio between the wanted and the made strength."""
+
 SMALL, LARGE = 1300, 5200
 """Samples a record."""
 
@@ -43,16 +47,18 @@ MOST = {
 }
 """Strength beyond which an effect is no longer one of a real stage; where none is given, 20."""
 
-LEAST = {"resonance": 0.6, "delay": 0.3, "lag": 0.3}
+LEAST = {"resonance": 0.6, "slew_limit": 0.6, "delay": 0.3, "lag": 0.3}
 """Strength below which the samples of the bench would no longer resolve an effect."""
 
 
 @dataclass(frozen=True)
 class Present:
-    """An effect of the plant, and the rms that it alone leaves after a refit of a fine play sum [output]."""
+    """An effect of the plant, and the rms that it alone leaves after a refit of a fine play sum [output], in all
+    records and in the held-out ones."""
 
     effect: Effect
     unabsorbed: float
+    held_out: float
 
 
 @dataclass(frozen=True)
@@ -111,7 +117,7 @@ def make(kind: str, seed: int, samples: int = SMALL) -> Case:
     stage, course, hysteresis, rich, session_time = _set_up(streams[0], kind, names, fault, samples, seed)
     span_out = stage.bench.span_out
     twin = _seen(stage, Plant(hysteresis))
-    remainder = refit.unabsorbed(course, [np.concatenate(twin)], stage.bench.span)[0]
+    remainder = refit.unabsorbed(course, np.concatenate(twin), stage.bench.span)[0]
     noise = max(between(streams[1], *NOISE) * span_out, remainder / PURE)
     colour = measure.COLOURS[(0, 0, 0, 1, 2)[int(streams[1].integers(5))]]
     if kind == "none":
@@ -119,7 +125,7 @@ def make(kind: str, seed: int, samples: int = SMALL) -> Case:
     present, noise = _effects(streams[2], kind, names, stage, course, hysteresis, noise, remainder)
     plant = Plant(hysteresis, tuple(item.effect for item in present))
     clean = _seen(stage, plant)
-    unabsorbed = refit.unabsorbed(course, [np.concatenate(clean)], stage.bench.span)[0] if present else remainder
+    unabsorbed = refit.unabsorbed(course, np.concatenate(clean), stage.bench.span)[0]
     converters = measure.draw(streams[3], noise, span_out, stage.bench.span, colour)
     v = [converters.drive(streams[4], stage.sampled(stage.v, item)) for item in stage.records]
     y = [converters.output(streams[4], part) for part in clean]
@@ -225,44 +231,49 @@ def _effects(
     most = max(NOISE[1] * stage.bench.span_out, least)
     present: list[Present] = []
     for name in names:
-        wanted = between(rng, 0.3, 12.0) if kind == "snr" else between(rng, 3.4, 30.0)
+        wanted = between(rng, 0.3, 12.0) if kind == "snr" else between(rng, 1.3 * VISIBLE, 30.0)
         best: Present | None = None
         for _ in range(5):
             effect = catalogue()[name].draw(rng, stage.bench)
-            found = _left(stage, course, hysteresis, effect)
+            item = _alone(stage, course, hysteresis, effect)
             if not present:
-                noise = min(max(found / wanted, least), most)
-            effect, found = _scaled(stage, course, hysteresis, effect, found, wanted * noise)
-            if best is None or abs(np.log(found / wanted / noise)) < abs(np.log(best.unabsorbed / wanted / noise)):
-                best = Present(effect, found)
-            if 0.8 < found / (wanted * noise) < 1.25:
+                noise = min(max(item.unabsorbed / wanted, least), most)
+            item = _scaled(stage, course, hysteresis, item, wanted * noise)
+            if best is None or _off(item, wanted * noise) < _off(best, wanted * noise):
+                best = item
+            if _off(item, wanted * noise) < CLOSE:
                 break
         assert best is not None
         present.append(best)
     return present, noise
 
 
-def _left(stage: session.Session, course: refit.Track, hysteresis: base.Base, effect: Effect) -> float:
+def _alone(stage: session.Session, course: refit.Track, hysteresis: base.Base, effect: Effect) -> Present:
     output = np.concatenate(_seen(stage, Plant(hysteresis, (effect,))))
-    return max(refit.unabsorbed(course, [output], stage.bench.span)[0], 1e-12 * stage.bench.span_out)
+    least = 1e-12 * stage.bench.span_out
+    everywhere, held_out = refit.unabsorbed(course, output, stage.bench.span)
+    return Present(effect, max(everywhere, least), max(held_out, least))
+
+
+def _off(item: Present, wanted: float) -> float:
+    """How far the strength is from the wanted one; held-out records have to show at least half of it."""
+    return max(abs(math.log(item.unabsorbed / wanted)), math.log(0.5 * wanted / item.held_out))
 
 
 def _scaled(
-    stage: session.Session, course: refit.Track, hysteresis: base.Base, effect: Effect, found: float, wanted: float
-) -> tuple[Effect, float]:
-    limit = MOST.get(effect.name, 20.0)
-    if effect.form == "soft_rails":
+    stage: session.Session, course: refit.Track, hysteresis: base.Base, item: Present, wanted: float
+) -> Present:
+    limit = MOST.get(item.effect.name, 20.0)
+    if item.effect.form == "soft_rails":
         limit = 1.1
     for _ in range(4):
-        if 0.8 < found / wanted < 1.25:
+        size = abs(item.effect.strength)
+        factor = float(np.clip(wanted / item.unabsorbed, 0.25, 4.0))
+        factor = min(max(factor, LEAST.get(item.effect.name, 0.0) / size), limit / size)
+        if abs(math.log(item.unabsorbed / wanted)) < CLOSE or abs(factor - 1.0) < 0.02:
             break
-        factor = float(np.clip(wanted / found, 0.25, 4.0))
-        factor = min(max(factor, LEAST.get(effect.name, 0.0) / abs(effect.strength)), limit / abs(effect.strength))
-        if abs(factor - 1.0) < 0.02:
-            break
-        effect = effect.scaled(factor)
-        found = _left(stage, course, hysteresis, effect)
-    return effect, found
+        item = _alone(stage, course, hysteresis, item.effect.scaled(factor))
+    return item
 
 
 def _logs_temperature(rng: np.random.Generator, stage: session.Session, present: list[Present]) -> bool:

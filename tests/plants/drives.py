@@ -76,10 +76,14 @@ def holds(rng: np.random.Generator, t: Array, start: float, sample: float) -> Ar
 
 def staircase(rng: np.random.Generator, t: Array, start: float, sample: float) -> Array:
     points = [(0.0, start), (0.02, start)]
-    levels = [*rng.permutation([1.0, 0.03, *rng.uniform(0.1, 0.9, 5)])]
-    for level in levels:
-        edge = rng.uniform(3.0, 8.0) * sample if rng.uniform() < 0.7 else rng.uniform(0.01, 0.03)
-        points += [(edge, float(level)), (rng.uniform(0.04, 0.16), float(level))]
+    levels = rng.uniform(0.1, 0.9, 5).tolist()
+    first = int(rng.integers(3))
+    # One full-scale step down and one up, among smaller ones
+    levels[first:first] = [1.0, 0.0, 0.97]
+    for k, level in enumerate(levels):
+        full = first < k < first + 3
+        edge = rng.uniform(3.0, 8.0) * sample if full or rng.uniform() < 0.6 else rng.uniform(0.01, 0.03)
+        points += [(edge, level), (rng.uniform(0.04, 0.16), level)]
     return path(t, sample, points)
 
 

@@ -78,6 +78,7 @@ def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
                 "values": dict(item.effect.values),
                 "unabsorbed": item.unabsorbed,
                 "ratio": item.unabsorbed / noise,
+                "ratio_holdout": item.held_out / case.noise(True),
                 "rivals": {name: _digits(x) for name, x in sorted(against.items(), key=lambda pair: pair[1])},
                 "indistinguishable": sorted(
                     name for name, x in against.items() if x <= rivals.ALIKE and name != item.effect.name

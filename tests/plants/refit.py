@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,20 +94,15 @@ def fit(columns: Array, y: Array, free: int = 0) -> Array:
     return np.asarray(found[: len(scale)] / scale)
 
 
-def unabsorbed(course: Track, outputs: Sequence[Array], span: float) -> list[float]:
-    """Rms that is left of each noise-free output (seen samples) after a joint refit to all records."""
-    record = course.record[course.seen]
-    columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
-    left = []
-    for output in outputs:
-        y = centred(output, record)
-        left.append(float(np.sqrt(np.mean((y - columns @ fit(columns, y)) ** 2))))
-    return left
-
-
 def residual(course: Track, output: Array, span: float) -> Array:
-    """What is left of an output (seen samples) after the refit of `unabsorbed`."""
+    """What is left of a noise-free output (seen samples) after a joint refit to all records."""
     record = course.record[course.seen]
     columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
     y = centred(output, record)
     return np.asarray(y - columns @ fit(columns, y))
+
+
+def unabsorbed(course: Track, output: Array, span: float) -> tuple[float, float]:
+    """Rms of `residual` over all records, and over the held-out ones alone."""
+    left = residual(course, output, span)
+    return float(np.sqrt(np.mean(left**2))), float(np.sqrt(np.mean(left[course.of(True)] ** 2)))

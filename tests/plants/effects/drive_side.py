@@ -30,7 +30,7 @@ def delay(effect: Effect, x: Array, around: Surroundings) -> Array:
 
 def draw_slew(rng: np.random.Generator, bench: Bench) -> Effect:
     # At strength 1 a full-scale move takes this many samples; edges of steps are made in three to eight
-    samples = between(rng, 12.0, 60.0)
+    samples = between(rng, 15.0, 60.0)
     rate = bench.span * bench.rates[1] / samples
     return Effect("slew_limit", "current", 1.0, values(rising=rate, falling=rate * rng.uniform(0.7, 1.4)))
 
