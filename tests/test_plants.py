@@ -430,7 +430,8 @@ def outcome(
         "unexplained": more.get("unexplained", []),
         "gap": {"after": {"holdout": 2.0 * residual}},
     }
-    return score.Outcome(label, None if more.get("missing") else found, {"exit": more.get("exit", 0), "seconds": 1.0})
+    ran = {"exit": more.get("exit", 0), "seconds": 1.0, "stderr": more.get("said", "r01.csv:3:1: error: no number\n")}
+    return score.Outcome(label, None if more.get("missing") else found, ran)
 
 
 class TestScore:
@@ -480,10 +481,12 @@ class TestScore:
             outcome("foreign", (), (), fault="hum", verdict="unexplained"),
             outcome("foreign", (), (), fault="hum", missing=True, exit=2),
             outcome("foreign", (), (), fault="hum"),
+            outcome("foreign", (), (), fault="hum", missing=True, exit=2, said="Usage: hystgen [OPTIONS]"),
             outcome("foreign", (), fault="hum", unexplained=[{"kind": "line"}]),
         )
         assert odd["foreign: cases with a name"].value == 1.0
-        assert odd["foreign: flagged"].value == pytest.approx(0.75)
+        assert odd["foreign: flagged"].value == pytest.approx(0.6)
+        assert odd["cases without a result"].value == 1.0
         poor = self.figures(
             outcome("poor", names=("creep",)), outcome("poor", names=("delay",), groups=(("lag", "delay"),))
         )
@@ -491,6 +494,17 @@ class TestScore:
         missing = self.figures(outcome(missing=True, exit=1), outcome())
         assert missing["cases without a result"].value == 1.0
         assert missing["single: right name first"].value == 0.5
+
+    def test_leaving_all_open_is_seen(self) -> None:
+        wide = outcome(groups=(("lag", "delay", "creep"),), alike=("delay",))
+        assert wide.overcautious
+        assert not outcome(groups=(("lag", "delay"),), alike=("delay",)).overcautious
+        refused = outcome("foreign", (), (), fault="hum", missing=True, exit=2)
+        some = [wide, outcome(), outcome("poor", names=()), refused]
+        found = score.asides(some)
+        assert found["single: left open though separable"] == 0.5
+        assert found["poor excitation: nothing named"] == 1.0
+        assert found["foreign: refused as bad input"] == 1.0
 
     def test_residual_over_noise(self) -> None:
         found = self.figures(*[outcome(residual=x) for x in (1.0, 1.1, 1.2, 1.3, 5.0)])

@@ -1,6 +1,16 @@
 """Blind plants: records of actuators with known faults, for judging `hystgen diagnose` from outside.
 
-The plants are written from physics and share no code and no model form with the package: see `base` for the
-hysteresis, `effects` for what is added to it, `session` for how it is driven, `case` for what a seed gives.
-`python -m tests.plants generate | run | score` makes cases, has them diagnosed through the command line, and counts.
+`python -m tests.plants generate | run | score` makes cases, has them diagnosed through the command line, and counts;
+`make blind` does all three with the report block of seeds. Nothing here imports the package, and only `run` calls it.
+
+bench, drives, session    who measures what: ranges, rates, waveforms, what happens between the records
+base, effects, plant      the actuator, on a time grid eight times finer than the records
+measure, foreign          converters and noise; faults that are no effect
+refit, rivals             how much a fine play sum swallows; which names the records leave open
+case, labels              what a seed gives, and its files: `cases/` for the workflow, `labels/` for the score
+run, score                the package's command line on every case; the figures and their limits
+
+An effect counts as visible from three times the noise on, by the rms that it alone leaves when a fine play sum and an
+offset a record are refitted to the noise-free records. A name that leaves at most 5 % more on the held-out records
+than the plant's true form is indistinguishable there; for a pair this is settled for each effect alone.
 """

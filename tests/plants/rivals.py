@@ -92,8 +92,12 @@ def _judge(data: Data, columns: Columns, y: Array) -> tuple[float, float]:
 def _best(data: Data, rival: Rival) -> float:
     """Held-out rms of the parameters that fit best."""
     starts = rival.starts(data)
+    begins = np.log(starts) if rival.positive else starts
+    reach = 2.0 if rival.positive else 0.5
 
     def point(x: Array) -> Array:
+        # A direction without effect must not lead to infinity
+        x = np.clip(x, begins.min(axis=0) - reach, begins.max(axis=0) + reach)
         return np.exp(x) if rival.positive else x
 
     def cost(x: Array) -> float:
@@ -101,7 +105,6 @@ def _best(data: Data, rival: Rival) -> float:
 
     if starts.shape[1] == 0:
         return held_out_rms(data, rival.form(data, starts[0]), data.y)
-    begins = np.log(starts) if rival.positive else starts
     costs = [cost(x) for x in begins]
     begin = begins[int(np.argmin(costs))]
     size = 0.25 if rival.positive else 0.03

@@ -8,6 +8,7 @@ no excuse for the wrong one.
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -93,9 +94,18 @@ class Outcome:
         ]
 
     @property
+    def overcautious(self) -> bool:
+        """An effect was reported as not separable from a name that these records do separate from it."""
+        return any(
+            e["name"] in group and not group <= {e["name"], *e["indistinguishable"]}
+            for e in self.label["effects"]
+            for group in self.groups
+        )
+
+    @property
     def refused(self) -> bool:
-        """The records were refused as bad input."""
-        return self.run.get("exit") == 2
+        """A record was refused as bad input, by its name; a wrong command line also exits 2."""
+        return self.run.get("exit") == 2 and re.search(r"\.csv\b.*: error: ", self.run.get("stderr", "")) is not None
 
     @property
     def flagged(self) -> bool:
@@ -193,6 +203,23 @@ def figures(outcomes: Sequence[Outcome]) -> list[Figure]:
     return found
 
 
+def asides(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """Shares without a limit, which tell whether a limit is kept by saying nothing or by leaving all open."""
+    singles = _of(outcomes, "single", visible=True)
+    pairs = _of(outcomes, "pair", visible=True)
+    poor = _of(outcomes, "poor")
+    foreign = _of(outcomes, "foreign")
+    asked: list[tuple[str, Sequence[Outcome], Callable[[Outcome], bool]]] = [
+        ("single: left open though separable", singles, lambda x: x.overcautious),
+        ("single: nothing named", singles, lambda x: not x.names),
+        ("pair: exact set", pairs, lambda x: x.exact),
+        ("poor excitation: right name first", poor, lambda x: x.first_right),
+        ("poor excitation: nothing named", poor, lambda x: not x.names),
+        ("foreign: refused as bad input", foreign, lambda x: x.refused),
+    ]
+    return {what: sum(map(true, some)) / len(some) for what, some, true in asked if some}
+
+
 def curve(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """Naming rate of single effects with rich excitation against unabsorbed rms over noise."""
     some = [*_of(outcomes, "single"), *_of(outcomes, "snr")]
@@ -234,6 +261,7 @@ def main(cases: Path, labels: Path, results: Path, report: Path | None = None) -
             "cases": len(outcomes),
             "blocks": sorted({x.label["block"] for x in outcomes}),
             "figures": [{**asdict(x), "kept": x.kept} for x in judged],
+            "asides": asides(outcomes),
             "confusion": {row: dict(counts) for row, counts in confusion(outcomes).items()},
             "curve": curve(outcomes),
             "seconds": _seconds(outcomes),
@@ -256,6 +284,7 @@ def text(outcomes: Sequence[Outcome], judged: Sequence[Figure]) -> str:
         shown = f"{x.value:8.3f}" if x.at_least or x.value != int(x.value) or x.limit else f"{x.value:8.0f}"
         sign = ">=" if x.at_least else "<="
         lines.append(f"{'ok    ' if x.kept else 'MISSED'} {x.what:40s}{shown}  {sign} {x.limit:g}  ({x.cases} cases)")
+    lines += [f"       {what:40s}{value:8.3f}" for what, value in asides(outcomes).items()]
     rows = curve(outcomes)
     if rows:
         lines += ["", "unabsorbed rms over noise   cases   right   wrong  silent"]

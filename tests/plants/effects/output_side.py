@@ -113,7 +113,7 @@ def sensor(effect: Effect, y: Array, around: Surroundings) -> Array:
 
 def draw_drift(rng: np.random.Generator, bench: Bench) -> Effect:
     sign = 1.0 if rng.uniform() < 0.5 else -1.0
-    return Effect("drift", "frame", sign * between(rng, 0.01, 0.1), values(curved=rng.uniform(-0.15, 0.15)))
+    return Effect("drift", "frame", sign * between(rng, 0.01, 0.1), values(curved=rng.uniform(-0.08, 0.08)))
 
 
 def drift(effect: Effect, y: Array, around: Surroundings) -> Array:
