@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
@@ -109,7 +110,7 @@ def _best(data: Data, rival: Rival) -> float:
     begin = begins[int(np.argmin(costs))]
     size = 0.25 if rival.positive else 0.03
     simplex = np.vstack((begin, begin + size * np.eye(len(begin))))
-    options = {"initial_simplex": simplex, "xatol": 0.01, "fatol": 1e-5 * min(costs), "maxfev": 12 + 14 * len(begin)}
+    options = {"initial_simplex": simplex, "xatol": 0.01, "fatol": 1e-5 * min(costs), "maxfev": 12 + 16 * len(begin)}
     found = minimize(cost, begin, method="Nelder-Mead", options=options)
     return held_out_rms(data, rival.form(data, point(found.x)), data.y)
 
@@ -133,8 +134,23 @@ def _lag(data: Data, x: Array) -> Array:
     return np.asarray(first_order(data.course.v, data.dt, float(x[0])))
 
 
-def _delay(data: Data, x: Array) -> Array:
-    return np.interp(data.course.t - x[0], data.course.t, data.course.v)
+def _delayed(straight: bool) -> Form:
+    """Plays delayed, not the drive: they remember corners, which a drive delayed by a part of a sample would miss.
+
+    Between samples straight lines are right beside steep edges, Akima's curves on sines.
+    """
+
+    def form(data: Data, x: Array) -> Columns:
+        course = data.course
+        columns = refit.plays(course.v, refit.radii(data.span, PLAYS))
+        then = np.maximum(course.t[course.seen] - x[0], course.t[0])
+        if not straight:
+            return np.asarray(Akima1DInterpolator(course.t, columns)(then)), 0
+        after = np.clip(np.searchsorted(course.t, then), 1, len(course.t) - 1)
+        share = (then - course.t[after - 1]) / (course.t[after] - course.t[after - 1])
+        return columns[after - 1] + share[:, None] * (columns[after] - columns[after - 1]), 0
+
+    return form
 
 
 @njit(cache=True)
@@ -365,7 +381,7 @@ def _slews(data: Data) -> Array:
 
 
 def _modes(data: Data) -> Array:
-    return np.array([[f * data.rate, z] for f in np.geomspace(0.004, 0.2, 12).tolist() for z in (0.02, 0.5)])
+    return np.array([[f * data.rate, z] for f in np.geomspace(0.004, 0.2, 24).tolist() for z in (0.05, 0.6)])
 
 
 def _long_times(data: Data) -> Array:
@@ -395,7 +411,7 @@ RIVALS: dict[str, list[Rival]] = {
         Rival(_centred_density, lambda _: np.array([[0.3], [0.5], [0.7]]), False),
     ],
     "lag": [Rival(_front(_lag), _times(0.15, 60.0, 9))],
-    "delay": [Rival(_front(_delay), _times(0.1, 30.0, 9))],
+    "delay": [Rival(_delayed(straight), _times(0.1, 30.0, 9)) for straight in (True, False)],
     "slew_limit": [Rival(_front(_slew), _slews)],
     "resonance": [Rival(_resonant, _modes)],
     "rate_dependence": [Rival(_grown, _growths), Rival(_relaxed, _times(0.3, 300.0, 8))],
