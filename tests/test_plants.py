@@ -262,7 +262,7 @@ class TestEffects:
 
     def test_thermal_gain_follows_the_room(self) -> None:
         t = np.arange(50.0)
-        numbers = {"offset_share": 0.0, "curved": 0.0, "time": 1.0, "sensor_time": 0.0}
+        numbers = {"offset_share": 0.0, "curved": 0.0, "time": 1.0}
         thermal = Effect("thermal", "room", 0.04, numbers)
         out = slow.thermal(thermal, np.full(50, 20.0), surroundings(t, temperature=20.0 + 0.1 * t))
         assert np.allclose(out, 20.0 * (1.0 + 0.04 * t / t[-1]))
@@ -270,7 +270,7 @@ class TestEffects:
     def test_own_heat_needs_a_moving_drive(self) -> None:
         t = np.arange(3000) * 0.01
         drive = np.where(t < 15.0, 50.0 + 50.0 * np.sin(12.0 * t), 50.0)
-        numbers = {"offset_share": 0.0, "curved": 0.0, "time": 5.0, "sensor_time": 0.0}
+        numbers = {"offset_share": 0.0, "curved": 0.0, "time": 5.0}
         out = slow.thermal(Effect("thermal", "friction_heat", 0.04, numbers), np.ones(3000), surroundings(t, drive))
         assert out[1490] == pytest.approx(1.04, abs=0.002)
         assert (out[2000] - 1.0) / (out[1500] - 1.0) == pytest.approx(math.exp(-1.0), rel=0.02)

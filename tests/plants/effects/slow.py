@@ -111,7 +111,6 @@ def draw_thermal(rng: np.random.Generator, bench: Bench) -> Effect:
         offset_share=rng.uniform(-0.5, 0.5),
         curved=rng.uniform(-0.1, 0.1),
         time=bench.long * between(rng, 0.4, 3.0),
-        sensor_time=bench.long * 0.02,
     )
     return Effect("thermal", form, sign * between(rng, 0.01, 0.05), numbers)
 
