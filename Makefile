@@ -37,7 +37,7 @@ lint: $(VENV)/ready
 fuzz: $(VENV)/ready
 	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
 
-# About two hours: an hour to make the cases, the rest to diagnose them
+# Makes the cases with their labels, has them diagnosed and counts; a case whose result is there is not run again
 blind: $(VENV)/ready
 	set -e; for part in $(BLIND); do $(BIN)/python -m tests.plants generate --block report --kind $${part%=*} \
 	    --seeds 0:$${part#*=} -o $(BLIND_DIR) --jobs $(JOBS); done
