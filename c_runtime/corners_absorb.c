@@ -34,7 +34,7 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p
     if (p->depth > 0) {
         const hystgen_corner_t *c = &corner[p->depth - 1];
         const hystgen_reach_t e = c->extremum;
-        const hystgen_sum_t y = c->output;
+        const hystgen_sum_t y = hystgen_held(c);
         const hystgen_play_t *r = &t->threshold[p->k];
         const hystgen_sum_t *z = &t->start_level[p->k];
         const int side = c->side;
@@ -184,12 +184,11 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->start = 0;
     if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = (hystgen_sum_t)w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
+        hystgen_write_corner(t, corner, w, (hystgen_sum_t)w * t->slope[t->n + 1u], t->n + 1u, 0);
         m->here.depth = 1;
+        m->start = 1;
     }
     hystgen_corners_settle(t, &m->here, corner);
 }
@@ -205,14 +204,11 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
     m->here.depth = t->n;
     m->here.rising = true;
     m->there.k = 0;
+    m->start = t->n;
     for (j = 0; j < t->n; ++j) {
-        hystgen_corner_t *c = &corner[j];
         const unsigned int k = t->n - j;
-        c->extremum = play[k];
-        c->output = (hystgen_sum_t)play[k] * t->slope[k + 1] + above;
+        hystgen_write_corner(t, &corner[j], play[k], (hystgen_sum_t)play[k] * t->slope[k + 1] + above, k + 1, 0);
         above = above + (hystgen_sum_t)play[k] * (t->slope[k + 1] - t->slope[k]);
-        c->end = (uint_least16_t)(k + 1);
-        c->side = 0;
     }
     hystgen_corners_settle(t, &m->here, corner);
 }
@@ -223,18 +219,10 @@ HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, cons
     return m->here.anchor_output + ((hystgen_sum_t)m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Writes the corner that turning back leaves into slot c. */
-static void hystgen_write_corner(hystgen_corner_t *c, const hystgen_memory_t *m, hystgen_sum_t output)
+/* Leaves the corner of turning back above those that are held. */
+static void hystgen_push_corner(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner)
 {
-    c->extremum = m->w;
-    c->output = output;
-    c->end = m->here.k;
-    c->side = m->here.rising ? -1 : 1;
-}
-
-static void hystgen_push_corner(const hystgen_tables_t *t, const hystgen_memory_t *m, hystgen_corner_t *c)
-{
-    hystgen_write_corner(c, m, hystgen_corners_output(t, m));
+    hystgen_leave_corner(t, m, corner, hystgen_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */
@@ -244,7 +232,7 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
     const bool turned = m->here.rising ? w < m->w : w > m->w;
     if (turned) {       /* the plays that followed stay where they are */
         if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            hystgen_push_corner(t, m, &corner[m->here.depth]);
+            hystgen_push_corner(t, m, corner);
             m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         }
         m->here.rising = !m->here.rising;

@@ -3,7 +3,7 @@
 /* The output at which play k, held by corner c, starts to follow a rising (falling) move. */
 static hystgen_sum_t hystgen_level(const hystgen_tables_t *t, const hystgen_corner_t *c, unsigned int k, bool rising)
 {
-    return hystgen_from(c->output, c->side, t->start_level[k], rising);
+    return hystgen_from(hystgen_held(c), c->side, t->start_level[k], rising);
 }
 
 /* Where a move to `output` leads that takes more plays along, or turns back: which plays follow there. */
@@ -57,7 +57,7 @@ HYSTGEN_API hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t
             return hystgen_going(t, m->w, rising ? output - here : here - output, p->k, rising);
         }
     } else if (p->k > 1) {
-        hystgen_write_corner(&corner[p->depth], m, here);
+        hystgen_leave_corner(t, m, corner, here);
     }
     m->there.rising = rising;
     hystgen_corners_seek(t, m, corner, output);

@@ -2,8 +2,9 @@
 #include "hystgen_runtime.h"
 #ifdef HYSTGEN_FIXED
 #include "over_slope.c"
+#include "corner_fixed.c"
 #include "corners_absorb.c"
-#include "corners_find.c"
+#include "corners_find_fixed.c"
 #include "corners_solve_fixed.c"
 #include "loop_absorb.c"
 #include "loop_solve_fixed.c"
@@ -21,9 +22,10 @@
 #include "dead_zone_forward.c"
 #include "dead_zone_inverse.c"
 #include "half_float.c"
+#include "corner_float.c"
 #include "corners_absorb.c"
-#include "corners_find.c"
-#include "corners_solve.c"
+#include "corners_find_float.c"
+#include "corners_solve_float.c"
 #include "loop_absorb.c"
 #include "loop_solve.c"
 #endif

@@ -38,6 +38,7 @@ typedef hystgen_real_t hystgen_sum_t;
 
 #include "hystgen_state.h"
 #ifdef HYSTGEN_FIXED
+#include "hystgen_corner_fixed.h"
 #include "hystgen_tables_fixed.h"
 
 uint64_t hystgen_wide(uint32_t a, uint32_t b);
@@ -49,6 +50,7 @@ hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32
 hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                                            hystgen_sum_t here, hystgen_sum_t output);
 #else
+#include "hystgen_corner_float.h"
 #include "hystgen_tables_float.h"
 
 hystgen_real_t hystgen_tanh(hystgen_real_t x);
@@ -57,6 +59,15 @@ hystgen_real_t hystgen_envelope_forward(const hystgen_envelope_t *e, hystgen_rea
 hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_real_t y, bool *limited);
 hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_real_t x);
 hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y);
+bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                           hystgen_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
+                           hystgen_real_t *w);
+unsigned int hystgen_corners_find(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
+                                  unsigned int depth, unsigned int *k, hystgen_real_t x, bool rising);
+hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
+                                    unsigned int left, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
+hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
+                                    unsigned int left, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
 #endif
 
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);

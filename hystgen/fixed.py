@@ -110,7 +110,7 @@ def going(t: FixedTables, w: Any, d: Any, k: int, rising: int) -> Any:
 
 def corners_locate(t: FixedTables, s: State, depth: int, begun: int, k: int, rising: int, output: Any) -> Any:
     """Input that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the others."""
-    left, k = corners_find(t, s, depth, k, rising, output, s.output, t.start_level)
+    left, k = corners_find(t, s, 0, depth, k, rising, output, s.output, t.start_level)
     hint(t, s, left, k, rising)
     if k > begun:  # the last place known to be passed, and the output there
         owner = entered_by(s, left, depth, k)
@@ -244,8 +244,9 @@ _NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelo
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
     "multiple", "activation", "level", "past", "all_follow", "reached", "corners_settle", "hint", "way",
-    "not_reached", "opposite", "corners_find", "entered_by", "foretold", "corners_rest", "corners_start",
-    "push_corner", "corners_absorb", "corners_output", "loop_rest", "loop_start", "loop_absorb", "loop_output",
+    "not_reached", "opposite", "corners_left", "corners_find", "entered_by", "foretold", "corners_rest",
+    "corners_start", "push_corner", "corners_absorb", "corners_output", "loop_rest", "loop_start", "loop_absorb",
+    "loop_output",
 }  # fmt: skip
 
 # Callees before callers: the memory, then what is written here, then what a step means

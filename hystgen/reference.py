@@ -37,7 +37,7 @@ TANH, DEAD_ZONE = 0, 1
 W, ANCHOR, ANCHOR_OUTPUT, NEXT, NEXT_OUTPUT, HINT_ANCHOR, HINT_ANCHOR_OUTPUT = 0, 1, 2, 3, 4, 5, 6
 PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 7, 8, 9, 10, 11
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-HINT_K, HINT_DEPTH, HINT_RISING = 9, 10, 11
+HINT_K, HINT_DEPTH, HINT_RISING, START = 9, 10, 11, 12
 
 INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN = 1, 2, 4, 8
 
@@ -100,7 +100,7 @@ def new_state(t: PlayTables) -> State:
     dtype = t.threshold.dtype
     return State(
         real=np.zeros(12, dtype),
-        counts=np.zeros(12, np.int64),
+        counts=np.zeros(13, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         output=np.zeros(max(n, 1), dtype),
         end=np.zeros(max(n, 1), np.int64),
@@ -199,29 +199,42 @@ def opposite(side: int, rising: int) -> bool:
     return side >= 0 if rising else side <= 0
 
 
-def corners_find(
-    t: PlayTables, s: State, depth: int, k: int, rising: int, x: Any, held: Reals, steps: Reals
-) -> tuple[int, int]:
-    """Corners that a move to x leaves of `depth`, and the plays that follow then; plays 0 .. k-1 are known to.
-
-    `held` and `steps` are the corners' extrema and the thresholds where x is an input of the plays, their outputs and
-    the start levels where x is an output. First the blocks that are passed whole, from the last one left by bisection,
-    then the plays of one block.
-    """
-    low = 0
+def corners_left(
+    t: PlayTables, s: State, low: int, depth: int, rising: int, x: Any, held: Reals, steps: Reals
+) -> int:
+    """Corners from `low` on that a move to x leaves of `depth`, from the last one by bisection."""
     left = depth
     probe = left
     while low < left:
         c = probe - 1
         if reached(x, held[c] + multiple(t, s, c, rising) * steps[s.end[c] - 1], rising):
             left = c
-            k = s.end[c]
         else:
             low = probe
         probe = (low + left + 1) // 2
+    return left
+
+
+def corners_find(
+    t: PlayTables, s: State, start: int, depth: int, k: int, rising: int, x: Any, held: Reals, steps: Reals
+) -> tuple[int, int]:
+    """Corners that a move to x leaves of `depth`, and the plays that follow then; plays 0 .. k-1 are known to.
+
+    `held` and `steps` are the corners' extrema and the thresholds where x is an input of the plays, their outputs and
+    the start levels where x is an output. First the blocks that are passed whole, those above the `start` corners of
+    the start before these, then the plays of one block; the lowest corner of the start is passed with its last play.
+    """
+    left = corners_left(t, s, start, depth, rising, x, held, steps)
+    if left <= start:
+        left = corners_left(t, s, min(start, 1), left, rising, x, held, steps)
+    if left < depth:
+        k = s.end[left]
     c = left - 1
     if left > 0 and opposite(s.side[c], rising):
-        k = not_reached(steps, k, s.end[c] - 1, way(t, x, held[c], s.side[c], rising))
+        last = left == 1 and start > 0
+        k = not_reached(steps, k, s.end[c] if last else s.end[c] - 1, way(t, x, held[c], s.side[c], rising))
+        if last and k == s.end[c]:
+            left = 0
     return left, k
 
 
@@ -256,7 +269,9 @@ def corners_rest(t: PlayTables, s: State, w: Any) -> None:
     s.counts[DEPTH] = 0
     s.counts[RISING] = 1
     s.counts[HINT_K] = 0
+    s.counts[START] = 0
     if n > 0:
+        s.counts[START] = 1
         s.extremum[0] = w
         s.output[0] = w * t.slope[n + 1]
         s.end[0] = n + 1
@@ -274,6 +289,7 @@ def corners_start(t: PlayTables, s: State, play: Reals) -> None:
     s.counts[DEPTH] = n
     s.counts[RISING] = 1
     s.counts[HINT_K] = 0
+    s.counts[START] = n
     for j in range(n):
         s.extremum[j] = play[n - j]
         s.output[j] = play[n - j] * t.slope[n - j + 1] + above
@@ -289,7 +305,9 @@ def corners_output(t: PlayTables, s: State) -> Any:
 
 
 def push_corner(t: PlayTables, s: State, c: int) -> None:
-    """Write the corner that turning back leaves into slot c."""
+    """Write the corner that turning back leaves into slot c, above those that are held."""
+    if s.counts[START] > c:
+        s.counts[START] = c
     s.extremum[c] = s.real[W]
     s.output[c] = corners_output(t, s)
     s.end[c] = s.counts[K]
@@ -321,7 +339,7 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
             corners_settle(t, s)
         if reached(w, s.real[NEXT], s.counts[RISING]):
             left, k = corners_find(
-                t, s, s.counts[DEPTH], s.counts[K] + 1, s.counts[RISING], w, s.extremum, t.threshold
+                t, s, 0, s.counts[DEPTH], s.counts[K] + 1, s.counts[RISING], w, s.extremum, t.threshold
             )
             s.counts[DEPTH] = left
             s.counts[K] = k
@@ -350,7 +368,7 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
 
     Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
     """
-    left, k = corners_find(t, s, depth, k, rising, output, s.output, t.start_level)
+    left, k = corners_find(t, s, s.counts[START], depth, k, rising, output, s.output, t.start_level)
     hint(t, s, left, k, rising)
     w = s.real[HINT_ANCHOR] + (output - s.real[HINT_ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if left > 0:
@@ -371,10 +389,10 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
     k = s.counts[K]
     rising = s.counts[RISING]
     depth = s.counts[DEPTH]
+    if reached(output, s.real[NEXT_OUTPUT], rising):
+        return corners_locate(t, s, depth, k + 1, rising, output)
     w = s.real[ANCHOR] + (output - s.real[ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if (rising and w >= s.real[W]) or (not rising and w <= s.real[W]):
-        if reached(output, s.real[NEXT_OUTPUT], rising):
-            return corners_locate(t, s, depth, k + 1, rising, output)
         if reached(w, s.real[NEXT], rising):
             return s.real[NEXT]
         return w
@@ -724,8 +742,8 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
-    corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner, corners_absorb, hint,
-    corners_locate, corners_solve,
+    corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
+    corners_absorb, hint, corners_locate, corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
     front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer,
     clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,

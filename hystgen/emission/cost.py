@@ -76,8 +76,9 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         scalars = [(size, size) for size in fields]
         if corners:
             place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
-            memory = _struct(place, place, (play, play))
-            size, alignment = _struct(*((size, size) for size in (sums, play, 2, 1)))
+            memory = _struct(place, place, (play, play), (2, 2))
+            levels = (sums,) if fixed else (sums, sums)
+            size, alignment = _struct(*((size, size) for size in (*levels, play, 2, 1)))
             order = [*scalars, memory] if op == "inverse" else [memory, *scalars]
             whole = _struct(*order, (max(n, 1) * size, alignment))
         else:
@@ -91,8 +92,9 @@ def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTabl
     """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside.
 
     A search through the corner list compares once with the last corner, then bisects the others; that through a block
-    compares twice, then bisects: 3 + 2 b comparisons in all, b the bits of n. A drive that was limited or committed is
-    searched for when it is taken to memory, the answer once more.
+    compares once or twice, then bisects: at most 3 + 2 b comparisons in all, b the bits of n; corners of a start list
+    are bisected apart, but own a play each, so that no block is searched then. A drive that was limited or committed
+    is searched for when it is taken to memory, the answer once more.
     """
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
@@ -137,7 +139,8 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
     if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
         return 4 if fixed else 3, 10, 0, 2  # next 1, search 3. In fixed point a sum takes two multiplications.
     # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
-    # 4 + 3; where samples can be fast: two edges, one more play 5, edges anew 4. The drive's corner and way, the
-    # reference's; two lines; with fast samples the next play's line and way, and the edge.
-    compares = 30 + 11 * fast
-    return (10 + 4 * fast if fixed else 6 + 3 * fast), compares, 0, 4
+    # 4 + 3; where samples can be fast: two edges, and in fixed point one more play 5, edges anew 4, in floating point
+    # ahead 1, the range's ends 3, limited 2. The drive's corner and way, the reference's; two lines; with fast samples
+    # the edge, and in fixed point the next play's line and way.
+    compares = 30 + (11 if fixed else 8) * fast
+    return (10 + 4 * fast if fixed else 6 + fast), compares, 0, 4

@@ -139,7 +139,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         sha256="does not depend on any",
     )
     file = about["runtime_file"]
-    types = "\n".join(runtime.types(header, (), prefix, family) for header in ("hystgen_state.h", family.tables))
+    types = "\n".join(runtime.types(header, (), prefix, family) for header in (*family.states, family.tables))
     return {
         f"{file}.h": render(
             "runtime.h.j2",
@@ -183,7 +183,10 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
         inverse=options.inverse,
         branches=cascade.branches_differ,
     )
-    values.state_types = "" if shared or not corners else runtime.types("hystgen_state.h", (), prefix, values.family)
+    values.state_types = ""
+    if corners and not shared:
+        headers = values.family.states
+        values.state_types = "\n".join(runtime.types(header, (), prefix, values.family) for header in headers)
     values.kernels = _kernels(values, options)
     values.details = _details(parameters, cascade, options, values)
     return values
@@ -217,7 +220,9 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     known = values.fast and family.fixed  # the output that a step begins at
     if options.forward or values.branches or known:
         roots.add(f"hystgen_{engine}_output")
-    if options.inverse:
+    if options.inverse and values.fast and not family.fixed:
+        roots |= {f"hystgen_corners_{part}" for part in ("begin", "find", "rise", "fall")}
+    elif options.inverse:
         roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
     if values.fast:
         roots.add("hystgen_copy_place")

@@ -22,16 +22,18 @@ FLOAT_KERNELS = (
     "dead_zone_forward.c",
     "dead_zone_inverse.c",
     "half_float.c",
+    "corner_float.c",
     "corners_absorb.c",
-    "corners_find.c",
-    "corners_solve.c",
+    "corners_find_float.c",
+    "corners_solve_float.c",
     "loop_absorb.c",
     "loop_solve.c",
 )
 FIXED_KERNELS = (
     "over_slope.c",
+    "corner_fixed.c",
     "corners_absorb.c",
-    "corners_find.c",
+    "corners_find_fixed.c",
     "corners_solve_fixed.c",
     "loop_absorb.c",
     "loop_solve_fixed.c",
@@ -66,6 +68,11 @@ class Family:
     def tables(self) -> str:
         """The header of the run time that has the types of its tables."""
         return "hystgen_tables_fixed.h" if self.fixed else "hystgen_tables_float.h"
+
+    @property
+    def states(self) -> tuple[str, str]:
+        """The headers of the run time that have the types of its memory."""
+        return "hystgen_corner_fixed.h" if self.fixed else "hystgen_corner_float.h", "hystgen_state.h"
 
 
 FAMILIES = {

@@ -75,6 +75,30 @@ static curved_reach_t curved_going(const curved_tables_t *t, curved_reach_t w, c
     return step > (curved_sum_t)w - t->least ? t->least : (curved_reach_t)(w - step);
 }
 
+/* Output at the moment that a corner was left. */
+static curved_sum_t curved_held(const curved_corner_t *c)
+{
+    return c->output;
+}
+
+/* Writes the corner that a rising (side -1) or falling (side +1) move leaves at w, or that the start does (0). */
+static void curved_write_corner(const curved_tables_t *t, curved_corner_t *c, curved_play_t w,
+                                 curved_sum_t output, unsigned int end, int side)
+{
+    (void)t;
+    c->output = output;
+    c->extremum = w;
+    c->end = (uint_least16_t)end;
+    c->side = (int_least8_t)side;
+}
+
+/* Leaves the corner of turning back, at `output`, above those that are held. */
+static void curved_leave_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *corner,
+                                 curved_sum_t output)
+{
+    curved_write_corner(t, &corner[m->here.depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+}
+
 static bool curved_reached(curved_reach_t x, curved_reach_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
@@ -109,7 +133,7 @@ static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, c
     if (p->depth > 0) {
         const curved_corner_t *c = &corner[p->depth - 1];
         const curved_reach_t e = c->extremum;
-        const curved_sum_t y = c->output;
+        const curved_sum_t y = curved_held(c);
         const curved_play_t *r = &t->threshold[p->k];
         const curved_sum_t *z = &t->start_level[p->k];
         const int side = c->side;
@@ -259,12 +283,11 @@ static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, cu
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->start = 0;
     if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = (curved_sum_t)w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
+        curved_write_corner(t, corner, w, (curved_sum_t)w * t->slope[t->n + 1u], t->n + 1u, 0);
         m->here.depth = 1;
+        m->start = 1;
     }
     curved_corners_settle(t, &m->here, corner);
 }
@@ -275,18 +298,10 @@ static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved
     return m->here.anchor_output + ((curved_sum_t)m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Writes the corner that turning back leaves into slot c. */
-static void curved_write_corner(curved_corner_t *c, const curved_memory_t *m, curved_sum_t output)
+/* Leaves the corner of turning back above those that are held. */
+static void curved_push_corner(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner)
 {
-    c->extremum = m->w;
-    c->output = output;
-    c->end = m->here.k;
-    c->side = m->here.rising ? -1 : 1;
-}
-
-static void curved_push_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *c)
-{
-    curved_write_corner(c, m, curved_corners_output(t, m));
+    curved_leave_corner(t, m, corner, curved_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */
@@ -296,7 +311,7 @@ static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, 
     const bool turned = m->here.rising ? w < m->w : w > m->w;
     if (turned) {       /* the plays that followed stay where they are */
         if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            curved_push_corner(t, m, &corner[m->here.depth]);
+            curved_push_corner(t, m, corner);
             m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         }
         m->here.rising = !m->here.rising;
@@ -373,7 +388,7 @@ static void curved_find_by_output(const curved_tables_t *t, const curved_corner_
 /* The output at which play k, held by corner c, starts to follow a rising (falling) move. */
 static curved_sum_t curved_level(const curved_tables_t *t, const curved_corner_t *c, unsigned int k, bool rising)
 {
-    return curved_from(c->output, c->side, t->start_level[k], rising);
+    return curved_from(curved_held(c), c->side, t->start_level[k], rising);
 }
 
 /* Where a move to `output` leads that takes more plays along, or turns back: which plays follow there. */
@@ -433,7 +448,7 @@ static curved_reach_t curved_corners_solve_from(const curved_tables_t *t, curved
             return curved_going(t, m->w, rising ? output - here : here - output, p->k, rising);
         }
     } else if (p->k > 1) {
-        curved_write_corner(&corner[p->depth], m, here);
+        curved_leave_corner(t, m, corner, here);
     }
     m->there.rising = rising;
     curved_corners_seek(t, m, corner, output);

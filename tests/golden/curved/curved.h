@@ -54,7 +54,7 @@ typedef int64_t curved_sum_t;
 #define CURVED_STATUS_HELD 4u /* NaN or infinite input: the last answer was held */
 #define CURVED_STATUS_DOMAIN 8u /* inverse: the argument of an envelope was limited */
 
-/* What the corner list of one instance looks like in memory. */
+/* A corner in fixed point. */
 
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
@@ -64,6 +64,8 @@ typedef struct {
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } curved_corner_t;
+
+/* Where the plays of one instance are; what a corner is, stands in a header of each arithmetic's own. */
 
 /* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
@@ -81,6 +83,7 @@ typedef struct {
     curved_place_t here;
     curved_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
     curved_play_t w;      /* input of the plays, w = G[v] */
+    uint_least16_t start;  /* corners at the bottom that are of the start, where no more than `depth` are left of them */
 } curved_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */

@@ -37,6 +37,44 @@ static plain_real_t plain_half(plain_real_t x)
     return x * (plain_real_t)0.5f;
 }
 
+/* Output at the moment that a corner was left. */
+static plain_real_t plain_held(const plain_corner_t *c)
+{
+    return c->side > 0 ? -c->pass[0] : c->pass[1];
+}
+
+/* Writes the corner that a rising (side -1) or falling (side +1) move leaves at w, or that the start does (0). */
+static void plain_write_corner(const plain_tables_t *t, plain_corner_t *c, plain_real_t w,
+                                 plain_real_t output, unsigned int end, int side)
+{
+    if (side < 0) {
+        const plain_real_t z = t->start_level[end - 1];
+        c->pass[0] = (z + z) - output;
+        c->pass[1] = output;
+    } else if (side > 0) {
+        const plain_real_t z = t->start_level[end - 1];
+        c->pass[0] = -output;
+        c->pass[1] = (z + z) + output;
+    } else {
+        c->pass[0] = -output;
+        c->pass[1] = output;
+    }
+    c->extremum = w;
+    c->end = (uint_least16_t)end;
+    c->side = (int_least8_t)side;
+}
+
+/* Leaves the corner of turning back, at `output`, above those that are held. */
+static void plain_leave_corner(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                 plain_real_t output)
+{
+    const unsigned int depth = m->here.depth;
+    if (m->start > depth) {
+        m->start = (uint_least16_t)depth;
+    }
+    plain_write_corner(t, &corner[depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+}
+
 static bool plain_reached(plain_real_t x, plain_real_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
@@ -71,7 +109,7 @@ static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, cons
     if (p->depth > 0) {
         const plain_corner_t *c = &corner[p->depth - 1];
         const plain_real_t e = c->extremum;
-        const plain_real_t y = c->output;
+        const plain_real_t y = plain_held(c);
         const plain_real_t *r = &t->threshold[p->k];
         const plain_real_t *z = &t->start_level[p->k];
         const int side = c->side;
@@ -221,12 +259,11 @@ static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->start = 0;
     if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
+        plain_write_corner(t, corner, w, w * t->slope[t->n + 1u], t->n + 1u, 0);
         m->here.depth = 1;
+        m->start = 1;
     }
     plain_corners_settle(t, &m->here, corner);
 }
@@ -237,18 +274,10 @@ static plain_real_t plain_corners_output(const plain_tables_t *t, const plain_me
     return m->here.anchor_output + (m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Writes the corner that turning back leaves into slot c. */
-static void plain_write_corner(plain_corner_t *c, const plain_memory_t *m, plain_real_t output)
+/* Leaves the corner of turning back above those that are held. */
+static void plain_push_corner(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner)
 {
-    c->extremum = m->w;
-    c->output = output;
-    c->end = m->here.k;
-    c->side = m->here.rising ? -1 : 1;
-}
-
-static void plain_push_corner(const plain_tables_t *t, const plain_memory_t *m, plain_corner_t *c)
-{
-    plain_write_corner(c, m, plain_corners_output(t, m));
+    plain_leave_corner(t, m, corner, plain_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */
@@ -258,7 +287,7 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
     const bool turned = m->here.rising ? w < m->w : w > m->w;
     if (turned) {       /* the plays that followed stay where they are */
         if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            plain_push_corner(t, m, &corner[m->here.depth]);
+            plain_push_corner(t, m, corner);
             m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         }
         m->here.rising = !m->here.rising;
@@ -279,103 +308,225 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
     m->there.k = 0;
 }
 
-static bool plain_passed(plain_real_t output, plain_real_t level, bool rising)
-{
-    return rising ? output >= level : output <= level;
-}
-
-/* As plain_threshold_not_reached, over outputs gained. */
-static unsigned int plain_level_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
+/* First of the start levels k .. high-1 that a way x has not reached, or high; mostly it is the first. */
+static unsigned int plain_level_not_reached(const plain_real_t *level, unsigned int k, unsigned int high,
                                               plain_real_t x)
 {
-    if (k < high && x >= step[k]) {
+    if (k < high && x >= level[k]) {
         ++k;
-        if (k < high && x >= step[k]) {
-            ++k;
-            while (k < high) {
-                const unsigned int middle = (k + high) / 2;
-                if (x >= step[middle]) {
-                    k = middle + 1;
-                } else {
-                    high = middle;
-                }
+        while (k < high) {
+            const unsigned int middle = (k + high) / 2;
+            if (x >= level[middle]) {
+                k = middle + 1;
+            } else {
+                high = middle;
             }
         }
     }
     return k;
 }
 
-/* As plain_find_by_input, for a move to an output. */
-static void plain_find_by_output(const plain_tables_t *t, const plain_corner_t *corner, unsigned int depth,
-                                   unsigned int k, plain_real_t output, plain_place_t *p)
+/* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
+   follow then, of which the first ones are known to. x as a rising move sees it. First the blocks that are passed
+   whole, from the last one left by bisection, those of the start but the lowest likewise, then the plays of one. */
+static unsigned int plain_corners_find(const plain_tables_t *t, const plain_corner_t *corner,
+                                              unsigned int start, unsigned int depth, unsigned int *k,
+                                              plain_real_t x, bool rising)
 {
-    const bool rising = p->rising;
-    const plain_real_t x = rising ? output : -output; /* everything as a rising move sees it */
-    unsigned int low = 0;
+    unsigned int low = start;
     unsigned int left = depth;
-    unsigned int probe = left;
+    unsigned int probe = depth;
     while (low < left) {
-        const plain_corner_t *c = &corner[probe - 1];
-        if (x >= plain_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+        if (x >= corner[probe - 1].pass[rising]) {
             left = probe - 1;
-            k = c->end;
         } else {
             low = probe;
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
-        const plain_corner_t *c = &corner[left - 1];
-        k = plain_level_not_reached(t->start_level, k, c->end - 1u, plain_way(x, rising ? c->output : -c->output, c->side));
+    if (start > 1 && left > 1 && left <= start) {
+        low = 1;
+        probe = left;
+        while (low < left) {
+            const plain_corner_t *c = &corner[probe - 1];
+            if (x >= t->start_level[c->end - 1] - c->pass[!rising]) {
+                left = probe - 1;
+            } else {
+                low = probe;
+            }
+            probe = (low + left + 1) / 2;
+        }
     }
-    p->depth = (uint_least16_t)left;
-    p->k = (uint_least16_t)k;
+    if (left < depth) {
+        *k = corner[left].end;
+    }
+    if (left > 0) {
+        const plain_corner_t *c = &corner[left - 1];
+        if (c->side == 0) {
+            const unsigned int high = left == 1 ? c->end : c->end - 1u;
+            *k = plain_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
+            if (*k == c->end) { /* the last one too */
+                --left;
+            }
+        } else if (c->side != (rising ? -1 : 1)) {
+            *k = plain_level_not_reached(t->start_level, *k, c->end - 1u, plain_half(x + c->pass[!rising]));
+        }
+    }
+    return left;
 }
 
-/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
-   that turning back would leave. Rounding is kept from leading out of the place that was found: then the plays that
-   follow are those that will. */
-static plain_real_t plain_corners_solve(const plain_tables_t *t, plain_memory_t *m,
-                                                 plain_corner_t *corner, plain_real_t output)
+/* A rising move to `output` that leaves `left` of `depth` corners, after which k plays follow: fills in the place where
+   it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
+   that follow are those that will. */
+static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corner_t *corner,
+                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                plain_real_t output, plain_place_t *p)
 {
-    const plain_place_t *here = &m->here;
-    plain_place_t *there = &m->there;
-    plain_real_t w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
-    unsigned int depth = here->depth;
-    unsigned int k = here->k + 1u;
-    bool rising = here->rising;
-    if (rising ? w >= m->w : w <= m->w) {
-        if (!plain_passed(output, here->next_output, rising)) {
-            there->k = 0;
-            return plain_reached(w, here->next, rising) ? here->next : w;
+    plain_real_t w;
+    plain_real_t first;
+    plain_real_t level;
+    plain_real_t next;
+    plain_real_t next_level;
+    if (left > 0) {
+        const plain_corner_t *c = &corner[left - 1];
+        const plain_real_t e = c->extremum;
+        if (c->side < 0) { /* all its plays start to follow there */
+            first = e;
+            level = c->pass[1];
+            next = e;
+            next_level = level;
+        } else {
+            const plain_real_t y = c->pass[0]; /* with its sign changed */
+            const plain_real_t *r = &t->threshold[k];
+            const plain_real_t *z = &t->start_level[k];
+            if (c->side != 0) {
+                first = e + (r[-1] + r[-1]);
+                level = (z[-1] + z[-1]) - y;
+                next = e + (r[0] + r[0]);
+                next_level = (z[0] + z[0]) - y;
+            } else {
+                first = e + r[-1];
+                level = z[-1] - y;
+                next = e + r[0];
+                next_level = z[0] - y;
+            }
         }
-    } else { /* the move turns back */
-        if (k > 2) {
-            plain_push_corner(t, m, &corner[depth]);
-            depth = depth + 1;
-        }
-        k = 1;
-        rising = !rising;
+    } else { /* every play follows */
+        first = 0;
+        level = -t->all_lift;
+        next = FLT_MAX;
+        next_level = FLT_MAX;
     }
-    there->rising = rising;
-    plain_find_by_output(t, corner, depth, k, output, there);
-    plain_corners_settle(t, there, corner);
-    k = there->k;
-    w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
-    if (plain_past(w, there->next, rising)) {
-        return there->next;
+    p->anchor_output = level;
+    p->next_output = next_level;
+    p->anchor = first;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)left;
+    p->rising = true;
+    w = first + (output - level) * t->inverse_slope[k];
+    if (w > next) {
+        return next;
     }
-    if (k > 1) {
-        const plain_corner_t *owner = plain_entered_by(corner, there->depth, depth, k);
-        const plain_real_t first = plain_activation(t, owner, k - 1, rising);
-        if (!plain_reached(w, first, rising)) {
-            there->anchor = first; /* so that later answers of the same move do not lie before this one */
-            there->anchor_output = output;
-            return first;
-        }
+    if (left < depth && corner[left].end == k) {
+        first = plain_activation(t, &corner[left], k - 1, true);
+    }
+    if (w < first && k > 1) {
+        p->anchor = first; /* so that later answers of the same move do not lie before this one */
+        p->anchor_output = output;
+        return first;
     }
     return w;
+}
+
+/* The same for a falling move. */
+static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corner_t *corner,
+                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                plain_real_t output, plain_place_t *p)
+{
+    plain_real_t w;
+    plain_real_t first;
+    plain_real_t level;
+    plain_real_t next;
+    plain_real_t next_level;
+    if (left > 0) {
+        const plain_corner_t *c = &corner[left - 1];
+        const plain_real_t e = c->extremum;
+        if (c->side > 0) { /* all its plays start to follow there */
+            first = e;
+            level = -c->pass[0];
+            next = e;
+            next_level = level;
+        } else {
+            const plain_real_t y = c->pass[1];
+            const plain_real_t *r = &t->threshold[k];
+            const plain_real_t *z = &t->start_level[k];
+            if (c->side != 0) {
+                first = e - (r[-1] + r[-1]);
+                level = y - (z[-1] + z[-1]);
+                next = e - (r[0] + r[0]);
+                next_level = y - (z[0] + z[0]);
+            } else {
+                first = e - r[-1];
+                level = y - z[-1];
+                next = e - r[0];
+                next_level = y - z[0];
+            }
+        }
+    } else { /* every play follows */
+        first = 0;
+        level = t->all_lift;
+        next = -FLT_MAX;
+        next_level = -FLT_MAX;
+    }
+    p->anchor_output = level;
+    p->next_output = next_level;
+    p->anchor = first;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)left;
+    p->rising = false;
+    w = first + (output - level) * t->inverse_slope[k];
+    if (w < next) {
+        return next;
+    }
+    if (left < depth && corner[left].end == k) {
+        first = plain_activation(t, &corner[left], k - 1, false);
+    }
+    if (w > first && k > 1) {
+        p->anchor = first; /* so that later answers of the same move do not lie before this one */
+        p->anchor_output = output;
+        return first;
+    }
+    return w;
+}
+
+/* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
+   a turn leaves its corner in the free slot above those that are held, which is scratch space. Or false, where no more
+   plays are taken along; then *w is the input of the plays. Moves nothing. */
+static bool plain_corners_begin(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                       plain_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
+                                       plain_real_t *w)
+{
+    const plain_place_t *here = &m->here;
+    *depth = here->depth;
+    *k = here->k + 1u;
+    *rising = here->rising;
+    if (here->rising ? output < here->next_output : output > here->next_output) {
+        *w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
+        if (here->rising ? *w >= m->w : *w <= m->w) {
+            m->there.k = 0;
+            *w = plain_reached(*w, here->next, here->rising) ? here->next : *w;
+            return false;
+        }
+        if (here->k > 1) { /* the move turns back */
+            plain_push_corner(t, m, corner);
+            *depth = *depth + 1;
+        }
+        *k = 1;
+        *rising = !here->rising;
+    }
+    return true;
 }
 
 static const plain_real_t plain_threshold[7] = {
@@ -447,37 +598,6 @@ static plain_real_t plain_inverse_answer(plain_inverse_t *self, plain_real_t v)
     return v;
 }
 
-/* After a step whose answer lies where solving put it: up to which reference the same plays follow, so that the next
-   steps need not look; a little short of it, by more than rounding can be. */
-static void plain_inverse_enter_fast(plain_inverse_t *self, plain_real_t u)
-{
-    const plain_place_t *p = &self->memory.there;
-    self->fast = true;
-    self->gain = plain_reciprocal[p->k];
-    self->falling = !p->rising;
-    if (p->rising) {
-        plain_real_t edge = p->next_output;
-        if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
-            edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
-        }
-        if (edge > PLAIN_OUTPUT_MAX) {
-            edge = PLAIN_OUTPUT_MAX;
-        }
-        self->edge[0] = u;
-        self->edge[1] = edge - 2.2984315e-05f;
-    } else {
-        plain_real_t edge = p->next_output;
-        if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
-            edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
-        }
-        if (edge < PLAIN_OUTPUT_MIN) {
-            edge = PLAIN_OUTPUT_MIN;
-        }
-        self->edge[0] = edge + 2.2984315e-05f;
-        self->edge[1] = u;
-    }
-}
-
 /* What the fast steps have left undone, all but taking the drives to memory. */
 static void plain_inverse_leave_fast(plain_inverse_t *self)
 {
@@ -485,6 +605,9 @@ static void plain_inverse_leave_fast(plain_inverse_t *self)
     self->reference = self->edge[self->falling ? 1 : 0];
     self->answer = self->pending;
     self->edge[0] = self->edge[1];
+    self->has_pending = true;
+    self->repeat = true;
+    self->stepped = true;
 }
 
 /* The actuator has seen w, which lies where solving put it. */
@@ -495,96 +618,425 @@ static void plain_inverse_take(plain_inverse_t *self, plain_real_t w)
     self->memory.w = w;
 }
 
-#if defined(__GNUC__)
-__attribute__((noinline)) /* so that the usual sample saves no registers for it */
-#endif
-static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u);
+/* Returns drive v and leaves it pending, unless the memory is there already. */
+static plain_real_t plain_inverse_send(plain_inverse_t *self, plain_real_t v)
+{
+    const plain_memory_t *m = &self->memory;
+    (void)plain_inverse_answer(self, v);
+    self->has_pending = m->there.k > 0 || v < m->w || v > m->w || (m->here.rising ? v >= m->here.next : v <= m->here.next);
+    return v;
+}
 
-/* Where a move that has gone on fast takes just one more play of the same corner along, the usual one among the samples
-   that are left, there is no need to look further. */
+/* A drive that is not what solving gave, or that is no move. */
+static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t u, plain_real_t v)
+{
+    const plain_real_t inside = plain_clamp_drive(v);
+    self->bits = inside < v || inside > v ? PLAIN_STATUS_OUTPUT_CLAMPED : 0;
+    self->status |= self->bits;
+    self->reference = u;
+    self->repeat = true;
+    self->fast = false;
+    self->edge[0] = self->edge[1];
+    return plain_inverse_send(self, inside);
+}
+
+/* After a step with a reference that had to be limited. */
+static void plain_inverse_mark(plain_inverse_t *self, plain_real_t asked)
+{
+    if (self->fast && (asked < PLAIN_OUTPUT_MIN) == self->falling) {
+        self->edge[self->falling] = asked;
+    } else if (self->fast) { /* what is asked for lies behind */
+        plain_inverse_leave_fast(self);
+    }
+    self->reference = asked;
+    self->bits |= PLAIN_STATUS_INPUT_CLAMPED;
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+}
+
+/* A move to u once what begins it is known: k plays follow, `depth` corners hold the others. From where it ends samples
+   are fast up to the reference at which another play follows, so that they need not look; a little short of it, by more
+   than rounding can be. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that shorter ways save no registers for it */
+#endif
+static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth, unsigned int k, bool rising,
+    plain_real_t u)
+{
+    const plain_place_t *p = &self->memory.there;
+    const plain_real_t output = u;
+    const unsigned int left = plain_corners_find(&plain_tables, self->corner, self->memory.start, depth, &k,
+        rising ? output : -output, rising);
+    plain_real_t v;
+    plain_real_t edge;
+    if (rising) {
+        v = plain_corners_rise(&plain_tables, self->corner, depth, left, k, output, &self->memory.there);
+        if (!(v > self->memory.w)) {
+            return plain_inverse_stay(self, u, v);
+        }
+        edge = p->next_output;
+        if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
+            if (v > PLAIN_DRIVE_MAX) {
+                return plain_inverse_stay(self, u, v);
+            }
+            edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
+        }
+        if (edge > PLAIN_OUTPUT_MAX) {
+            edge = PLAIN_OUTPUT_MAX;
+        }
+        self->edge[0] = u;
+        self->edge[1] = edge - 2.2984315e-05f;
+        self->gain = plain_reciprocal[p->k];
+        self->falling = false;
+        self->fast = true;
+        self->pending = v;
+        self->reference = u;
+        self->bits = 0;
+        return v;
+    }
+    v = plain_corners_fall(&plain_tables, self->corner, depth, left, k, output, &self->memory.there);
+    if (!(v < self->memory.w)) {
+        return plain_inverse_stay(self, u, v);
+    }
+    edge = p->next_output;
+    if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
+        if (v < PLAIN_DRIVE_MIN) {
+            return plain_inverse_stay(self, u, v);
+        }
+        edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
+    }
+    if (edge < PLAIN_OUTPUT_MIN) {
+        edge = PLAIN_OUTPUT_MIN;
+    }
+    self->edge[1] = u;
+    self->edge[0] = edge + 2.2984315e-05f;
+    self->gain = plain_reciprocal[p->k];
+    self->falling = true;
+    self->fast = true;
+    self->pending = v;
+    self->reference = u;
+    self->bits = 0;
+    return v;
+}
+
+/* The same for a reference that has to be limited. */
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static plain_real_t plain_inverse_limited(plain_inverse_t *self, unsigned int depth, unsigned int k,
+    bool rising, plain_real_t u)
+{
+    const plain_real_t v = plain_inverse_far(self, depth, k, rising,
+        u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX);
+    plain_inverse_mark(self, u);
+    return v;
+}
+
+/* A rising move that takes no more plays along, and is fast from u on. */
+static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t u,
+    plain_real_t v)
+{
+    const plain_place_t *p = &self->memory.here;
+    plain_real_t edge;
+    if (!(v > self->memory.w && v < p->next)) {
+        return plain_inverse_stay(self, u, v);
+    }
+    plain_copy_place(&self->memory.there, p);
+    edge = p->next_output;
+    if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
+        if (v > PLAIN_DRIVE_MAX) {
+            return plain_inverse_stay(self, u, v);
+        }
+        edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
+    }
+    if (edge > PLAIN_OUTPUT_MAX) {
+        edge = PLAIN_OUTPUT_MAX;
+    }
+    self->edge[0] = u;
+    self->edge[1] = edge - 2.2984315e-05f;
+    self->gain = plain_reciprocal[p->k];
+    self->falling = false;
+    self->fast = true;
+    self->pending = v;
+    self->reference = u;
+    self->bits = 0;
+    return v;
+}
+
+/* A falling move that takes no more plays along, and is fast from u on. */
+static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t u,
+    plain_real_t v)
+{
+    const plain_place_t *p = &self->memory.here;
+    plain_real_t edge;
+    if (!(v < self->memory.w && v > p->next)) {
+        return plain_inverse_stay(self, u, v);
+    }
+    plain_copy_place(&self->memory.there, p);
+    edge = p->next_output;
+    if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
+        if (v < PLAIN_DRIVE_MIN) {
+            return plain_inverse_stay(self, u, v);
+        }
+        edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
+    }
+    if (edge < PLAIN_OUTPUT_MIN) {
+        edge = PLAIN_OUTPUT_MIN;
+    }
+    self->edge[1] = u;
+    self->edge[0] = edge + 2.2984315e-05f;
+    self->gain = plain_reciprocal[p->k];
+    self->falling = true;
+    self->fast = true;
+    self->pending = v;
+    self->reference = u;
+    self->bits = 0;
+    return v;
+}
+
+/* Any sample, limits and what is no number included. */
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
+{
+    const plain_real_t asked = u;
+    unsigned int depth;
+    unsigned int k;
+    bool rising;
+    plain_real_t v;
+    if (self->fast) {
+        plain_inverse_leave_fast(self);
+        plain_inverse_take(self, self->pending);
+    } else if (self->has_pending) { /* what was sent last is what the actuator has seen */
+        plain_inverse_see(self, self->pending);
+    }
+    self->has_pending = false;
+    if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
+        if (!plain_finite(u)) {
+            self->status |= PLAIN_STATUS_HELD;
+            return plain_inverse_send(self, self->stepped ? self->answer : plain_clamp_drive(self->applied));
+        }
+        u = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
+    }
+    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
+        self->status |= self->bits;
+        return plain_inverse_send(self, self->answer);
+    }
+    if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
+        return asked < u || asked > u ? plain_inverse_limited(self, depth, k, rising, asked)
+                                      : plain_inverse_far(self, depth, k, rising, u);
+    }
+    v = rising ? plain_inverse_up(self, u, v) : plain_inverse_down(self, u, v);
+    if (asked < u || asked > u) {
+        plain_inverse_mark(self, asked);
+    }
+    return v;
+}
+
+/* Where a fast move turns back, or takes just one more play of the same corner along, the usual ones among the samples
+   that are left. */
 #if defined(__GNUC__)
 __attribute__((noinline))
 #endif
 static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
 {
     const plain_real_t output = u;
-    plain_place_t *p = &self->memory.there;
-    plain_real_t answer;
+    plain_memory_t *m = &self->memory;
+    plain_place_t *p = &m->there;
+    plain_real_t last;
+    plain_real_t edge;
+    plain_real_t v;
     if (!self->fast) {
         return plain_inverse_look(self, u);
     }
-    if (p->rising && output >= p->next_output && u <= PLAIN_OUTPUT_MAX) {
-        const plain_corner_t *c = &self->corner[p->depth - 1];
-        const unsigned int k = p->k + 1u;
-        const plain_real_t v = p->next + (output - p->next_output) * plain_reciprocal[k];
-        plain_real_t way = output - c->output;
-        plain_real_t r;
-        plain_real_t z;
-        if (k >= c->end || c->side < 0) {
-            return plain_inverse_look(self, u);
-        }
-        r = plain_threshold[k];
-        z = plain_start_level[k];
-        if (c->side != 0) {
-            way = way * 0.5f;
-            r = r + r;
-            if (way >= z) {
-                return plain_inverse_look(self, u);
+    if (p->rising) {
+        if (output >= p->next_output && u > self->edge[0]) {
+            const plain_corner_t *c;
+            const unsigned int k = p->k + 1u;
+            if (u > PLAIN_OUTPUT_MAX) {
+                if (!(PLAIN_OUTPUT_MAX >= p->next_output) || !plain_finite(u)) {
+                    return plain_inverse_look(self, u);
+                }
+                plain_inverse_take(self, self->pending);
+                return plain_inverse_limited(self, m->here.depth, k, true, u);
             }
-            z = z + z;
-        } else if (way >= z) {
-            return plain_inverse_look(self, u);
-        }
-        r = c->extremum + r;
-        if (!(v < r && v <= PLAIN_DRIVE_MAX)) {
-            return plain_inverse_look(self, u);
-        }
-        plain_copy_place(&self->memory.here, p);
-        p->next = r;
-        p->next_output = c->output + z;
-        answer = v;
-    } else if (!p->rising && output <= p->next_output && u >= PLAIN_OUTPUT_MIN) {
-        const plain_corner_t *c = &self->corner[p->depth - 1];
-        const unsigned int k = p->k + 1u;
-        const plain_real_t v = p->next + (output - p->next_output) * plain_reciprocal[k];
-        plain_real_t way = c->output - output;
-        plain_real_t r;
-        plain_real_t z;
-        if (k >= c->end || c->side > 0) {
-            return plain_inverse_look(self, u);
-        }
-        r = plain_threshold[k];
-        z = plain_start_level[k];
-        if (c->side != 0) {
-            way = way * 0.5f;
-            r = r + r;
-            if (way >= z) {
-                return plain_inverse_look(self, u);
+            c = &self->corner[p->depth - 1];
+            if (k < c->end && !(c->side < 0)) {
+                const plain_real_t y = c->pass[0]; /* with its sign changed */
+                plain_real_t way = output + y;
+                plain_real_t r = plain_threshold[k];
+                plain_real_t z = plain_start_level[k];
+                bool first = way < z;
+                if (c->side != 0) {
+                    first = way * 0.5f < z;
+                    r = r + r;
+                    z = z + z;
+                }
+                r = c->extremum + r;
+                v = p->next + (output - p->next_output) * plain_reciprocal[k];
+                if (first && v < r && v <= PLAIN_DRIVE_MAX) {
+                    plain_copy_place(&m->here, p);
+                    m->w = self->pending;
+                    p->anchor = p->next;
+                    p->anchor_output = p->next_output;
+                    p->next = r;
+                    p->next_output = z - y;
+                    p->k = (uint_least16_t)k;
+                    edge = p->next_output;
+                    if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
+                        if (v > PLAIN_DRIVE_MAX) {
+                            return plain_inverse_stay(self, u, v);
+                        }
+                        edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
+                    }
+                    if (edge > PLAIN_OUTPUT_MAX) {
+                        edge = PLAIN_OUTPUT_MAX;
+                    }
+                    self->edge[0] = u;
+                    self->edge[1] = edge - 2.2984315e-05f;
+                    self->gain = plain_reciprocal[p->k];
+                    self->falling = false;
+                    self->fast = true;
+                    self->pending = v;
+                    self->reference = u;
+                    self->bits = 0;
+                    return v;
+
+                }
             }
-            z = z + z;
-        } else if (way >= z) {
-            return plain_inverse_look(self, u);
+            plain_inverse_take(self, self->pending);
+            return plain_inverse_far(self, m->here.depth, k, true, u);
         }
-        r = c->extremum - r;
-        if (!(v > r && v >= PLAIN_DRIVE_MIN)) {
-            return plain_inverse_look(self, u);
+
+        v = p->anchor + (output - p->anchor_output) * self->gain;
+        if (v < self->pending) {
+            unsigned int depth = p->depth;
+            plain_inverse_take(self, self->pending);
+            if (m->here.k > 1) {
+                plain_corner_t *c = &self->corner[depth];
+                const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
+                const plain_real_t z = plain_start_level[m->here.k - 1];
+                if (m->start > depth) {
+                    m->start = (uint_least16_t)depth;
+                }
+                c->pass[0] = (z + z) - y;
+                c->pass[1] = y;
+                c->extremum = m->w;
+                c->end = m->here.k;
+                c->side = -1;
+                depth = depth + 1;
+            }
+            if (u < PLAIN_OUTPUT_MIN) {
+                if (!plain_finite(u)) {
+                    plain_inverse_leave_fast(self);
+                    self->has_pending = false;
+                    return plain_inverse_look(self, u);
+                }
+                return plain_inverse_limited(self, depth, 1, false, u);
+            }
+            return plain_inverse_far(self, depth, 1, false, u);
         }
-        plain_copy_place(&self->memory.here, p);
-        p->next = r;
-        p->next_output = c->output - z;
-        answer = v;
-    } else {
-        return plain_inverse_look(self, u);
+} else {
+        if (output <= p->next_output && u < self->edge[1]) {
+            const plain_corner_t *c;
+            const unsigned int k = p->k + 1u;
+            if (u < PLAIN_OUTPUT_MIN) {
+                if (!(PLAIN_OUTPUT_MIN <= p->next_output) || !plain_finite(u)) {
+                    return plain_inverse_look(self, u);
+                }
+                plain_inverse_take(self, self->pending);
+                return plain_inverse_limited(self, m->here.depth, k, false, u);
+            }
+            c = &self->corner[p->depth - 1];
+            if (k < c->end && !(c->side > 0)) {
+                const plain_real_t y = c->pass[1];
+                plain_real_t way = y - output;
+                plain_real_t r = plain_threshold[k];
+                plain_real_t z = plain_start_level[k];
+                bool first = way < z;
+                if (c->side != 0) {
+                    first = way * 0.5f < z;
+                    r = r + r;
+                    z = z + z;
+                }
+                r = c->extremum - r;
+                v = p->next + (output - p->next_output) * plain_reciprocal[k];
+                if (first && v > r && v >= PLAIN_DRIVE_MIN) {
+                    plain_copy_place(&m->here, p);
+                    m->w = self->pending;
+                    p->anchor = p->next;
+                    p->anchor_output = p->next_output;
+                    p->next = r;
+                    p->next_output = y - z;
+                    p->k = (uint_least16_t)k;
+                    edge = p->next_output;
+                    if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
+                        if (v < PLAIN_DRIVE_MIN) {
+                            return plain_inverse_stay(self, u, v);
+                        }
+                        edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
+                    }
+                    if (edge < PLAIN_OUTPUT_MIN) {
+                        edge = PLAIN_OUTPUT_MIN;
+                    }
+                    self->edge[1] = u;
+                    self->edge[0] = edge + 2.2984315e-05f;
+                    self->gain = plain_reciprocal[p->k];
+                    self->falling = true;
+                    self->fast = true;
+                    self->pending = v;
+                    self->reference = u;
+                    self->bits = 0;
+                    return v;
+
+                }
+            }
+            plain_inverse_take(self, self->pending);
+            return plain_inverse_far(self, m->here.depth, k, false, u);
+        }
+
+        v = p->anchor + (output - p->anchor_output) * self->gain;
+        if (v > self->pending) {
+            unsigned int depth = p->depth;
+            plain_inverse_take(self, self->pending);
+            if (m->here.k > 1) {
+                plain_corner_t *c = &self->corner[depth];
+                const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
+                const plain_real_t z = plain_start_level[m->here.k - 1];
+                if (m->start > depth) {
+                    m->start = (uint_least16_t)depth;
+                }
+                c->pass[0] = -y;
+                c->pass[1] = (z + z) + y;
+                c->extremum = m->w;
+                c->end = m->here.k;
+                c->side = 1;
+                depth = depth + 1;
+            }
+            if (u > PLAIN_OUTPUT_MAX) {
+                if (!plain_finite(u)) {
+                    plain_inverse_leave_fast(self);
+                    self->has_pending = false;
+                    return plain_inverse_look(self, u);
+                }
+                return plain_inverse_limited(self, depth, 1, true, u);
+            }
+            return plain_inverse_far(self, depth, 1, true, u);
+        }
+}
+    last = self->edge[self->falling];
+    if ((u >= last && u <= last) || (plain_finite(u) && (p->rising
+        ? u > PLAIN_OUTPUT_MAX && last > PLAIN_OUTPUT_MAX && PLAIN_OUTPUT_MAX < p->next_output
+        : u < PLAIN_OUTPUT_MIN && last < PLAIN_OUTPUT_MIN && PLAIN_OUTPUT_MIN > p->next_output))) {
+        /* the last answer once more, for the same reference or one with the same limit; the drive has come to it */
+        plain_copy_place(&m->here, p);
+        m->w = self->pending;
+        self->edge[self->falling] = u;
+        self->reference = u;
+        self->status |= self->bits;
+        return self->pending;
     }
-    p->anchor = self->memory.here.next;
-    p->anchor_output = self->memory.here.next_output;
-    p->k = (uint_least16_t)(p->k + 1u);
-    self->memory.w = self->pending;
-    self->pending = answer;
-    self->reference = u;
-    self->bits = 0;
-    plain_inverse_enter_fast(self, u);
-    return answer;
+    return plain_inverse_look(self, u);
 }
 
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
@@ -598,59 +1050,6 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         return v;
     }
     return plain_inverse_next(self, u);
-}
-
-static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
-{
-    plain_real_t w;
-    plain_real_t v;
-    plain_real_t asked;
-    plain_real_t inside;
-    unsigned int bits = 0;
-    if (self->fast) {
-        plain_inverse_leave_fast(self);
-        plain_inverse_take(self, self->pending);
-        self->has_pending = false;
-    }
-    if (self->has_pending) { /* what was sent last is what the actuator has seen */
-        plain_inverse_see(self, self->pending);
-        self->has_pending = false;
-    }
-    asked = u;
-    if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
-        if (!plain_finite(u)) {
-            self->status |= PLAIN_STATUS_HELD;
-            return plain_inverse_answer(self, self->stepped ? self->answer : plain_clamp_drive(self->applied));
-        }
-        u = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
-        bits = PLAIN_STATUS_INPUT_CLAMPED;
-    }
-    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
-        self->status |= self->bits;
-        return plain_inverse_answer(self, self->answer);
-    }
-    self->reference = asked;
-    self->repeat = true;
-    w = plain_corners_solve(&plain_tables, &self->memory, self->corner, u - 0.0f);
-    v = w;
-    inside = plain_clamp_drive(v);
-    if (inside < v || inside > v) {
-        bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
-    }
-    self->bits = bits;
-    self->status |= bits;
-    if (!(bits & PLAIN_STATUS_OUTPUT_CLAMPED)) { /* the drive is what solving gave */
-        const plain_memory_t *m = &self->memory;
-        const plain_place_t *p = m->there.k > 0 ? &m->there : &m->here;
-        if ((p->rising ? v > m->w && (v < p->next || p == &m->there) : v < m->w && (v > p->next || p == &m->there))
-            && (bits == 0 || (asked > u) == p->rising)) { /* a limited reference lies ahead, no other one before it */
-            if (p != &m->there) {
-                plain_copy_place(&self->memory.there, p);
-            }
-            plain_inverse_enter_fast(self, asked);
-        }
-    }
-    return plain_inverse_answer(self, inside);
 }
 
 void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)

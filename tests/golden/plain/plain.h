@@ -10,8 +10,8 @@
  *
  * Cost, derived from the model (32-bit target):
  *     constant tables   152 bytes
- *     inverse instance  172 bytes of RAM
- *     inverse step, worst case: 9 multiplications, 53 comparisons (41 + 4 b, b = 3 the bits of n)
+ *     inverse instance  200 bytes of RAM
+ *     inverse step, worst case: 7 multiplications, 50 comparisons (38 + 4 b, b = 3 the bits of n)
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero
@@ -54,16 +54,20 @@ typedef float plain_real_t;
 #define PLAIN_STATUS_HELD 4u /* NaN or infinite input: the last answer was held */
 #define PLAIN_STATUS_DOMAIN 8u /* inverse: the argument of an envelope was limited */
 
-/* What the corner list of one instance looks like in memory. */
+/* A corner in floating point. */
 
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
-    plain_real_t output;     /* output at that moment; for side 0, less what a move has changed since the start */
+    plain_real_t pass[2];    /* output at which a falling move, its sign changed, and a rising one have taken along the
+                                 whole block, so that a search reads nothing else; one of them is that of the corner's
+                                 own moment. For side 0 both are, less what a move has changed since the start. */
     plain_real_t extremum;  /* input of the plays at which the move that left this corner ended */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } plain_corner_t;
+
+/* Where the plays of one instance are; what a corner is, stands in a header of each arithmetic's own. */
 
 /* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
@@ -81,6 +85,7 @@ typedef struct {
     plain_place_t here;
     plain_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
     plain_real_t w;      /* input of the plays, w = G[v] */
+    uint_least16_t start;  /* corners at the bottom that are of the start, where no more than `depth` are left of them */
 } plain_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */

@@ -10,7 +10,7 @@
  *
  * Cost, derived from the model (32-bit target):
  *     constant tables   364 bytes
- *     inverse instance  156 bytes of RAM
+ *     inverse instance  184 bytes of RAM
  *     inverse step, worst case: 12 multiplications, 60 comparisons (48 + 4 b, b = 3 the bits of n), 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
@@ -57,16 +57,20 @@ typedef float two_branches_real_t;
 #define TWO_BRANCHES_STATUS_HELD 4u /* NaN or infinite input: the last answer was held */
 #define TWO_BRANCHES_STATUS_DOMAIN 8u /* inverse: the argument of an envelope was limited */
 
-/* What the corner list of one instance looks like in memory. */
+/* A corner in floating point. */
 
 /* A corner: the plays of its block, from the corner above it (or the plays that follow) up to `end` - 1,
    hold extremum + side * threshold. Corners lie in a stack, the block with the largest thresholds first. */
 typedef struct {
-    two_branches_real_t output;     /* output at that moment; for side 0, less what a move has changed since the start */
+    two_branches_real_t pass[2];    /* output at which a falling move, its sign changed, and a rising one have taken along the
+                                 whole block, so that a search reads nothing else; one of them is that of the corner's
+                                 own moment. For side 0 both are, less what a move has changed since the start. */
     two_branches_real_t extremum;  /* input of the plays at which the move that left this corner ended */
     uint_least16_t end;       /* first play beyond the block */
     int_least8_t side;        /* -1 left by a rising move, +1 by a falling one, 0 never moved since the start */
 } two_branches_corner_t;
+
+/* Where the plays of one instance are; what a corner is, stands in a header of each arithmetic's own. */
 
 /* Where a move has come to: plays 0 .. k-1 follow the input w, `depth` corners hold the others. */
 typedef struct {
@@ -84,6 +88,7 @@ typedef struct {
     two_branches_place_t here;
     two_branches_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
     two_branches_real_t w;      /* input of the plays, w = G[v] */
+    uint_least16_t start;  /* corners at the bottom that are of the start, where no more than `depth` are left of them */
 } two_branches_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
@@ -308,6 +313,44 @@ static two_branches_real_t two_branches_half(two_branches_real_t x)
     return x * (two_branches_real_t)0.5f;
 }
 
+/* Output at the moment that a corner was left. */
+static two_branches_real_t two_branches_held(const two_branches_corner_t *c)
+{
+    return c->side > 0 ? -c->pass[0] : c->pass[1];
+}
+
+/* Writes the corner that a rising (side -1) or falling (side +1) move leaves at w, or that the start does (0). */
+static void two_branches_write_corner(const two_branches_tables_t *t, two_branches_corner_t *c, two_branches_real_t w,
+                                 two_branches_real_t output, unsigned int end, int side)
+{
+    if (side < 0) {
+        const two_branches_real_t z = t->start_level[end - 1];
+        c->pass[0] = (z + z) - output;
+        c->pass[1] = output;
+    } else if (side > 0) {
+        const two_branches_real_t z = t->start_level[end - 1];
+        c->pass[0] = -output;
+        c->pass[1] = (z + z) + output;
+    } else {
+        c->pass[0] = -output;
+        c->pass[1] = output;
+    }
+    c->extremum = w;
+    c->end = (uint_least16_t)end;
+    c->side = (int_least8_t)side;
+}
+
+/* Leaves the corner of turning back, at `output`, above those that are held. */
+static void two_branches_leave_corner(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                 two_branches_real_t output)
+{
+    const unsigned int depth = m->here.depth;
+    if (m->start > depth) {
+        m->start = (uint_least16_t)depth;
+    }
+    two_branches_write_corner(t, &corner[depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+}
+
 static bool two_branches_reached(two_branches_real_t x, two_branches_real_t level, bool rising)
 {
     return rising ? x >= level : x <= level;
@@ -342,7 +385,7 @@ static void two_branches_corners_settle(const two_branches_tables_t *t, two_bran
     if (p->depth > 0) {
         const two_branches_corner_t *c = &corner[p->depth - 1];
         const two_branches_real_t e = c->extremum;
-        const two_branches_real_t y = c->output;
+        const two_branches_real_t y = two_branches_held(c);
         const two_branches_real_t *r = &t->threshold[p->k];
         const two_branches_real_t *z = &t->start_level[p->k];
         const int side = c->side;
@@ -492,12 +535,11 @@ static void two_branches_corners_rest(const two_branches_tables_t *t, two_branch
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->start = 0;
     if (t->n > 0) {
-        corner[0].extremum = w;
-        corner[0].output = w * t->slope[t->n + 1u];
-        corner[0].end = (uint_least16_t)(t->n + 1);
-        corner[0].side = 0;
+        two_branches_write_corner(t, corner, w, w * t->slope[t->n + 1u], t->n + 1u, 0);
         m->here.depth = 1;
+        m->start = 1;
     }
     two_branches_corners_settle(t, &m->here, corner);
 }
@@ -508,18 +550,10 @@ static two_branches_real_t two_branches_corners_output(const two_branches_tables
     return m->here.anchor_output + (m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Writes the corner that turning back leaves into slot c. */
-static void two_branches_write_corner(two_branches_corner_t *c, const two_branches_memory_t *m, two_branches_real_t output)
+/* Leaves the corner of turning back above those that are held. */
+static void two_branches_push_corner(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner)
 {
-    c->extremum = m->w;
-    c->output = output;
-    c->end = m->here.k;
-    c->side = m->here.rising ? -1 : 1;
-}
-
-static void two_branches_push_corner(const two_branches_tables_t *t, const two_branches_memory_t *m, two_branches_corner_t *c)
-{
-    two_branches_write_corner(c, m, two_branches_corners_output(t, m));
+    two_branches_leave_corner(t, m, corner, two_branches_corners_output(t, m));
 }
 
 /* Moves the input of the plays to w. */
@@ -529,7 +563,7 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
     const bool turned = m->here.rising ? w < m->w : w > m->w;
     if (turned) {       /* the plays that followed stay where they are */
         if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            two_branches_push_corner(t, m, &corner[m->here.depth]);
+            two_branches_push_corner(t, m, corner);
             m->here.depth = (uint_least16_t)(m->here.depth + 1u);
         }
         m->here.rising = !m->here.rising;
@@ -550,103 +584,243 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
     m->there.k = 0;
 }
 
-static bool two_branches_passed(two_branches_real_t output, two_branches_real_t level, bool rising)
-{
-    return rising ? output >= level : output <= level;
-}
-
-/* As two_branches_threshold_not_reached, over outputs gained. */
-static unsigned int two_branches_level_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
+/* First of the start levels k .. high-1 that a way x has not reached, or high; mostly it is the first. */
+static unsigned int two_branches_level_not_reached(const two_branches_real_t *level, unsigned int k, unsigned int high,
                                               two_branches_real_t x)
 {
-    if (k < high && x >= step[k]) {
+    if (k < high && x >= level[k]) {
         ++k;
-        if (k < high && x >= step[k]) {
-            ++k;
-            while (k < high) {
-                const unsigned int middle = (k + high) / 2;
-                if (x >= step[middle]) {
-                    k = middle + 1;
-                } else {
-                    high = middle;
-                }
+        while (k < high) {
+            const unsigned int middle = (k + high) / 2;
+            if (x >= level[middle]) {
+                k = middle + 1;
+            } else {
+                high = middle;
             }
         }
     }
     return k;
 }
 
-/* As two_branches_find_by_input, for a move to an output. */
-static void two_branches_find_by_output(const two_branches_tables_t *t, const two_branches_corner_t *corner, unsigned int depth,
-                                   unsigned int k, two_branches_real_t output, two_branches_place_t *p)
+/* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
+   follow then, of which the first ones are known to. x as a rising move sees it. First the blocks that are passed
+   whole, from the last one left by bisection, those of the start but the lowest likewise, then the plays of one. */
+static unsigned int two_branches_corners_find(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                              unsigned int start, unsigned int depth, unsigned int *k,
+                                              two_branches_real_t x, bool rising)
 {
-    const bool rising = p->rising;
-    const two_branches_real_t x = rising ? output : -output; /* everything as a rising move sees it */
-    unsigned int low = 0;
+    unsigned int low = start;
     unsigned int left = depth;
-    unsigned int probe = left;
+    unsigned int probe = depth;
     while (low < left) {
-        const two_branches_corner_t *c = &corner[probe - 1];
-        if (x >= two_branches_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+        if (x >= corner[probe - 1].pass[rising]) {
             left = probe - 1;
-            k = c->end;
         } else {
             low = probe;
         }
         probe = (low + left + 1) / 2;
     }
-    if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
-        const two_branches_corner_t *c = &corner[left - 1];
-        k = two_branches_level_not_reached(t->start_level, k, c->end - 1u, two_branches_way(x, rising ? c->output : -c->output, c->side));
+    if (start > 1 && left > 1 && left <= start) {
+        low = 1;
+        probe = left;
+        while (low < left) {
+            const two_branches_corner_t *c = &corner[probe - 1];
+            if (x >= t->start_level[c->end - 1] - c->pass[!rising]) {
+                left = probe - 1;
+            } else {
+                low = probe;
+            }
+            probe = (low + left + 1) / 2;
+        }
     }
-    p->depth = (uint_least16_t)left;
+    if (left < depth) {
+        *k = corner[left].end;
+    }
+    if (left > 0) {
+        const two_branches_corner_t *c = &corner[left - 1];
+        if (c->side == 0) {
+            const unsigned int high = left == 1 ? c->end : c->end - 1u;
+            *k = two_branches_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
+            if (*k == c->end) { /* the last one too */
+                --left;
+            }
+        } else if (c->side != (rising ? -1 : 1)) {
+            *k = two_branches_level_not_reached(t->start_level, *k, c->end - 1u, two_branches_half(x + c->pass[!rising]));
+        }
+    }
+    return left;
+}
+
+/* A rising move to `output` that leaves `left` of `depth` corners, after which k plays follow: fills in the place where
+   it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
+   that follow are those that will. */
+static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                two_branches_real_t output, two_branches_place_t *p)
+{
+    two_branches_real_t w;
+    two_branches_real_t first;
+    two_branches_real_t level;
+    two_branches_real_t next;
+    two_branches_real_t next_level;
+    if (left > 0) {
+        const two_branches_corner_t *c = &corner[left - 1];
+        const two_branches_real_t e = c->extremum;
+        if (c->side < 0) { /* all its plays start to follow there */
+            first = e;
+            level = c->pass[1];
+            next = e;
+            next_level = level;
+        } else {
+            const two_branches_real_t y = c->pass[0]; /* with its sign changed */
+            const two_branches_real_t *r = &t->threshold[k];
+            const two_branches_real_t *z = &t->start_level[k];
+            if (c->side != 0) {
+                first = e + (r[-1] + r[-1]);
+                level = (z[-1] + z[-1]) - y;
+                next = e + (r[0] + r[0]);
+                next_level = (z[0] + z[0]) - y;
+            } else {
+                first = e + r[-1];
+                level = z[-1] - y;
+                next = e + r[0];
+                next_level = z[0] - y;
+            }
+        }
+    } else { /* every play follows */
+        first = 0;
+        level = -t->all_lift;
+        next = FLT_MAX;
+        next_level = FLT_MAX;
+    }
+    p->anchor_output = level;
+    p->next_output = next_level;
+    p->anchor = first;
+    p->next = next;
     p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)left;
+    p->rising = true;
+    w = first + (output - level) * t->inverse_slope[k];
+    if (w > next) {
+        return next;
+    }
+    if (left < depth && corner[left].end == k) {
+        first = two_branches_activation(t, &corner[left], k - 1, true);
+    }
+    if (w < first && k > 1) {
+        p->anchor = first; /* so that later answers of the same move do not lie before this one */
+        p->anchor_output = output;
+        return first;
+    }
+    return w;
+}
+
+/* The same for a falling move. */
+static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                two_branches_real_t output, two_branches_place_t *p)
+{
+    two_branches_real_t w;
+    two_branches_real_t first;
+    two_branches_real_t level;
+    two_branches_real_t next;
+    two_branches_real_t next_level;
+    if (left > 0) {
+        const two_branches_corner_t *c = &corner[left - 1];
+        const two_branches_real_t e = c->extremum;
+        if (c->side > 0) { /* all its plays start to follow there */
+            first = e;
+            level = -c->pass[0];
+            next = e;
+            next_level = level;
+        } else {
+            const two_branches_real_t y = c->pass[1];
+            const two_branches_real_t *r = &t->threshold[k];
+            const two_branches_real_t *z = &t->start_level[k];
+            if (c->side != 0) {
+                first = e - (r[-1] + r[-1]);
+                level = y - (z[-1] + z[-1]);
+                next = e - (r[0] + r[0]);
+                next_level = y - (z[0] + z[0]);
+            } else {
+                first = e - r[-1];
+                level = y - z[-1];
+                next = e - r[0];
+                next_level = y - z[0];
+            }
+        }
+    } else { /* every play follows */
+        first = 0;
+        level = t->all_lift;
+        next = -FLT_MAX;
+        next_level = -FLT_MAX;
+    }
+    p->anchor_output = level;
+    p->next_output = next_level;
+    p->anchor = first;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)left;
+    p->rising = false;
+    w = first + (output - level) * t->inverse_slope[k];
+    if (w < next) {
+        return next;
+    }
+    if (left < depth && corner[left].end == k) {
+        first = two_branches_activation(t, &corner[left], k - 1, false);
+    }
+    if (w > first && k > 1) {
+        p->anchor = first; /* so that later answers of the same move do not lie before this one */
+        p->anchor_output = output;
+        return first;
+    }
+    return w;
+}
+
+/* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
+   a turn leaves its corner in the free slot above those that are held, which is scratch space. Or false, where no more
+   plays are taken along; then *w is the input of the plays. Moves nothing. */
+static bool two_branches_corners_begin(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                       two_branches_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
+                                       two_branches_real_t *w)
+{
+    const two_branches_place_t *here = &m->here;
+    *depth = here->depth;
+    *k = here->k + 1u;
+    *rising = here->rising;
+    if (here->rising ? output < here->next_output : output > here->next_output) {
+        *w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
+        if (here->rising ? *w >= m->w : *w <= m->w) {
+            m->there.k = 0;
+            *w = two_branches_reached(*w, here->next, here->rising) ? here->next : *w;
+            return false;
+        }
+        if (here->k > 1) { /* the move turns back */
+            two_branches_push_corner(t, m, corner);
+            *depth = *depth + 1;
+        }
+        *k = 1;
+        *rising = !here->rising;
+    }
+    return true;
 }
 
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
-   word for the next absorb of where the answer lies; the free slot above the corners is scratch space for the corner
-   that turning back would leave. Rounding is kept from leading out of the place that was found: then the plays that
-   follow are those that will. */
+   word for the next absorb of where the answer lies. */
 static two_branches_real_t two_branches_corners_solve(const two_branches_tables_t *t, two_branches_memory_t *m,
                                                  two_branches_corner_t *corner, two_branches_real_t output)
 {
-    const two_branches_place_t *here = &m->here;
-    two_branches_place_t *there = &m->there;
-    two_branches_real_t w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
-    unsigned int depth = here->depth;
-    unsigned int k = here->k + 1u;
-    bool rising = here->rising;
-    if (rising ? w >= m->w : w <= m->w) {
-        if (!two_branches_passed(output, here->next_output, rising)) {
-            there->k = 0;
-            return two_branches_reached(w, here->next, rising) ? here->next : w;
-        }
-    } else { /* the move turns back */
-        if (k > 2) {
-            two_branches_push_corner(t, m, &corner[depth]);
-            depth = depth + 1;
-        }
-        k = 1;
-        rising = !rising;
+    unsigned int depth;
+    unsigned int left;
+    unsigned int k;
+    bool rising;
+    two_branches_real_t w;
+    if (!two_branches_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
+        return w;
     }
-    there->rising = rising;
-    two_branches_find_by_output(t, corner, depth, k, output, there);
-    two_branches_corners_settle(t, there, corner);
-    k = there->k;
-    w = there->anchor + (output - there->anchor_output) * t->inverse_slope[k];
-    if (two_branches_past(w, there->next, rising)) {
-        return there->next;
-    }
-    if (k > 1) {
-        const two_branches_corner_t *owner = two_branches_entered_by(corner, there->depth, depth, k);
-        const two_branches_real_t first = two_branches_activation(t, owner, k - 1, rising);
-        if (!two_branches_reached(w, first, rising)) {
-            there->anchor = first; /* so that later answers of the same move do not lie before this one */
-            there->anchor_output = output;
-            return first;
-        }
-    }
-    return w;
+    left = two_branches_corners_find(t, corner, m->start, depth, &k, rising ? output : -output, rising);
+    return rising ? two_branches_corners_rise(t, corner, depth, left, k, output, &m->there)
+                  : two_branches_corners_fall(t, corner, depth, left, k, output, &m->there);
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {

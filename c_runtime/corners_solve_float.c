@@ -1,0 +1,173 @@
+#include "hystgen_runtime.h"
+
+/* A rising move to `output` that leaves `left` of `depth` corners, after which k plays follow: fills in the place where
+   it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
+   that follow are those that will. */
+HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                hystgen_real_t output, hystgen_place_t *p)
+{
+    hystgen_real_t w;
+    hystgen_real_t first;
+    hystgen_real_t level;
+    hystgen_real_t next;
+    hystgen_real_t next_level;
+    if (left > 0) {
+        const hystgen_corner_t *c = &corner[left - 1];
+        const hystgen_real_t e = c->extremum;
+        if (c->side < 0) { /* all its plays start to follow there */
+            first = e;
+            level = c->pass[1];
+            next = e;
+            next_level = level;
+        } else {
+            const hystgen_real_t y = c->pass[0]; /* with its sign changed */
+            const hystgen_real_t *r = &t->threshold[k];
+            const hystgen_real_t *z = &t->start_level[k];
+            if (c->side != 0) {
+                first = e + (r[-1] + r[-1]);
+                level = (z[-1] + z[-1]) - y;
+                next = e + (r[0] + r[0]);
+                next_level = (z[0] + z[0]) - y;
+            } else {
+                first = e + r[-1];
+                level = z[-1] - y;
+                next = e + r[0];
+                next_level = z[0] - y;
+            }
+        }
+    } else { /* every play follows */
+        first = 0;
+        level = -t->all_lift;
+        next = HYSTGEN_REACH_MAX;
+        next_level = HYSTGEN_SUM_MAX;
+    }
+    p->anchor_output = level;
+    p->next_output = next_level;
+    p->anchor = first;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)left;
+    p->rising = true;
+    w = first + (output - level) * t->inverse_slope[k];
+    if (w > next) {
+        return next;
+    }
+    if (left < depth && corner[left].end == k) {
+        first = hystgen_activation(t, &corner[left], k - 1, true);
+    }
+    if (w < first && k > 1) {
+        p->anchor = first; /* so that later answers of the same move do not lie before this one */
+        p->anchor_output = output;
+        return first;
+    }
+    return w;
+}
+
+/* The same for a falling move. */
+HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                hystgen_real_t output, hystgen_place_t *p)
+{
+    hystgen_real_t w;
+    hystgen_real_t first;
+    hystgen_real_t level;
+    hystgen_real_t next;
+    hystgen_real_t next_level;
+    if (left > 0) {
+        const hystgen_corner_t *c = &corner[left - 1];
+        const hystgen_real_t e = c->extremum;
+        if (c->side > 0) { /* all its plays start to follow there */
+            first = e;
+            level = -c->pass[0];
+            next = e;
+            next_level = level;
+        } else {
+            const hystgen_real_t y = c->pass[1];
+            const hystgen_real_t *r = &t->threshold[k];
+            const hystgen_real_t *z = &t->start_level[k];
+            if (c->side != 0) {
+                first = e - (r[-1] + r[-1]);
+                level = y - (z[-1] + z[-1]);
+                next = e - (r[0] + r[0]);
+                next_level = y - (z[0] + z[0]);
+            } else {
+                first = e - r[-1];
+                level = y - z[-1];
+                next = e - r[0];
+                next_level = y - z[0];
+            }
+        }
+    } else { /* every play follows */
+        first = 0;
+        level = t->all_lift;
+        next = -HYSTGEN_REACH_MAX;
+        next_level = -HYSTGEN_SUM_MAX;
+    }
+    p->anchor_output = level;
+    p->next_output = next_level;
+    p->anchor = first;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)left;
+    p->rising = false;
+    w = first + (output - level) * t->inverse_slope[k];
+    if (w < next) {
+        return next;
+    }
+    if (left < depth && corner[left].end == k) {
+        first = hystgen_activation(t, &corner[left], k - 1, false);
+    }
+    if (w > first && k > 1) {
+        p->anchor = first; /* so that later answers of the same move do not lie before this one */
+        p->anchor_output = output;
+        return first;
+    }
+    return w;
+}
+
+/* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
+   a turn leaves its corner in the free slot above those that are held, which is scratch space. Or false, where no more
+   plays are taken along; then *w is the input of the plays. Moves nothing. */
+HYSTGEN_API bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                       hystgen_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
+                                       hystgen_real_t *w)
+{
+    const hystgen_place_t *here = &m->here;
+    *depth = here->depth;
+    *k = here->k + 1u;
+    *rising = here->rising;
+    if (here->rising ? output < here->next_output : output > here->next_output) {
+        *w = here->anchor + (output - here->anchor_output) * t->inverse_slope[here->k];
+        if (here->rising ? *w >= m->w : *w <= m->w) {
+            m->there.k = 0;
+            *w = hystgen_reached(*w, here->next, here->rising) ? here->next : *w;
+            return false;
+        }
+        if (here->k > 1) { /* the move turns back */
+            hystgen_push_corner(t, m, corner);
+            *depth = *depth + 1;
+        }
+        *k = 1;
+        *rising = !here->rising;
+    }
+    return true;
+}
+
+/* The analytic inverse asked of the same memory: the input of the plays that gives `output`. Moves nothing, but leaves
+   word for the next absorb of where the answer lies. */
+HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                 hystgen_corner_t *corner, hystgen_real_t output)
+{
+    unsigned int depth;
+    unsigned int left;
+    unsigned int k;
+    bool rising;
+    hystgen_real_t w;
+    if (!hystgen_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
+        return w;
+    }
+    left = hystgen_corners_find(t, corner, m->start, depth, &k, rising ? output : -output, rising);
+    return rising ? hystgen_corners_rise(t, corner, depth, left, k, output, &m->there)
+                  : hystgen_corners_fall(t, corner, depth, left, k, output, &m->there);
+}
