@@ -364,6 +364,25 @@ class TanhEnvelope:
         ]
 
 
+def directions(v: Array, ascending: bool) -> NDArray[np.bool_]:
+    """Whether the drive rises at each sample; where it stands still the last direction, at first `ascending`."""
+    moved = np.diff(v, prepend=v[:1])
+    last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(v)), -1))
+    return np.asarray(np.where(last >= 0, moved[np.maximum(last, 0)] > 0.0, ascending))
+
+
+def through_stages(stages: Sequence[Stage], v: Array, rising: NDArray[np.bool_] | None) -> Array:
+    """`w = G[v]` sample by sample; `rising` may be None where no stage has two branches."""
+    w = v
+    for stage in stages:
+        if stage.branches_differ:
+            assert rising is not None
+            w = np.where(rising, stage.forward(w, True), stage.forward(w, False))
+        else:
+            w = stage.forward(w)
+    return np.ascontiguousarray(w)
+
+
 UNBOUNDED = (-math.inf, math.inf)
 
 

@@ -89,3 +89,7 @@ class RecordError(ValueError):
     def __init__(self, problems: Iterable[str]) -> None:
         self.problems = list(problems)
         super().__init__("\n".join(self.problems))
+
+
+class EffectsError(ValueError):
+    """Something that cannot be done with a model's effects, or an effect that cannot be used."""

@@ -20,7 +20,7 @@ from hystgen.identification import constrained, reduction, weights
 from hystgen.identification.constrained import root_mean_square
 from hystgen.identification.fronts import Front
 from hystgen.identification.reduction import Course, Reduced, Source
-from hystgen.models import Stage
+from hystgen.models import Stage, directions, through_stages
 
 Array = NDArray[np.float64]
 
@@ -55,25 +55,6 @@ class Shaped:
     weights: Array
     rms: float
     system: Reduced
-
-
-def directions(v: Array, ascending: bool) -> NDArray[np.bool_]:
-    """Whether the drive rises at each sample; where it stands still the last direction, at first `ascending`."""
-    moved = np.diff(v, prepend=v[:1])
-    last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(v)), -1))
-    return np.asarray(np.where(last >= 0, moved[np.maximum(last, 0)] > 0.0, ascending))
-
-
-def through_stages(stages: Sequence[Stage], v: Array, rising: NDArray[np.bool_] | None) -> Array:
-    """`w = G[v]` sample by sample; `rising` may be None where no stage has two branches."""
-    w = v
-    for stage in stages:
-        if stage.branches_differ:
-            assert rising is not None
-            w = np.where(rising, stage.forward(w, True), stage.forward(w, False))
-        else:
-            w = stage.forward(w)
-    return np.ascontiguousarray(w)
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:

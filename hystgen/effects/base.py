@@ -1,0 +1,170 @@
+"""What an effect is: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
+
+Between two samples every signal is taken as straight, so that the filters are exact for any time steps on drives that
+are; before the first sample everything is at rest at that sample.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+Array = NDArray[np.float64]
+
+
+class Place(enum.Enum):
+    """Where an effect sits, in the order of the chain; within a place the effects' `order` decides."""
+
+    DRIVE = "drive"
+    PLAYS = "plays"
+    LINEAR = "linear"
+    GAIN = "gain"
+    OUTPUT = "output"
+    ADDED = "added"
+
+
+@dataclass(frozen=True)
+class Run:
+    """What an effect sees of one record, N samples.
+
+    `t`: seconds, rising, session time; `v`: the drive as recorded; `extra`: further columns by name; `rest`: seconds of
+    pause before the first sample, at the drive before it (`chain.join` turns it into samples).
+    """
+
+    t: Array
+    v: Array
+    extra: Mapping[str, Array] = field(default_factory=dict)
+    rest: float = 0.0
+
+    @property
+    def steps(self) -> Array:
+        """Seconds from each sample to the next, N - 1 of them."""
+        return np.diff(self.t)
+
+
+@dataclass(frozen=True)
+class About:
+    """What is known of the records for which shapes are listed."""
+
+    drive: tuple[float, float]
+    output_range: float
+    sample_time: float
+    duration: float
+    """of the longest record, s"""
+    session: float
+    """from the first to the last sample of all records, s"""
+    fastest: float
+    """largest |dv/dt|, input/s"""
+    travel: float
+    """sum of |dv| over all records, input"""
+    thresholds: tuple[float, ...]
+    columns: frozenset[str] = frozenset()
+    """further columns that every record has"""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One shape of an effect to try in a fit: free numbers within bounds, and the effect that they make.
+
+    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens.
+    """
+
+    label: str
+    low: Array
+    high: Array
+    start: Array
+    build: Callable[[Array], Effect]
+    none: Array | None = None
+
+
+class Effect(BaseModel):
+    """An effect with its parameters; a subclass has a `place`, the matching method and the keys of the YAML entry."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    name: str
+    place: ClassVar[Place]
+    order: ClassVar[int] = 0
+    selector: ClassVar[str] = "shape"
+    """key that tells the shapes of one name apart"""
+    repeatable: ClassVar[bool] = False
+    """whether a model may have several of this name"""
+    timed: ClassVar[bool] = True
+    """whether the times of the samples matter"""
+    columns: ClassVar[tuple[str, ...]] = ()
+    """further columns that a record needs"""
+    compensation: ClassVar[str] = ""
+    """what the effect means for a compensator, one clause"""
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""
+        yield from ()
+
+    def drive(self, a: Array, run: Run) -> Array:
+        """DRIVE: the drive (N,) behind the effect."""
+        raise NotImplementedError
+
+    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """PLAYS: rows (n+1, N) that the weights sum, for the input `w` (N,) of the plays."""
+        raise NotImplementedError
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """PLAYS of an order above 0: rows (n+1, N) in place of those of the effect before it."""
+        raise NotImplementedError
+
+    def filtered(self, h: Array, run: Run) -> Array:
+        """LINEAR: every row of `h`, (N,) or (k, N), filtered by itself, from rest at its first sample."""
+        raise NotImplementedError
+
+    def gain(self, run: Run) -> Array:
+        """GAIN: factor (N,)."""
+        return np.ones(len(run.t))
+
+    def offset(self, run: Run) -> Array:
+        """GAIN: added after the factor (N,)."""
+        return np.zeros(len(run.t))
+
+    def mapped(self, y: Array, run: Run) -> Array:
+        """OUTPUT: the output (N,) behind the effect."""
+        raise NotImplementedError
+
+    def added(self, run: Run) -> Array:
+        """ADDED: what is added to the output (N,)."""
+        raise NotImplementedError
+
+    def transients(self, run: Run) -> Array:
+        """Responses (k, N) to an unknown start state, which a fit may add to a record with free factors."""
+        return np.empty((0, len(run.t)))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Shapes to try in a fit, simplest first."""
+        return []
+
+
+def span(low: float, high: float) -> tuple[float, float]:
+    """Decimal logarithms of the ends of a range of positive numbers; never empty."""
+    low = max(low, 1e-12)
+    return math.log10(low), math.log10(max(high, 2.0 * low))
+
+
+def decays(steps: Array, time_constant: float) -> tuple[Array, Array, Array]:
+    """Factors of `x' = (u - x)/tau` over time steps with straight `u`: `x_1 = E x_0 + b_0 u_0 + b_1 u_1`.
+
+    With `s = dt/tau`: `E = exp(-s)`, `b_0 = (1 - E)/s - E`, `b_1 = 1 - (1 - E)/s` (first-order hold, exact). A time
+    constant of 0 passes `u`.
+    """
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        s = steps / time_constant if time_constant > 0.0 else np.full(len(steps), np.inf)
+        decay = np.exp(-s)
+        mean = np.where(s > 0.0, -np.expm1(-s) / s, 1.0)
+        # 1 - (1 - E)/s loses its digits for short steps
+        late = np.where(s < 1e-3, s * (0.5 - s * (1.0 / 6.0 - s / 24.0)), 1.0 - mean)
+    return decay, 1.0 - late - decay, late

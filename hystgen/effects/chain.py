@@ -1,0 +1,170 @@
+"""The whole actuator: static model and effects in the order of the chain, over the records of a session."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import operators
+from hystgen.effects.base import Effect, Place, Run
+from hystgen.models import Cascade, directions, through_stages
+from hystgen.problems import EffectsError
+
+Array = NDArray[np.float64]
+
+VISIT = 10.0
+"""Seconds of the straight move to each value of a history."""
+
+VISIT_SAMPLES = 200
+
+_PLACES = list(Place)
+
+
+def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects as the chain meets them; those of one place and order as they were given."""
+    return tuple(sorted(effects, key=lambda effect: (_PLACES.index(effect.place), effect.order)))
+
+
+@dataclass(frozen=True)
+class Session:
+    """Records that follow one another as one run, with the slice of it that each record is."""
+
+    run: Run
+    parts: tuple[slice, ...]
+
+
+def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session:
+    """The runs of a session on one time axis.
+
+    A record whose times lie behind those before it keeps them (session time), unless a rest would not fit between; any
+    other starts one sample after the record before and its rest. In gaps and rests the drive holds, until one sample
+    before the next record. The values of `history` are visited before the first record, each on a straight move of
+    `VISIT` seconds from the one before, and held for its rest. Raises ValueError for records of no samples.
+    """
+    if not runs or any(len(run.t) == 0 for run in runs):
+        raise ValueError("a session has records, and each of them samples")
+    names = set.intersection(*(set(run.extra) for run in runs))
+    t: list[Array] = []
+    v: list[Array] = []
+    extra: dict[str, list[Array]] = {name: [] for name in names}
+    parts = []
+    count = 0
+
+    def put(times: Array, drives: Array, columns: dict[str, Array]) -> None:
+        nonlocal count
+        t.append(np.asarray(times, dtype=np.float64))
+        v.append(np.asarray(drives, dtype=np.float64))
+        for name in names:
+            extra[name].append(np.asarray(columns[name], dtype=np.float64))
+        count += len(times)
+
+    for i, run in enumerate(runs):
+        step = float(run.t[1] - run.t[0]) if len(run.t) > 1 else 1.0
+        times = np.asarray(run.t, dtype=np.float64)
+        if i == 0 and history:
+            end = float(times[0]) - step - run.rest
+            visits = [float(x) for x in history]
+            ramps = [np.linspace(a, b, VISIT_SAMPLES + 1)[1:] for a, b in itertools.pairwise(visits)]
+            drives = np.concatenate([visits[:1], *ramps])
+            since = np.arange(len(drives)) * (VISIT / VISIT_SAMPLES)
+            first = {name: np.full(len(drives), float(run.extra[name][0])) for name in names}
+            put(np.asarray(end - since[::-1], dtype=np.float64), drives, first)
+        elif i:
+            end = float(t[-1][-1])
+            wanted = end + run.rest + step
+            if times[0] <= end or (run.rest > 0.0 and times[0] < wanted):
+                times = times + (wanted - times[0])
+        if count and times[0] - step > t[-1][-1] + 1e-6 * step:
+            held = {name: extra[name][-1][-1:] for name in names}
+            put(np.array([times[0] - step]), v[-1][-1:], held)
+        parts.append(slice(count, count + len(times)))
+        put(times, run.v, {name: run.extra[name] for name in names})
+    whole = Run(np.concatenate(t), np.concatenate(v), {name: np.concatenate(extra[name]) for name in names})
+    return Session(whole, tuple(parts))
+
+
+class Chain:
+    """Static model and effects as one forward model.
+
+    Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation behind,
+    output offset, sensor nonlinearity, drift.
+    """
+
+    def __init__(self, cascade: Cascade, effects: Sequence[Effect]) -> None:
+        self.cascade = cascade
+        self.effects = in_order(effects)
+
+    def simulate(self, runs: Sequence[Run], history: Sequence[float] | None = None) -> list[Array]:
+        """Outputs (N,) of each run of a session, from the start memory and at rest; see `join`.
+
+        Raises EffectsError where a column is missing or an effect's answer has the wrong form.
+        """
+        for name in sorted({column for effect in self.effects for column in effect.columns}):
+            if any(name not in run.extra for run in runs):
+                who = next(effect.name for effect in self.effects if name in effect.columns)
+                raise EffectsError(f"the effect {who} needs the column {name}, which a record does not have")
+        session = join(runs, history)
+        y = self.output(session.run)
+        return [y[part] for part in session.parts]
+
+    def output(self, run: Run) -> Array:
+        """Output (N,) of one run, from the start memory and at rest at its first sample."""
+        y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
+        for effect in self._of(Place.LINEAR):
+            if effect.order == 0:
+                y = _checked(effect, effect.filtered(y, run), y)
+        for effect in self._of(Place.GAIN):
+            y = _checked(effect, effect.gain(run) * y + effect.offset(run), y)
+        for effect in self._of(Place.LINEAR):
+            if effect.order > 0:
+                y = _checked(effect, effect.filtered(y, run), y)
+        for effect in self._of(Place.OUTPUT):
+            if effect.order == 0:
+                y = _checked(effect, effect.mapped(y, run), y)
+        y = y + self.cascade.output_offset
+        for effect in self._of(Place.OUTPUT):
+            if effect.order > 0:
+                y = _checked(effect, effect.mapped(y, run), y)
+        for effect in self._of(Place.ADDED):
+            y = y + _checked(effect, effect.added(run), y)
+        return y
+
+    def play_input(self, run: Run) -> Array:
+        """Input `w` (N,) of the plays: the drive behind delay, slew limit, lag and front."""
+        a = np.ascontiguousarray(run.v, dtype=np.float64)
+        for effect in self._of(Place.DRIVE):
+            a = _checked(effect, effect.drive(a, run), a)
+        if not self.cascade.branches_differ:
+            return through_stages(self.cascade.stages, a, None)
+        before = float(self.cascade.front_inverse(self.cascade.pi.start[0])) if self.cascade.start_is_defined else 0.0
+        rising = directions(np.concatenate([[before], a]), True)[1:]
+        return through_stages(self.cascade.stages, a, rising)
+
+    def plays(self, w: Array, run: Run) -> Array:
+        """Rows (n+1, N) that the weights sum, from the start memory."""
+        pi = self.cascade.pi
+        thresholds, start = np.asarray(pi.thresholds), np.asarray(pi.start)
+        rows = None
+        for effect in self._of(Place.PLAYS):
+            expected = np.empty((len(thresholds), len(w)))
+            if rows is None:
+                rows = _checked(effect, effect.plays(w, run, thresholds, start), expected)
+            else:
+                rows = _checked(effect, effect.bent(rows, thresholds), expected)
+        return operators.plays(w, thresholds, start) if rows is None else rows
+
+    def _of(self, place: Place) -> list[Effect]:
+        return [effect for effect in self.effects if effect.place is place]
+
+
+def _checked(effect: Effect, answer: Array, like: Array) -> Array:
+    """What an effect answered, if it has the form of `like`; a user's own effect may not."""
+    found = np.asarray(answer)
+    if found.shape != like.shape or found.dtype.kind not in "fiu":
+        what = f"{found.dtype} of shape {found.shape}"
+        raise EffectsError(f"the effect {effect.name} answered {what}; numbers of shape {like.shape} were expected")
+    return np.ascontiguousarray(found, dtype=np.float64)
