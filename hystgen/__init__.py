@@ -27,6 +27,7 @@ _PLACES = {
     "ParameterError": "params",
     "Session": "simulation",
     "TanhEnvelope": "models",
+    "diagnose": "api",
     "differences": "api",
     "emit": "api",
     "identify": "api",
@@ -40,6 +41,7 @@ __all__ = [*sorted(_PLACES), "__version__"]
 if TYPE_CHECKING:
     from hystgen.api import InverseModel as InverseModel
     from hystgen.api import Model as Model
+    from hystgen.api import diagnose as diagnose
     from hystgen.api import differences as differences
     from hystgen.api import emit as emit
     from hystgen.api import identify as identify

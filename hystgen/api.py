@@ -199,6 +199,13 @@ def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:
     return verification.verify_model(_model(source), **options)
 
 
+def diagnose(source: Model | str | os.PathLike[str], records: Any, **options: Any) -> Any:
+    """Find what a believed model is missing; see `hystgen.diagnosis.diagnose`."""
+    from hystgen import diagnosis
+
+    return diagnosis.diagnose(source, records, **options)
+
+
 def identify(records: Any, **options: Any) -> Any:
     """Fit a model to measured records; see `hystgen.identification.identify`."""
     from hystgen import identification

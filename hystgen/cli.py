@@ -346,6 +346,39 @@ def identify(
 
 @main.command()
 @params_argument
+@click.argument("data", nargs=-1, required=True, type=click.Path())
+@click.option("-o", "output", required=True, type=click.Path(file_okay=False), help="folder for what is found")
+@click.option("--holdout", multiple=True, type=click.Path(), help="record that judges and takes no part in the fits")
+@record_options
+def diagnose(
+    params: str, data: tuple[str, ...], output: str, holdout: tuple[str, ...], history: str | None, rest: float,
+    **reading: Any,
+) -> None:
+    """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
+
+    Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
+    """
+    from hystgen import diagnosis
+
+    model = _load(params)
+    visited = _numbers(history)
+    how = _reading(**reading)
+
+    def run() -> None:
+        found = diagnosis.diagnose(
+            model, list(data), holdout=list(holdout), history=visited, rest=rest, progress=True, **how
+        )
+        for note in found.notes:
+            click.echo(f"warning: {note}", err=True)
+        click.echo(found.sentence())
+        for path in found.write(output):
+            click.echo(str(path))
+
+    _shown(params, run)
+
+
+@main.command()
+@params_argument
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
 def show(params: str, plot: str | None) -> None:
     """Print what a model can do: ranges, slopes, loop width, invertible or why not.

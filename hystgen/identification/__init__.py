@@ -299,14 +299,15 @@ def _parameters(
         },
         "output_offset": offset,
     }
-    stages = [_stage_content(stage) for stage in fitted.stages]
+    stages = [stage_content(stage) for stage in fitted.stages]
     if stages:
         described["memoryless"] = stages[0] if len(stages) == 1 else stages
     content["model"] = described
     return make_parameters(content)
 
 
-def _stage_content(stage: Stage) -> dict[str, object]:
+def stage_content(stage: Stage) -> dict[str, object]:
+    """A stage as the parameter file has it."""
     if isinstance(stage, DeadZone):
         return {"kind": "dead_zone", "thresholds": list(stage.thresholds), "weights": list(stage.weights)}
     assert isinstance(stage, TanhEnvelope)
@@ -338,4 +339,4 @@ def identifier_from(text: str) -> str:
     return f"stage_{words}" if name_problem(words) else words
 
 
-__all__ = ["MODELS", "Fit", "IdentificationError", "Row", "identifier_from", "identify"]
+__all__ = ["MODELS", "Fit", "IdentificationError", "Row", "identifier_from", "identify", "stage_content"]

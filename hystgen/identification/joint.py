@@ -104,7 +104,7 @@ def search(
     now = linear(shape, p)
     low, high = limits.bounds
     damping = 1e-3
-    for _ in range(most):
+    for _ in range(most if len(shape) else 0):
         if damping > 1e6 or now.rms == 0.0:
             break
         try:

@@ -1,0 +1,266 @@
+"""Finding what a model is missing: where it disagrees with measured records, the name of the effect, and the model
+with it added.
+
+>>> found = hystgen.diagnose("stage.yaml", ["slow.csv", "steps.csv"], holdout=["other.csv"])
+>>> found.verdict
+>>> found.write("diagnosis/")
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis import believed, floor, leftovers, selection, structure, where
+from hystgen.diagnosis.floor import Floor
+from hystgen.diagnosis.selection import Outcome
+from hystgen.diagnosis.structure import Fitted, Item
+from hystgen.identification import stage_content, threads
+from hystgen.identification.fit import Source, visited
+from hystgen.identification.pi import DIGITS, DUST, IdentificationError
+from hystgen.identification.thresholds import rounded
+from hystgen.records import Record, read_records, write_atomically
+
+if TYPE_CHECKING:
+    from hystgen.effects.base import Effect
+    from hystgen.params import Parameters
+
+Array = NDArray[np.float64]
+
+STRUCTURE = 0.15
+"""Share of the residual's variance that goes with a variable on unseen samples, beyond which it is no noise."""
+
+ABOVE_FLOOR = 1.25
+"""A residual this much larger than the noise, and with structure, is unexplained."""
+
+FAR_ABOVE = 1.6
+"""One this much larger is, whatever it goes with."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What was found: `content` as `diagnosis.json` has it, `parameters` with the effects added."""
+
+    content: dict[str, Any]
+    parameters: Parameters
+    notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> str:
+        """`nothing_missing`, `effects_found` or `unexplained`."""
+        return str(self.content["verdict"])
+
+    def sentence(self) -> str:
+        """The verdict in a sentence."""
+        gap, unit = self.content["gap"], self.content["unit"]
+        before, after = (f"{gap[key]['holdout']:.4g}{' ' if unit else ''}{unit}" for key in ("refitted", "after"))
+        if self.verdict == "effects_found":
+            names = ", ".join(effect["name"] for effect in self.content["effects"])
+            return f"Missing: {names}. The held-out rms error falls from {before} to {after}."
+        if self.verdict == "nothing_missing":
+            return f"Nothing is missing: the refitted model leaves {after} rms on held-out records, which is noise."
+        return f"Something is missing that the catalogue does not hold or the records cannot show: {after} rms is left."
+
+    def to_json(self) -> str:
+        """`diagnosis.json`."""
+        return json.dumps(self.content, indent=2, allow_nan=False) + "\n"
+
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write `diagnosis.json` and `params.yaml` into a folder; the paths."""
+        from hystgen.params import dump_parameters
+
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        texts = {
+            "diagnosis.json": self.to_json(),
+            "params.yaml": dump_parameters(self.parameters, header=f"Diagnosed by hystgen. {self.sentence()}"),
+        }
+        for name, text in texts.items():
+            write_atomically(target / name, text)
+        return [target / name for name in texts]
+
+
+def diagnose(
+    parameters: Any,
+    records: Source | Iterable[Source],
+    *,
+    holdout: Source | Iterable[Source] = (),
+    history: Sequence[float] | None = None,
+    rest: float = 0.0,
+    effects: Sequence[type[Effect]] = (),
+    columns: dict[str, str] | None = None,
+    sample_time: float | None = None,
+    delimiter: str | None = None,
+    progress: bool = False,
+) -> Diagnosis:
+    """Find what a believed model is missing.
+
+    `parameters`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
+    waveforms that judge; without them every third record, or the end of one, is set aside. `history`: drive values
+    visited before every record, `rest`: seconds of pause after them. `effects`: further effects that take part.
+
+    The believed model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
+    weights on the free-run error, and accepted when it removes a worthwhile part of the held-out error that chance does
+    not explain. Raises RecordError, IdentificationError, ValueError.
+    """
+    from hystgen.api import Model, load
+    from hystgen.progress import Progress
+
+    model = parameters if isinstance(parameters, Model) else load(parameters)
+    given = model.parameters.model.effects
+    several = [records] if isinstance(records, Record | str | os.PathLike) else list(records)
+    others = [holdout] if isinstance(holdout, Record | str | os.PathLike) else list(holdout)
+    read = read_records([*several, *others], columns, sample_time, delimiter, progress=progress)
+    before = None if history is None else visited(history)
+    with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
+        ready = believed.prepare(read[: len(several)], read[len(several) :], before, rest)
+        noise = floor.noise_floor([*ready.to_fit, *ready.held])
+        base, start = believed.structure_of(model.cascade, given, ready)
+        found = selection.select(
+            ready.to_fit, ready.held, base, start, noise.rms, effects, lambda: bar.tick(1)
+        )
+        first = believed.as_given(model.cascade, given)
+        as_given = [
+            structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
+        ]
+        content = _content(model.parameters, ready, noise, found, as_given)
+    notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
+    return Diagnosis(content, _extended(model.parameters, found.fitted, ready), tuple(notes))
+
+
+STEPS = 120
+"""About so many fits are made, for the progress bar."""
+
+
+def _content(
+    parameters: Parameters, ready: believed.Prepared, noise: Floor, found: Outcome, as_given: Sequence[float]
+) -> dict[str, Any]:
+    before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
+    after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
+    refitted, last = ([structure.rms(errors) for errors in each] for each in (before, after))
+    left = leftovers.disturbances([*ready.to_fit, *ready.held], [*after[0], *after[1]])
+    share, goes_with = leftovers.structure(ready.held, after[1])
+    ratio = last[1] / noise.rms if noise.rms else float("inf")
+    if ratio > FAR_ABOVE or (share > STRUCTURE and ratio > ABOVE_FLOOR):
+        left.append({"kind": "structure", "rms": last[1], "share_by_variable": goes_with})
+    verdict = "effects_found" if found.found else "unexplained" if left else "nothing_missing"
+    effects = []
+    for each in found.found:
+        effects.append(
+            {
+                "name": each.name,
+                "parameters": _parameters_of(found.fitted, each.name),
+                "share_of_gap": (each.before - each.after) / refitted[1] if refitted[1] else 0.0,
+                "holdout_before": each.before,
+                "holdout_after": each.after,
+                "p_value": each.p_value,
+                "evidence": _evidence(each),
+            }
+        )
+    rivals = [[each.name, rival] for each in found.found for rival in each.rivals]
+    units = parameters.units
+    content = {
+        "hystgen": 1,
+        "verdict": verdict,
+        "noise_floor": noise.rms,
+        "output_range": max(item.output_range for item in (*ready.to_fit, *ready.held)),
+        "unit": units.output,
+        "gap": {
+            "as_given": {"fit": as_given[0], "holdout": as_given[1]},
+            "refitted": {"fit": refitted[0], "holdout": refitted[1]},
+            "after": {"fit": last[0], "holdout": last[1]},
+        },
+        "effects": effects,
+        "unexplained": left,
+        "where": where.places([*ready.to_fit, *ready.held], [*before[0], *before[1]], noise.rms),
+        "not_separable": rivals,
+        "advice": [ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals],
+        "ranking": [
+            [{"name": t.name, "shape": t.option.label, "fit": t.fitted.rms, "holdout": t.held_out} for t in each]
+            for each in found.rankings
+        ],
+    }
+    return _plain(content)  # type: ignore[no-any-return]
+
+
+ADVICE: dict[frozenset[str], str] = {
+    frozenset(("creep", "drift")): "record holds of a minute after moves both ways: creep follows the last move",
+    frozenset(("lag", "delay")): "record full steps with three samples or more to the edge: a lag has a tail",
+    frozenset(("lag", "resonance")): "record steps or a sweep: a resonance rings and has a peak",
+    frozenset(("lag", "rate_dependence")): "record small loops at high rate with reversals: a lag opens them",
+    frozenset(("asymmetry", "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
+}
+"""Which experiment tells two effects apart."""
+
+
+def _advice(one: str, other: str) -> str:
+    return f"{one} and {other} cannot be told apart by these records; hystgen diagnose --plan writes drives that can"
+
+
+def _evidence(each: selection.Found) -> str:
+    gain = 100.0 * (1.0 - each.after / each.before) if each.before else 0.0
+    return f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
+
+
+def _parameters_of(fitted: Fitted, name: str) -> dict[str, Any]:
+    """The entry's keys without the name; for a front its stage."""
+    for part, effect in zip(fitted.structure.parts, fitted.structure.effects(fitted.shape), strict=True):
+        if part.name == name:
+            return _entry(effect)
+    stages = fitted.actuator.stages
+    return dict(stage_content(stages[-1])) if stages else {}
+
+
+def _entry(effect: Effect) -> dict[str, Any]:
+    return {key: value for key, value in effect.model_dump(exclude_defaults=True).items() if key != "name"}
+
+
+def _extended(parameters: Parameters, fitted: Fitted, ready: believed.Prepared) -> Parameters:
+    """The parameter file with the model refitted and the effects added."""
+    from hystgen.params import make_parameters
+
+    p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
+    p[p < DUST * float(np.sum(p))] = 0.0
+    r = fitted.structure.thresholds
+    kept = (p > 0.0) | (r == 0.0)
+    actuator = fitted.actuator
+    offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
+    content = {
+        **parameters.model_dump(),
+        "input_range": list(parameters.input_range),
+        "model": {
+            "pi": {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()},
+            "memoryless": [stage_content(stage) for stage in actuator.stages],
+            "output_offset": offset,
+            "effects": [{"name": effect.name, **_entry(effect)} for effect in actuator.effects],
+        },
+    }
+    return make_parameters(content)
+
+
+def _offset(fitted: Fitted, item: Item) -> float:
+    rows, constant = fitted.actuator.columns(item, fitted.weights)
+    return float(np.nanmean(item.y - fitted.actuator.added(item) - rows[0] - constant))
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as JSON has them: ten digits, so that the same input gives the same text."""
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float):
+        return float(f"{value:.8g}") if np.isfinite(value) else None
+    return value
+
+
+__all__ = ["Diagnosis", "IdentificationError", "diagnose"]

@@ -1,0 +1,152 @@
+"""The believed model and the records, as the fits of a diagnosis take them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
+from hystgen.effects.base import Candidate, Effect, Run
+from hystgen.identification import faults, pi, prepared, thresholds
+from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh
+from hystgen.identification.reduction import Course
+from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
+from hystgen.records import Record
+
+Array = NDArray[np.float64]
+
+SET_ASIDE = 0.3
+"""Share of a single record, its end, that is held out where nothing else can be."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """A front that is kept as it was given: cascades of several stages."""
+
+    given: tuple[Stage, ...]
+    name: str = "as given"
+
+    @property
+    def straight(self) -> Array:
+        """No shape numbers."""
+        return np.empty(0)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """None."""
+        return np.empty(0), np.empty(0)
+
+    def slack(self, shape: Array) -> Array:
+        """Nothing to hold."""
+        return np.empty(0)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The given ones."""
+        return self.given
+
+
+def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
+    """The believed front as a family around it, and the shape that it has in that family."""
+    if not stages:
+        return Straight(), np.empty(0)
+    if len(stages) == 1 and isinstance(stages[0], DeadZone):
+        kept = stages[0].over(*drive)
+        if kept.breaks:
+            family = DeadZones(drive, kept.breaks)
+            return family, family.shape(np.array(kept.slopes))
+    if len(stages) == 1 and isinstance(stages[0], TanhEnvelope):
+        half, middle = 0.5 * (drive[1] - drive[0]), 0.5 * (drive[0] + drive[1])
+        shape = []
+        for up in (True, False) if stages[0].branches_differ else (True,):
+            _, a1, a2, _ = stages[0].branch(up)
+            shape += [abs(a1) * half, (-a2 / a1 - middle) / half]
+        if not stages[0].branches_differ:
+            return Tanh(drive), np.array(shape)
+        (low, high), (down_low, down_high) = (stages[0].image(*drive, up) for up in (True, False))
+        lift = float(stages[0].forward(middle, False) - stages[0].forward(middle, True))
+        scale = high - low
+        return Tanh(drive, 2), np.array([*shape, math.log((down_high - down_low) / scale), max(lift / scale, 0.0)])
+    return Given(tuple(stages)), np.empty(0)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Records to fit and held-out ones, what was done to them, and the drive range of the former."""
+
+    to_fit: list[Item]
+    held: list[Item]
+    notes: list[str]
+    drive: tuple[float, float]
+    thresholds: Array
+
+
+def prepare(
+    records: Sequence[Record], holdout: Sequence[Record], history: tuple[float, ...] | None, rest: float
+) -> Prepared:
+    """Items for the fits; without held-out records every third one is held out, or the end of a single one.
+
+    Raises IdentificationError.
+    """
+    notes: list[str] = []
+    if not holdout and len(records) > 2:
+        holdout = list(records)[2::3]
+        records = [record for k, record in enumerate(records) if k % 3 != 2]
+        notes.append("no record was given as held out: " + ", ".join(record.name for record in holdout) + " set aside")
+    fit_courses, held_courses = ([_course(record, history, notes) for record in group] for group in (records, holdout))
+    notes += prepared.mask_outliers(fit_courses, held_courses, None, 0.0, 0)
+    to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
+    held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
+    if not held:
+        to_fit, held = _ends(to_fit)
+        notes.append(f"no record was given as held out: the last {100 * SET_ASIDE:g} % of each is set aside")
+    reach = thresholds.largest(fit_courses)
+    samples = sum(course.used for course in fit_courses)
+    drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
+    places = np.array(thresholds.dense(reach, samples).thresholds)
+    return Prepared(to_fit, held, notes, drive, places)
+
+
+def _course(record: Record, history: tuple[float, ...] | None, notes: list[str]) -> Course:
+    course = pi.course(record, history, 0)
+    spikes = faults.drive_spikes(course.v, course.y)
+    if spikes.any():
+        notes.append(faults.told(course.name, spikes, "v jump away and back unseen by y, bridged"))
+        course = replace(course, v=faults.bridged(course.v, spikes))
+    return course
+
+
+def _item(course: Course, record: Record, rest: float) -> Item:
+    y = course.y.copy()
+    y[: course.first] = np.nan
+    run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
+    return Item(course.name, run, y, course.history, course.output_range)
+
+
+def _ends(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
+    """Every item twice: its beginning to be fitted, its end to be compared."""
+    fronts, ends = [], []
+    for item in items:
+        known = np.flatnonzero(item.known)
+        split = int(known[int((1.0 - SET_ASIDE) * len(known))])
+        front, end = item.y.copy(), item.y.copy()
+        front[split:], end[:split] = np.nan, np.nan
+        fronts.append(replace(item, y=front))
+        ends.append(replace(item, y=end))
+    return fronts, ends
+
+
+def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
+    """The believed model with its weights, thresholds and front free, and where a search starts."""
+    front, shape = front_of(cascade.stages, found.drive)
+    none = np.empty(0)
+    parts = tuple(Part(e.name, Candidate("as given", none, none, none, lambda _, e=e: e)) for e in given)  # type: ignore[misc]
+    return Structure(found.thresholds, front, parts), shape
+
+
+def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:
+    """The believed model unchanged, and its weights."""
+    return Actuator(np.array(cascade.pi.thresholds), cascade.stages, tuple(given)), np.array(cascade.pi.weights)
