@@ -1,34 +1,29 @@
 #include "hystgen_runtime.h"
 
-/* The input of the plays that gives `output`: takes along the plays one by one until the next would be too much. */
+/* The input of the plays that gives `output`: takes along the plays one by one until the next would be too much. What is
+   `left` of the way in output only shrinks, so that no sum grows beyond the first one, whatever the plays hold. */
 HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_play_t *play,
                                                hystgen_sum_t output)
 {
-    hystgen_sum_t here = hystgen_loop_output(t, play);
+    const hystgen_sum_t here = hystgen_loop_output(t, play);
     const bool rising = output > here;
+    hystgen_sum_t left = rising ? output - here : here - output;
     hystgen_reach_t w = play[0];
     unsigned int k;
-    if (output == here) {
+    if (left == 0) {
         return w;
     }
     for (k = 1; k <= t->n; ++k) {
-        if (rising) {
-            const hystgen_reach_t start = (hystgen_reach_t)play[k] + t->threshold[k];
-            const hystgen_sum_t there = here + (hystgen_sum_t)(start - w) * t->slope[k];
-            if (output < there) {
-                break;
-            }
-            here = there;
-            w = start;
-        } else {
-            const hystgen_reach_t start = (hystgen_reach_t)play[k] - t->threshold[k];
-            const hystgen_sum_t there = here - (hystgen_sum_t)(w - start) * t->slope[k];
-            if (output > there) {
-                break;
-            }
-            here = there;
-            w = start;
+        const hystgen_reach_t start = rising ? (hystgen_reach_t)play[k] + t->threshold[k]
+                                             : (hystgen_reach_t)play[k] - t->threshold[k];
+        /* play k starts to follow no earlier than play k-1, and at most twice their thresholds' distance later */
+        const uint32_t further = (uint32_t)(rising ? start - w : w - start);
+        const hystgen_sum_t step = (hystgen_sum_t)hystgen_wide(further, (uint32_t)t->slope[k]);
+        if (left < step) {
+            break;
         }
+        left = left - step;
+        w = start;
     }
-    return hystgen_going(t, w, rising ? output - here : here - output, k, rising);
+    return hystgen_going(t, w, left, k, rising);
 }

@@ -152,24 +152,17 @@ def loop_solve(t: FixedTables, s: State, output: Any) -> Any:
     if output == here:
         return w
     rising = 1 if output > here else 0
+    left = output - here if rising else here - output
     k = 1
     while k < len(s.play):
-        if rising:
-            start = s.play[k] + t.threshold[k]
-            there = here + t.slope[k] * (start - w)
-            if output < there:
-                break
-        else:
-            start = s.play[k] - t.threshold[k]
-            there = here - t.slope[k] * (w - start)
-            if output > there:
-                break
-        here = there
+        start = s.play[k] + t.threshold[k] if rising else s.play[k] - t.threshold[k]
+        step = t.slope[k] * (start - w if rising else w - start)
+        if left < step:
+            break
+        left = left - step
         w = start
         k += 1
-    if rising:
-        return going(t, w, output - here, k, rising)
-    return going(t, w, here - output, k, rising)
+    return going(t, w, left, k, rising)
 
 
 def curve(t: FixedTables, which: int, x: Any) -> Any:

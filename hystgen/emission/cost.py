@@ -104,7 +104,7 @@ def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTabl
         stages = [(int(kind), int(size)) for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True)]
         fronts = bool(stages)
     products, compares, per_play, per_bit = _worst_of_plays(op, corners, fixed, corners and not fronts)
-    per_play_products = 0 if corners else 1 if op == "forward" else 3
+    per_play_products = 0 if corners else 1 if op == "forward" else 2 if fixed else 3
     passes = 1 if op == "forward" else 2 + int(numbers.branches)
     compares += 12 * int(bool(numbers.branches))
     kernels = ""
@@ -135,7 +135,7 @@ def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTabl
 def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[int, int, int, int]:
     """Multiplications, comparisons, and of these more a play, more a bit of n; of plays, checks and limits."""
     if not corners:
-        return (1, 6, 2, 0) if op == "forward" else (2, 13, 3, 0)
+        return (1, 6, 2, 0) if op == "forward" else (3 if fixed else 2, 13, 3, 0)
     if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
         return 4 if fixed else 3, 10, 0, 2  # next 1, search 3. In fixed point a sum takes two multiplications.
     # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
