@@ -28,6 +28,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#if (-1 >> 1) != -1
+#error "curved: right shifts of negative numbers have to keep the sign here"
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
