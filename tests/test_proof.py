@@ -60,6 +60,7 @@ CORNERS = [
     ("bent", "q31"),
     ("two_branches", "q15"),
     ("mixed", "q31"),
+    ("sixteen", "q31"),
 ]
 PROVED = [(*module, "loop") for module in LOOP] + [(*module, "corners") for module in CORNERS]
 
@@ -140,7 +141,8 @@ def alarms(source: Path, machine: str) -> list[str]:
         [
             frama_c(), *MACHINES[machine], "-warn-signed-downcast", *(["-warn-unsigned-overflow"] if not wraps else []),
             "-eva", "-eva-precision", "0", "-eva-no-print", "-eva-domains", "symbolic-locations",
-            "-eva-widening-delay", "12", "-eva-auto-loop-unroll", str(plays + 2), "-eva-plevel", "400",
+            "-eva-widening-delay", str(12 if f"{name}_loop_rest(" in text else plays + 6),  # until as many corners
+            "-eva-auto-loop-unroll", str(plays + 2), "-eva-plevel", "400",
             "-eva-slevel-function", ",".join(visits),
             source.with_name("driver.c"), source,
         ],
@@ -165,24 +167,30 @@ def test_no_sequence_of_calls_can_fault(name: str, arithmetic: str, engine: str,
     assert alarms(write(tmp_path, name, arithmetic, engine), machine) == []
 
 
-# Faults put into the emitted two_branches, and the alarm that has to follow: table entries, limits, a loop, a start
+# Faults put into the emitted two_branches in q31, and the alarm that has to follow: table entries, limits, a loop, a
+# start; a list of corners that is too short for them
 FAULTS = [
-    (r"(_weight\[7\] = \{)[^}]*", r"\g<1>" + ", ".join(["2147483647"] * 7), "signed overflow"),
-    (r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
-    (r"(_front_ascending_scale\[\d+\] = \{\s*)\d+", r"\g<1>32", "shift"),
-    (r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
-    (r"return \(two_branches_real_t\)\(code > [^;]*", r"return (two_branches_real_t)code", "signed downcast"),
-    (r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
-    (r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
+    ("loop", ".c", r"(u \* \(\(two_branches_sum_t\)1 << )\d+", r"\g<1>40", "signed overflow"),
+    ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
+    ("loop", ".c", r"(_front_ascending_scale\[\d+\] = \{\s*)\d+", r"\g<1>32", "shift"),
+    ("loop", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
+    ("loop", ".c", r"return \(two_branches_real_t\)\(code > [^;]*", r"return (two_branches_real_t)code", "downcast"),
+    ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
+    ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
+    ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
+    ("corners", ".c", r"(_start_level\[7\] = \{\s*0, )\d+", r"\g<1>9223372036854775807", "signed overflow"),
+    ("corners", ".h", r"corner\[6\];(.*_forward_t;)", r"corner[5];\1", "out of bounds"),
 ]
 
 
-@pytest.mark.parametrize(("pattern", "replacement", "alarm"), FAULTS)
-def test_faults_raise_alarms(pattern: str, replacement: str, alarm: str, tmp_path: Path) -> None:
-    source = write(tmp_path, "two_branches", "q31", "loop")
-    text, places = re.subn(pattern, replacement, source.read_text())
+@pytest.mark.parametrize(("engine", "file", "pattern", "replacement", "alarm"), FAULTS)
+def test_faults_raise_alarms(
+    engine: str, file: str, pattern: str, replacement: str, alarm: str, tmp_path: Path
+) -> None:
+    source = write(tmp_path, "two_branches", "q31", engine)
+    text, places = re.subn(pattern, replacement, source.with_suffix(file).read_text(), flags=re.DOTALL)
     assert places == 1
-    source.write_text(text)
+    source.with_suffix(file).write_text(text)
     assert any(alarm in found for found in alarms(source, "32 bits"))
 
 
