@@ -39,7 +39,17 @@ PLACES = [
     # where a corner is left, a play is held by it; there are no more corners than plays
     (r"(    if \(p->depth > 0\) \{\n)", 1, r"\1        GRANTED(p->k >= 1 && p->k <= PLAYS && p->depth <= PLAYS);\n"),
     (r"( +NAME_push_corner\(t, m, &corner\[m->here\.depth\]\);)", 1, r"        GRANTED(m->here.depth < PLAYS);\n\1"),
-    (r"( +NAME_push_corner\(t, m, &corner\[depth\]\);)", 1, r"        GRANTED(depth < PLAYS);\n\1"),
+    (r"( +NAME_write_corner\(&corner\[p->depth\], m, here\);)", 1, r"        GRANTED(p->depth < PLAYS);\n\1"),
+    (
+        r"        here = m->here\.k > 1 \? (corner\[m->here\.depth\]\.output) : (NAME_corners_output\(t, m\));",
+        1,
+        r"""        if (m->here.k > 1) {
+            GRANTED(m->here.depth < PLAYS);
+            here = \1;
+        } else {
+            here = \2;
+        }""",
+    ),
     # no more plays follow than there are
     (r"(    p->k = \(uint_least16_t\)k;)", 2, r"    GRANTED(k <= PLAYS + 1);\n\1"),
     # a block ends beyond the play it begins with
@@ -52,14 +62,19 @@ PLACES = [
     (
         r"    return left < depth && corner\[left\]\.end == k \? &corner\[left\] : &corner\[left - 1\];",
         1,
-        r"""    if (left < depth && corner[left].end == k) {
+        r"""    GRANTED(depth <= PLAYS);
+    if (left < depth && corner[left].end == k) {
         return &corner[left];
     }
     GRANTED(left > 0);
     return &corner[left - 1];""",
     ),
-    # nothing is granted here: bisection is looked at for each number of corners on its own
-    (r"(    unsigned int low = 0;\n    unsigned int left = depth;)", 2, r"    /*@ split depth; */\n\1"),
+    # bisection is looked at for each number of corners on its own
+    (
+        r"(    unsigned int low = 0;\n    unsigned int left = depth;)",
+        2,
+        r"    GRANTED(depth <= PLAYS);\n    /*@ split depth; */\n\1",
+    ),
 ]
 
 # Of modules without a memoryless part, whose usual sample does not look at the list
@@ -75,9 +90,9 @@ FAST_PLACES = [
 """,
     ),
     (
-        r"(self->output = p->anchor_output \+ )\(\(int64_t\)w - \(int64_t\)p->anchor\) \* slope;",
-        1,
-        r"\1way * slope;\n    WITHIN(self->output, SUM);",
+        r"(self->output = p->anchor_output [+-] )(\(int64_t\)NAME_wide\(\(uint32_t\)slope, .*\));",
+        2,
+        r"GRANTED(\2 <= INT64_MAX - SUM);\n        \1\2;\n        WITHIN(self->output, SUM);",
     ),
     # between the edges there is such a line, and w goes on by less than 2^31 on it, inside the range
     (
