@@ -38,8 +38,7 @@ PLACES = [
     ),
     # where a corner is left, a play is held by it; there are no more corners than plays
     (r"(    if \(p->depth > 0\) \{\n)", 1, r"\1        GRANTED(p->k >= 1 && p->k <= PLAYS && p->depth <= PLAYS);\n"),
-    (r"( +NAME_push_corner\(t, m, &corner\[m->here\.depth\]\);)", 1, r"        GRANTED(m->here.depth < PLAYS);\n\1"),
-    (r"( +NAME_write_corner\(&corner\[p->depth\], m, here\);)", 1, r"        GRANTED(p->depth < PLAYS);\n\1"),
+    (r"(static void NAME_leave_corner\([^{]*\{\n)", 1, r"\1    GRANTED(m->here.depth < PLAYS);\n"),
     (
         r"        here = m->here\.k > 1 \? (corner\[m->here\.depth\]\.output) : (NAME_corners_output\(t, m\));",
         1,
