@@ -31,6 +31,7 @@ _PLACES = {
     "differences": "api",
     "emit": "api",
     "identify": "api",
+    "identify_batch": "api",
     "load": "api",
     "schema": "params",
     "verify": "api",
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from hystgen.api import differences as differences
     from hystgen.api import emit as emit
     from hystgen.api import identify as identify
+    from hystgen.api import identify_batch as identify_batch
     from hystgen.api import load as load
     from hystgen.api import verify as verify
     from hystgen.models import PI as PI

@@ -213,6 +213,13 @@ def identify(records: Any, **options: Any) -> Any:
     return identification.identify(records, **options)
 
 
+def identify_batch(sources: Any, output: str | os.PathLike[str], **options: Any) -> Any:
+    """Fit and emit many units in parallel; see `hystgen.identification.fleet.identify_batch`."""
+    from hystgen.identification import fleet
+
+    return fleet.identify_batch(sources, output, **options)
+
+
 __all__ = [
     "InverseModel",
     "Model",
@@ -222,6 +229,7 @@ __all__ = [
     "emit_options",
     "emitted_files",
     "identify",
+    "identify_batch",
     "load",
     "verify",
 ]

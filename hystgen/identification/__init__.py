@@ -92,21 +92,7 @@ def identify(
     actuator: no record tells in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError for wrong arguments.
     """
-    if model not in MODELS:
-        raise ValueError(f"model {model!r} is none of {', '.join(MODELS)}")
-    how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor, skip)
-    before = None if history is None else visited(history)
-    if loading_curve:
-        if before:
-            raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
-        before = ()
-    if not (math.isfinite(rest) and rest >= 0.0):
-        raise ValueError(f"rest is a number of seconds, not negative, not {rest}")
-    if skip < 0:
-        raise ValueError(f"skip is a number of samples, not negative, not {skip}")
-    if not 0.0 <= p0_floor < 1.0:
-        raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
-
+    how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve)
     to_fit, to_hold = _several(records), _several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
@@ -154,6 +140,35 @@ def identify(
         sure = uncertainty.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
     return Fit(_parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), sure, before)
+
+
+def check_options(
+    model: str = "pi",
+    thresholds: int | Sequence[float] | None = None,
+    breaks: int | Sequence[float] | None = None,
+    history: Sequence[float] | None = None,
+    rest: float = 0.0,
+    skip: int = 0,
+    p0_floor: float = P0_FLOOR,
+    loading_curve: bool = False,
+    **_: object,
+) -> tuple[_How, tuple[float, ...] | None]:
+    """What is asked of a fit, and the history, from options of `identify`. Raises ValueError for wrong ones."""
+    if model not in MODELS:
+        raise ValueError(f"model {model!r} is none of {', '.join(MODELS)}")
+    how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor, skip)
+    before = None if history is None else visited(history)
+    if loading_curve:
+        if before:
+            raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
+        before = ()
+    if not (math.isfinite(rest) and rest >= 0.0):
+        raise ValueError(f"rest is a number of seconds, not negative, not {rest}")
+    if skip < 0:
+        raise ValueError(f"skip is a number of samples, not negative, not {skip}")
+    if not 0.0 <= p0_floor < 1.0:
+        raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
+    return how, before
 
 
 @dataclass(frozen=True)
@@ -339,4 +354,13 @@ def identifier_from(text: str) -> str:
     return f"stage_{words}" if name_problem(words) else words
 
 
-__all__ = ["MODELS", "Fit", "IdentificationError", "Row", "identifier_from", "identify", "stage_content"]
+__all__ = [
+    "MODELS",
+    "Fit",
+    "IdentificationError",
+    "Row",
+    "check_options",
+    "identifier_from",
+    "identify",
+    "stage_content",
+]

@@ -1,0 +1,82 @@
+"""Units that are unlike the rest of their fleet.
+
+Modified z-scores: `0.6745 (x - median) / MAD`, MAD the median absolute deviation from the median; 0.6745 makes them
+comparable with scores of a normal distribution, and beyond 3.5 a value counts as an outlier (B. Iglewicz and
+D. C. Hoaglin, How to Detect and Handle Outliers, 1993).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+BEYOND = 3.5
+"""Modified z-score beyond which a unit is an outlier."""
+
+FEWEST = 8
+"""With fewer units a median absolute deviation says little, and none is marked."""
+
+SAME = 1e-6
+"""Relative spread below which units are alike for every purpose: written digits and solvers differ by less."""
+
+LEAST_ERROR = 1e-6
+"""Held-out errors below this, in %, are rounding of the written digits."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A figure that units are compared by: its words and its column; of an `error` the logarithm, and only upwards."""
+
+    words: str
+    column: str
+    error: bool = False
+
+    def value(self, figures: Mapping[str, object]) -> float | None:
+        """The number that is compared; None where a unit has no such figure."""
+        number = figures.get(self.column)
+        if not isinstance(number, float) or not math.isfinite(number):
+            return None
+        return math.log(max(number, LEAST_ERROR)) if self.error else number
+
+
+JUDGED = (
+    Judged("held-out rms %", "held_out_rms_percent", error=True),
+    Judged("gain", "gain"),
+    Judged("width", "width"),
+    Judged("p_0", "p_0"),
+)
+
+
+def modified_scores(values: Sequence[float]) -> list[float]:
+    """Modified z-score of every value, in the order given.
+
+    Where more than half of the values are alike, MAD is 0 and the mean absolute deviation takes its place with the
+    factor sqrt(2/pi) that belongs to it; where all are alike, all scores are 0.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    middle = float(np.median(x))
+    away = np.abs(x - middle)
+    alike = SAME * max(abs(middle), float(np.finfo(np.float64).tiny))
+    for spread, factor in ((float(np.median(away)), 0.6745), (float(np.mean(away)), math.sqrt(2.0 / math.pi))):
+        if spread > alike:
+            return [float(score) for score in factor * (x - middle) / spread]
+    return [0.0] * len(x)
+
+
+def find(units: Mapping[str, Mapping[str, object]]) -> dict[str, str] | None:
+    """Units (name to figures) that are outliers, each with the figures that are far off; None if there are too few."""
+    if len(units) < FEWEST:
+        return None
+    found: dict[str, list[str]] = {}
+    for judged in JUDGED:
+        values = {name: value for name, figures in units.items() if (value := judged.value(figures)) is not None}
+        if len(values) < FEWEST:
+            continue
+        for name, score in zip(values, modified_scores(list(values.values())), strict=True):
+            if (score if judged.error else abs(score)) > BEYOND:
+                number = float(units[name][judged.column])  # type: ignore[arg-type]
+                found.setdefault(name, []).append(f"{judged.words} {number:.4g} (z {score:+.1f})")
+    return {name: "; ".join(words) for name, words in found.items()}
