@@ -411,9 +411,7 @@ def diagnose(
     how = _reading(**reading)
 
     def run() -> None:
-        found = diagnosis.diagnose(
-            model, list(data), holdout=list(holdout), history=visited, rest=rest, progress=True, **how
-        )
+        found = diagnosis.diagnose(model, list(data), holdout=list(holdout), history=visited, rest=rest, **how)
         for note in found.notes:
             click.echo(f"warning: {note}", err=True)
         click.echo(found.sentence())

@@ -6,6 +6,7 @@ weights and the change of all other numbers at once (`identification.joint`), on
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -229,12 +230,12 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         block = np.asarray(np.linalg.qr(table, mode="r"))[len(free) :, len(free) :]
         whole = np.asarray(np.linalg.qr(np.concatenate([whole, block]), mode="r"))
         samples += int(np.count_nonzero(known))
+    system = reduction.Reduced(structure.thresholds, whole, (), (samples,))
+    if not np.isfinite(whole).all():  # numbers far from what the records are like
+        return Shaped(shape, p, math.inf, system)
     columns = np.arange(n1)
     best = weights.non_negative(whole, columns)
-    rms = root_mean_square(weights.residual(whole, columns, best), samples)
-    counts = (samples, *[0] * (reduction.FOLDS - 1))
-    system = reduction.Reduced(structure.thresholds, whole, (), counts)
-    return Shaped(shape, p, rms, system)
+    return Shaped(shape, p, root_mean_square(weights.residual(whole, columns, best), samples), system)
 
 
 @dataclass(frozen=True)
@@ -265,6 +266,8 @@ def fit(
     found = joint.search(
         lambda shape, q: linear(structure, items, shape, q), structure, np.clip(start, low, high), p, steps
     )
+    if not math.isfinite(found.rms):
+        return Fitted(structure, found.shape, p, math.inf)
     best = weights.non_negative(found.system.whole, np.arange(len(structure.thresholds)))
     return Fitted(structure, found.shape, best, found.rms)
 

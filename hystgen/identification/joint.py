@@ -105,7 +105,7 @@ def search(
     low, high = limits.bounds
     damping = 1e-3
     for _ in range(most if len(shape) else 0):
-        if damping > 1e6 or now.rms == 0.0:
+        if damping > 1e6 or now.rms == 0.0 or not math.isfinite(now.rms):
             break
         try:
             change, p = solve_linear(now.system.whole, now.weights, now.shape, limits, damping)

@@ -884,9 +884,6 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     p->k = (uint_least16_t)k;
                     edge = p->next_output;
                     if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
-                        if (v > PLAIN_DRIVE_MAX) {
-                            return plain_inverse_stay(self, u, v);
-                        }
                         edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
                     }
                     if (edge > PLAIN_OUTPUT_MAX) {
@@ -971,9 +968,6 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     p->k = (uint_least16_t)k;
                     edge = p->next_output;
                     if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
-                        if (v < PLAIN_DRIVE_MIN) {
-                            return plain_inverse_stay(self, u, v);
-                        }
                         edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
                     }
                     if (edge < PLAIN_OUTPUT_MIN) {
