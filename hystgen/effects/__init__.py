@@ -19,8 +19,17 @@ if TYPE_CHECKING:
 
 CATALOGUE = (
     "creep",
+    "rate_dependence",
+    "resonance",
     "lag",
+    "delay",
+    "slew_limit",
+    "saturation",
+    "thermal",
     "drift",
+    "ageing",
+    "sensor_nonlinearity",
+    "noncongruent",
 )
 """Names of the effects, each a module of this package whose `SHAPES` are its classes, the default shape first."""
 

@@ -100,6 +100,8 @@ class Effect(BaseModel):
     """whether the times of the samples matter"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
+    hint: ClassVar[str] = ""
+    """word on what may have been meant, said with a wrong or missing key"""
     compensation: ClassVar[str] = ""
     """what the effect means for a compensator, one clause"""
 
@@ -153,6 +155,19 @@ def span(low: float, high: float) -> tuple[float, float]:
     """Decimal logarithms of the ends of a range of positive numbers; never empty."""
     low = max(low, 1e-12)
     return math.log10(low), math.log10(max(high, 2.0 * low))
+
+
+def from_zero(grain: float, most: float, start: float) -> tuple[Array, Array, Array, Callable[[float], float]]:
+    """Bounds and start of a coordinate x >= 0 with value `grain (10^x - 1)`: even over orders of magnitude, with 0."""
+
+    def value(x: float) -> float:
+        return grain * math.expm1(x * math.log(10.0))
+
+    def place(size: float) -> Array:
+        return np.array([math.log10(1.0 + size / grain)])
+
+    most = max(most, 2.0 * grain)
+    return np.zeros(1), place(most), place(min(start, most)), value
 
 
 def decays(steps: Array, time_constant: float) -> tuple[Array, Array, Array]:

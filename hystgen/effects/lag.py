@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, decays, span
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, decays, from_zero
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative
 
@@ -16,7 +16,7 @@ class Lag(Effect):
     """First-order lag `tau a' + a = v` of the drive.
 
     Over a step with straight `v` the solution is exact (first-order hold: Franklin, Powell, Workman, Digital Control of
-    Dynamic Systems, 3rd ed., section 6.3). A record starts settled at its first drive.
+    Dynamic Systems). A record starts settled at its first drive.
     """
 
     name: Literal["lag"] = Field(description="name of the effect")
@@ -29,20 +29,18 @@ class Lag(Effect):
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""
         out = np.empty_like(a)
-        code().follow(np.ascontiguousarray(a), *decays(run.steps, self.time_constant), float(a[0]), out)
+        code().follow(a, *decays(run.steps, self.time_constant), float(a[0]), out)
         return out
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The time constant, from far below a sample to a fifth of the longest record."""
-        low, high = span(0.02 * about.sample_time, 0.2 * about.duration)
-        start = min(max(np.log10(2.0 * about.sample_time), low), high)
+        """The time constant, from none to a fifth of the longest record."""
+        low, high, start, value = from_zero(0.1 * about.sample_time, 0.2 * about.duration, about.sample_time)
         return [
             Candidate(
-                "lag", np.array([low]), np.array([high]), np.array([start]),
-                lambda x: cls(name="lag", time_constant=10.0 ** float(x[0])),
+                "lag", low, high, start, lambda x: cls(name="lag", time_constant=value(float(x[0]))), none=np.zeros(1)
             )
-        ]  # fmt: skip
+        ]
 
 
 SHAPES = (Lag,)

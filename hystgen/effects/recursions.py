@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,12 @@ from hystgen import compiled
 
 Array = NDArray[np.float64]
 
+MOST_PIECES = 16
+"""A step of a nonlinear relaxation is cut into at most so many."""
+
+CLOSE = 1e-6
+"""Error of a step of a nonlinear relaxation at which it is cut, in largest thresholds."""
+
 
 def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Array) -> None:
     """First-order filter from the state `x`: `x_(k+1) = decay_k x_k + early_k u_k + late_k u_(k+1)`."""
@@ -22,7 +29,117 @@ def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Arr
         out[k + 1] = x
 
 
-COMPILED: list[Callable[..., Any]] = [follow]
+def limit(u: Array, up: Array, down: Array, out: Array) -> None:
+    """`u` followed by moves of at most `up_k` upwards and `down_k` downwards to sample k + 1."""
+    x = u[0]
+    out[0] = x
+    for k in range(len(u) - 1):
+        x = min(max(u[k + 1], x - down[k]), x + up[k])
+        out[k + 1] = x
+
+
+def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float, out: Array) -> None:
+    """Second-order low pass, from rest, over steps with straight `u`.
+
+    `c`, `s`: decaying cosine and sine of each step; `ramp`, `step`: what the output, and its rate, gain by a change of
+    `u` by 1 over the step. Rates are per radian of the undamped oscillation.
+    """
+    y = u[0]
+    rate = 0.0
+    out[0] = y
+    for k in range(len(u) - 1):
+        off = y - u[k]
+        change = u[k + 1] - u[k]
+        y = u[k] + (c[k] + damping * s[k]) * off + s[k] * rate + ramp[k] * change
+        rate = (c[k] - damping * s[k]) * rate - s[k] * off + step[k] * change
+        out[k + 1] = y
+
+
+def dilated_play(w: Array, rate: Array, r: float, beta: float, state: float, out: Array) -> None:
+    """Play whose threshold is `r + beta rate_k`."""
+    for k in range(len(w)):
+        reach = r + beta * rate[k]
+        state = min(max(state, w[k] - reach), w[k] + reach)
+        out[k] = state
+
+
+def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
+    """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
+
+    Steps that are exact for the equation straightened about `e` (exponential Rosenbrock-Euler), kept on their side of
+    the equilibrium.
+    """
+    if exponent == 1.0:
+        part = duration / tau
+        decay = math.exp(-part)
+        final = decay * e + (speed * duration * (1.0 - decay) / part if part > 1e-8 else speed * duration)
+        if final >= 0.0:
+            return final, 0.0
+        taken = tau * math.log1p(e / (-speed * tau))
+        return 0.0, max(duration - taken, 0.0)
+    balance = scale * (speed * tau / scale) ** (1.0 / exponent) if speed > 0.0 else 0.0
+    left = duration
+    for piece in range(MOST_PIECES):
+        about = max(e, 0.1 * balance, 1e-12 * scale)
+        slope = exponent / tau * (about / scale) ** (exponent - 1.0)
+        fall = slope / exponent * about if about == e else scale / tau * (e / scale) ** exponent
+        change = speed - fall
+        bend = abs(exponent - 1.0) * slope / about
+        step = left
+        if piece < MOST_PIECES - 1:
+            wrong = left * left * left * bend * change * change / 12.0
+            if wrong > CLOSE * scale:
+                step = left / min(math.ceil(math.sqrt(wrong / (CLOSE * scale))), MOST_PIECES - piece)
+        part = slope * step
+        final = e + change * step * (-math.expm1(-part) / part if part > 1e-8 else 1.0)
+        if change > 0.0:
+            final = min(final, balance)
+        elif speed >= 0.0:
+            final = max(final, balance)
+        if final < 0.0:
+            return 0.0, max(left - step * e / (e - final), 0.0)
+        e = final
+        left -= step
+        if left <= 1e-12 * duration:
+            break
+    return e, 0.0
+
+
+def relaxing_play(
+    w: Array, steps: Array, r: float, tau: float, exponent: float, scale: float, state: float, out: Array
+) -> None:
+    """Play that follows its input viscously: `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold."""
+    state = min(max(state, w[0] - r), w[0] + r)
+    out[0] = state
+    for k in range(len(w) - 1):
+        x = w[k]
+        target = w[k + 1]
+        left = steps[k]
+        speed = (target - x) / left
+        side = 0.0
+        if x - r - state > 0.0:
+            side = 1.0
+        elif state - r - x > 0.0:
+            side = -1.0
+        if side != 0.0:
+            e, left = stretch(side * (x - state) - r, side * speed, left, tau, exponent, scale)
+            if left > 0.0:  # caught up, with the input on its way back
+                x = target - speed * left
+                state = x - side * r
+                side = 0.0
+            else:
+                state = target - side * (r + e)
+        if side == 0.0 and left > 0.0:
+            way = 1.0 if target > x else -1.0
+            beyond = way * (target - state) - r
+            if beyond > 0.0:
+                taken = left * min(beyond / (way * (target - x)), 1.0)
+                e, _ = stretch(0.0, way * speed, taken, tau, exponent, scale)
+                state = target - way * (r + e)
+        out[k + 1] = state
+
+
+COMPILED: list[Callable[..., Any]] = [follow, limit, ring, dilated_play, stretch, relaxing_play]
 
 
 @functools.cache

@@ -1,0 +1,42 @@
+"""Dead time in front of the actuator."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, from_zero
+from hystgen.param_models import NotNegative
+
+
+class Delay(Effect):
+    """Pure delay `a(t) = v(t - T)` of the drive, T any number of seconds.
+
+    The drive is straight between its samples, as for every effect, and constant before its first: steps stay without
+    overshoot, ramps are exact, a sine of angular frequency w is off by at most (w dt)^2/8 of its amplitude.
+    """
+
+    name: Literal["delay"] = Field(description="name of the effect")
+    time: NotNegative = Field(description="T, s", examples=[2.0e-4])
+
+    place: ClassVar[Place] = Place.DRIVE
+    compensation: ClassVar[str] = "preview of a known reference; otherwise named, not inverted"
+
+    def drive(self, a: Array, run: Run) -> Array:
+        """The drive `time` seconds earlier."""
+        return np.asarray(np.interp(run.t - self.time, run.t, a)) if self.time else a
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The time, from none to a tenth of the longest record."""
+        low, high, start, value = from_zero(0.1 * about.sample_time, 0.1 * about.duration, about.sample_time)
+        return [
+            Candidate(
+                "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), none=np.zeros(1)
+            )
+        ]
+
+
+SHAPES = (Delay,)

@@ -1,0 +1,134 @@
+"""Plays whose loops depend on where they lie: minor loops between the same ends are not congruent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen import operators
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, span
+from hystgen.param_models import MAX_PLAYS, Number, Positive
+
+MAX_TERMS = 8
+
+
+class _Noncongruent(Effect):
+    name: Literal["noncongruent"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.PLAYS
+    order: ClassVar[int] = 1
+    timed: ClassVar[bool] = False
+    compensation: ClassVar[str] = "a monotone scalar equation, solved every sample"
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """There are plays to bend."""
+        if thresholds is not None and len(thresholds) < 2:
+            yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
+
+    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """Plays behind their functions."""
+        return self.bent(operators.plays(w, thresholds, start), thresholds)
+
+
+class PlayFunctions(_Noncongruent):
+    """Play functions `sum p_i g_i(play_i)`, `g_i(s) = s + r_n sum_k c_ik xi^k`, `xi = s/r_n`, k = 2, 3, ...
+
+    r_n is the largest threshold; the drive itself (weight p_0) takes no part. Every Preisach operator is such a sum
+    of functions of plays (Brokate, Sprekels, Hysteresis and Phase Transitions, 1996).
+    """
+
+    shape: Literal["play_functions"] = Field(default="play_functions", description="a polynomial a play")
+    coefficients: Annotated[
+        tuple[Annotated[tuple[Number, ...], Field(min_length=1, max_length=MAX_TERMS)], ...],
+        Field(min_length=1, max_length=MAX_PLAYS),
+    ] = Field(
+        description="a list for each threshold but r_0: coefficients of xi^2, xi^3, ..",
+        examples=[[[0.05], [0.02, 0.01]]],
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """One list a play."""
+        yield from super().problems(thresholds)
+        if thresholds is not None and len(thresholds) > 1 and len(self.coefficients) != len(thresholds) - 1:
+            count = f"{len(self.coefficients)} list{'' if len(self.coefficients) == 1 else 's'}"
+            plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
+            yield ("coefficients",), f"has {count} for {plays}; give one for each threshold but r_0"
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """Rows behind their polynomials."""
+        scale = float(thresholds[-1])
+        out = np.array(rows)
+        for i, terms in enumerate(self.coefficients, 1):
+            xi = rows[i] / scale
+            out[i] += scale * xi * xi * np.polynomial.polynomial.polyval(xi, np.array(terms))
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The same parabola for all plays, then with a cubic term."""
+        plays = len(about.thresholds) - 1
+        if plays < 1:
+            return []
+        # of order one where xi is as large as the drive makes it
+        largest = max(1.0, max(map(abs, about.drive)) / about.thresholds[-1])
+
+        def build(x: Array) -> PlayFunctions:
+            terms = tuple((0.1 * x / largest ** np.arange(1, len(x) + 1)).tolist())
+            return cls(name="noncongruent", coefficients=(terms,) * plays)
+
+        return [
+            Candidate(label, np.full(n, -4.0), np.full(n, 4.0), np.full(n, 0.0), build, none=np.zeros(n))
+            for label, n in (("noncongruent, parabola", 1), ("noncongruent, cubic", 2))
+        ]
+
+
+class LoopCentre(_Noncongruent):
+    """Preisach density that depends on the centre of a relay's loop: `p_i (1 + A sech^2((c - centre)/width))`.
+
+    A play is the sum of relays of its half width over all centres c below its state (Brokate, Sprekels, Hysteresis and
+    Phase Transitions, 1996), so that the density makes every play `g(s) = s + A width (tanh((s - centre)/width) +
+    tanh(centre/width))`. The drive itself (weight p_0) has no relays and takes no part.
+    """
+
+    shape: Literal["centre"] = Field(description="Preisach density that depends on the loop's centre")
+    amplitude: Annotated[Number, Field(gt=-1.0)] = Field(
+        description="A, share by which the density at `centre` is higher; above -1", examples=[0.2]
+    )
+    centre: Number = Field(description="centre of the bump, input units of the plays", examples=[50.0])
+    width: Positive = Field(description="width of the bump, input units of the plays", examples=[20.0])
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """Rows with the density's integral."""
+        out = np.array(rows)
+        bump = np.tanh((rows[1:] - self.centre) / self.width) + np.tanh(self.centre / self.width)
+        out[1:] += self.amplitude * self.width * bump
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Amplitude, centre in the middle half of the drive and beyond, width."""
+        if len(about.thresholds) < 2:
+            return []
+        low, high = about.drive
+        wide = high - low
+        ends = span(0.05 * wide, 2.0 * wide)
+        start = float(np.log10(0.4 * wide))
+
+        def build(x: Array) -> LoopCentre:
+            return cls(
+                name="noncongruent", shape="centre", amplitude=float(x[0]),
+                centre=low + wide * float(x[1]), width=10.0 ** float(x[2]),
+            )  # fmt: skip
+
+        return [
+            Candidate(
+                "noncongruent, loop centre", np.array([-0.9, -0.5, ends[0]]), np.array([3.0, 1.5, ends[1]]),
+                np.array([0.05, 0.5, start]), build, none=np.array([0.0, 0.5, start]),
+            )
+        ]  # fmt: skip
+
+
+SHAPES = (PlayFunctions, LoopCentre)

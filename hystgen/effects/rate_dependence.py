@@ -1,0 +1,143 @@
+"""Plays that depend on the rate of their input."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen import operators
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, from_zero
+from hystgen.effects.recursions import code
+from hystgen.param_models import MAX_PLAYS, NotNegative, Positive
+
+
+class _RateDependence(Effect):
+    name: Literal["rate_dependence"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.PLAYS
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """There are plays to depend on the rate."""
+        if thresholds is not None and len(thresholds) < 2:
+            yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
+
+
+class ThresholdRate(_RateDependence):
+    """Thresholds that grow with the rate of the plays' input: `r_i + beta_i |w'|`.
+
+    Al Janaideh, Krejci: Inverse rate-dependent Prandtl-Ishlinskii model for feedforward compensation of hysteresis in a
+    piezomicropositioning actuator, IEEE/ASME Trans. Mechatronics 18, 2013; here linear in the rate. `w'` at a sample is
+    the slope from the sample before, 0 at the first. The drive itself (weight p_0) takes no part.
+    """
+
+    shape: Literal["threshold"] = Field(default="threshold", description="thresholds grow with the rate")
+    betas: Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=MAX_PLAYS)] = Field(
+        description="beta_1 .. beta_n, s, one for each threshold but r_0", examples=[[0.001, 0.002]]
+    )
+
+    compensation: ClassVar[str] = "exact while the thresholds stay ordered, else one implicit step a sample"
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """One beta a play."""
+        yield from super().problems(thresholds)
+        if thresholds is not None and len(thresholds) > 1 and len(self.betas) != len(thresholds) - 1:
+            count = f"{len(self.betas)} value{'' if len(self.betas) == 1 else 's'}"
+            plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
+            yield ("betas",), f"has {count} for {plays}; give one for each threshold but r_0"
+
+    def ordered_below(self, thresholds: tuple[float, ...]) -> float:
+        """Rate |w'|, input units per s, from which thresholds no longer rise in order; infinite where beta rises."""
+        gaps, falls = np.diff(thresholds[1:]), -np.diff(self.betas)
+        closing = falls > 0.0
+        return float(np.min(gaps[closing] / falls[closing])) if np.any(closing) else float("inf")
+
+    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """Plays with dynamic thresholds."""
+        with np.errstate(over="ignore"):
+            slope = np.minimum(np.abs(np.diff(w)) / run.steps, 1e300)
+        rate = np.concatenate([[0.0], slope])
+        out = np.empty((len(thresholds), len(w)))
+        out[0] = w
+        for i in range(1, len(thresholds)):
+            code().dilated_play(w, rate, float(thresholds[i]), self.betas[i - 1], float(start[i]), out[i])
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The same beta for all plays, beta in proportion to r, and a straight line over r."""
+        if len(about.thresholds) < 2:
+            return []
+        r = np.asarray(about.thresholds[1:]) / about.thresholds[-1]
+        unit = about.thresholds[-1] / max(about.fastest, 1e-12)
+
+        def shape(label: str, *courses: Array) -> Candidate:
+            table = unit * np.array(courses)
+
+            def build(x: Array) -> ThresholdRate:
+                return cls(name="rate_dependence", betas=tuple((x @ table).tolist()))
+
+            n = len(courses)
+            return Candidate(label, np.zeros(n), np.full(n, 3.0), np.full(n, 0.1), build, np.zeros(n))
+
+        even = np.ones(len(r))
+        return [
+            shape("rate dependence, thresholds, one beta", even),
+            shape("rate dependence, thresholds, beta in proportion to r", r),
+            shape("rate dependence, thresholds, beta falling or rising with r", 1.0 - r, r),
+        ]
+
+
+class RelaxingPlays(_RateDependence):
+    """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` what of its argument lies beyond +/- r.
+
+    A dashpot beside the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
+    nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. Over straight `w` the
+    linear case is exact, contacts within a step included; the nonlinear one is integrated to about 1e-6 of r_n a step.
+    """
+
+    shape: Literal["relaxation"] = Field(description="plays that follow viscously")
+    time_constant: NotNegative = Field(description="tau, s; 0 is no delay of the plays", examples=[1.0e-3])
+    exponent: Annotated[Positive, Field(ge=0.1, le=10.0)] = Field(
+        default=1.0, description="m, 1 for a linear dashpot; 0.1 to 10"
+    )
+
+    compensation: ClassVar[str] = "one implicit step a sample"
+
+    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """Viscous plays."""
+        if self.time_constant == 0.0:
+            return operators.plays(w, thresholds, start)
+        out = np.empty((len(thresholds), len(w)))
+        out[0] = w
+        about = (self.time_constant, self.exponent, float(thresholds[-1]))
+        for i in range(1, len(thresholds)):
+            code().relaxing_play(w, run.steps, float(thresholds[i]), *about, float(start[i]), out[i])
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The time constant alone, then with the exponent."""
+        if len(about.thresholds) < 2:
+            return []
+        low, high, start, value = from_zero(0.1 * about.sample_time, about.duration, about.sample_time)
+
+        def linear(x: Array) -> RelaxingPlays:
+            return cls(name="rate_dependence", shape="relaxation", time_constant=value(float(x[0])))
+
+        def bent(x: Array) -> RelaxingPlays:
+            return linear(x).model_copy(update={"exponent": float(10.0 ** x[1])})
+
+        zero = np.zeros(1)
+        return [
+            Candidate("rate dependence, relaxation", low, high, start, linear, none=np.zeros(1)),
+            Candidate(
+                "rate dependence, relaxation with exponent",
+                np.append(low, -0.6), np.append(high, 0.6), np.append(start, zero), bent, none=np.zeros(2),
+            ),
+        ]  # fmt: skip
+
+
+SHAPES = (ThresholdRate, RelaxingPlays)

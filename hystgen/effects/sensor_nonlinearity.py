@@ -1,0 +1,50 @@
+"""Curvature of the displacement sensor."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.param_models import Number, Positive
+
+
+class SensorPolynomial(Effect):
+    """Sensor that measures `y + scale sum_k c_k xi^k`, `xi = y/scale`, k = 2, 3, ...; single-valued in y."""
+
+    name: Literal["sensor_nonlinearity"] = Field(description="name of the effect")
+    shape: Literal["polynomial"] = Field(default="polynomial", description="a polynomial of the output")
+    coefficients: Annotated[tuple[Number, ...], Field(min_length=1, max_length=16)] = Field(
+        description="c_2, c_3, .., shares of scale", examples=[[0.01, -0.005]]
+    )
+    scale: Positive = Field(description="output at which xi = 1, output units", examples=[50.0])
+
+    place: ClassVar[Place] = Place.OUTPUT
+    order: ClassVar[int] = 1
+    timed: ClassVar[bool] = False
+    compensation: ClassVar[str] = "corrected in the data, never inverted in the drive"
+
+    def mapped(self, y: Array, run: Run) -> Array:
+        """What the sensor shows."""
+        xi = y / self.scale
+        bent = np.polynomial.polynomial.polyval(xi, np.array(self.coefficients))
+        return np.asarray(y + self.scale * xi * xi * bent)
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """A parabola, then a cubic, over the output range."""
+
+        def build(x: Array) -> SensorPolynomial:
+            return cls(
+                name="sensor_nonlinearity", coefficients=tuple((0.1 * x).tolist()), scale=about.output_range
+            )
+
+        return [
+            Candidate(label, np.full(n, -5.0), np.full(n, 5.0), np.zeros(n), build, none=np.zeros(n))
+            for label, n in (("sensor, parabola", 1), ("sensor, cubic", 2))
+        ]
+
+
+SHAPES = (SensorPolynomial,)

@@ -1,0 +1,57 @@
+"""Limited slew rate of the amplifier."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, cast
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.recursions import code
+from hystgen.param_models import Positive
+
+
+class SlewLimit(Effect):
+    """Slew limit `-S_falling <= a' <= S` of the drive: from sample to sample `a` goes as far towards `v` as it may."""
+
+    name: Literal["slew_limit"] = Field(description="name of the effect")
+    rate: Positive = Field(description="S, input units per s", examples=[5.0e3])
+    falling_rate: Positive = Field(
+        default=cast("float", None), description="limit of a falling drive, input units per s; by default the same"
+    )
+
+    place: ClassVar[Place] = Place.DRIVE
+    order: ClassVar[int] = 1
+    compensation: ClassVar[str] = "the reference is limited, and what was applied is committed"
+
+    @model_validator(mode="after")
+    def _same_rate(self) -> SlewLimit:
+        if self.falling_rate is None:
+            object.__setattr__(self, "falling_rate", self.rate)
+        return self
+
+    def drive(self, a: Array, run: Run) -> Array:
+        """The drive as fast as it may be."""
+        out = np.empty_like(a)
+        code().limit(a, self.rate * run.steps, self.falling_rate * run.steps, out)
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One rate, then one for each direction, from 1 % of the fastest recorded one to that."""
+        fastest = np.log10(max(about.fastest, 1e-12))
+
+        def build(x: Array) -> SlewLimit:
+            return cls(name="slew_limit", rate=10.0 ** float(x[0]), falling_rate=10.0 ** float(x[-1]))
+
+        return [
+            Candidate(
+                label, np.full(n, fastest - 2.0), np.full(n, fastest), np.full(n, fastest - 0.3), build,
+                none=np.full(n, fastest),
+            )
+            for label, n in (("slew limit", 1), ("slew limit, rising and falling", 2))
+        ]  # fmt: skip
+
+
+SHAPES = (SlewLimit,)
