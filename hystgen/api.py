@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen import tables
 from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, Stage, TanhEnvelope
 from hystgen.params import Parameters, load_parameters
+from hystgen.problems import EffectsError, UnsupportedEffectsError
 
 if TYPE_CHECKING:
+    from hystgen.effects import Chain, Effect, Run
     from hystgen.emission.module import Options
     from hystgen.fixed import FixedTables
     from hystgen.reference import Tables
@@ -54,6 +58,27 @@ class Model:
         """C identifier that prefixes every emitted symbol."""
         return self.parameters.name
 
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects beyond the static model, as in the parameter file."""
+        return self.parameters.model.effects
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The static model with its effects."""
+        from hystgen.effects.chain import Chain
+
+        return Chain(self.cascade, self.effects)
+
+    def need_static(self, what: str) -> None:
+        """Raise UnsupportedEffectsError if the model has effects: `what` (`the inverse`) does not cover them yet."""
+        if self.effects:
+            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
+            raise UnsupportedEffectsError(
+                f"{what} of a model with effects ({names}) is not supported yet; remove model.effects, or simulate "
+                "the model forward in double precision"
+            )
+
     def engine(self, engine: str | None = None, operator: str | None = None, arithmetic: str | None = None) -> str:
         """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided."""
         emit = self.parameters.emit
@@ -74,6 +99,7 @@ class Model:
         """An instance of an operator that keeps its memory from record to record."""
         from hystgen.simulation import Session
 
+        self.need_static("an operator that runs sample by sample")
         if arithmetic is not None:
             check_arithmetic(arithmetic)
             chosen = self.engine(engine, arithmetic=arithmetic)
@@ -81,17 +107,59 @@ class Model:
         return Session(self.cascade, operator, clamp=clamp)
 
     def simulate(
-        self, v: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None
+        self,
+        v: ArrayLike,
+        arithmetic: str | None = None,
+        clamp: bool = False,
+        engine: str | None = None,
+        *,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
         Without `arithmetic` in double precision, unlimited unless `clamp`. With 'float32', 'float64', 'q31' or 'q15'
         the bit reference of the emitted C, which limits the drive to `input_range`; fixed point takes and gives codes.
+
+        Only effects see time: `t` (N,) in seconds, rising, or the parameter file's `sample_time`; and `extra`, further
+        columns (N,) such as `temperature`. Everything starts at rest at the first sample. Raises EffectsError for what
+        they need and do not get, UnsupportedEffectsError for effects in an `arithmetic`.
         """
-        return self.session("forward", arithmetic, engine, clamp).run(v)[0]
+        if not self.effects:
+            return self.session("forward", arithmetic, engine, clamp).run(v)[0]
+        if arithmetic is not None:
+            self.need_static("the bit reference")
+        return self.chain.simulate([self.run(v, t, extra, clamp)])[0]
+
+    def run(
+        self,
+        v: ArrayLike,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
+        clamp: bool = False,
+        rest: float = 0.0,
+    ) -> Run:
+        """A record as `chain.simulate` takes it; arguments as for `simulate`, `rest` in seconds before it."""
+        from hystgen.effects import Run
+
+        drive = np.array(v, dtype=np.float64)
+        low, high = self.cascade.input_range
+        period = self.parameters.sample_time or 1.0
+        if t is None and self.parameters.sample_time is None and any(effect.timed for effect in self.effects):
+            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects if effect.timed))
+            raise EffectsError(f"the effects ({names}) need time; give t, or sample_time in the parameter file")
+        times = np.array(np.arange(len(drive)) * period if t is None else t, dtype=np.float64)
+        columns = {name: np.array(values, dtype=np.float64) for name, values in (extra or {}).items()}
+        for name, values in (("v", drive), ("t", times), *columns.items()):
+            if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
+                raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one a sample of v")
+        if np.any(np.diff(times) <= 0.0):
+            raise EffectsError("t has to rise from sample to sample")
+        return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def inverse(self) -> InverseModel:
-        """The compensator. Raises NotInvertibleError with the reasons and ranges."""
+        """The compensator. Raises NotInvertibleError with the reasons and ranges, UnsupportedEffectsError."""
+        self.need_static("the inverse")
         self.cascade.inverse()
         return InverseModel(self)
 
@@ -113,12 +181,13 @@ class InverseModel:
         return self.forward
 
 
-def load(path: str | os.PathLike[str]) -> Model:
-    """The model of a parameter file.
+def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] | type[Effect]] = ()) -> Model:
+    """The model of a parameter file; `effects`: files, or classes, of effects of the user's own that it names.
 
-    Raises ParameterError with every problem in the file; warns of a start memory that had to be projected.
+    Raises ParameterError with every problem in the file, EffectsError for a file of effects that cannot be used; warns
+    of a start memory that had to be projected.
     """
-    model = Model(load_parameters(path))
+    model = Model(load_parameters(path, _own_effects(effects)))
     if model.cascade.pi.projected:
         warnings.warn(
             f"{os.fspath(path)}: model.pi.initial_state cannot have come from any input; moved to the nearest "
@@ -126,6 +195,15 @@ def load(path: str | os.PathLike[str]) -> Model:
             stacklevel=2,
         )
     return model
+
+
+def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
+    from hystgen.effects.user import load_user_effects
+
+    found: list[type[Effect]] = []
+    for source in sources:
+        found += [source] if isinstance(source, type) else load_user_effects(source)
+    return found
 
 
 def check_arithmetic(arithmetic: str) -> None:
@@ -148,6 +226,7 @@ def emit_options(
     """What is to be emitted: the arguments given, else the parameter file's `emit` section."""
     from hystgen.emission import module
 
+    model.need_static("C")
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
     check_arithmetic(arithmetic)
@@ -176,7 +255,7 @@ def emit(
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
-    Raises ParameterError, NotInvertibleError and FormatError; then nothing is written.
+    Raises ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError; then nothing is written.
     """
     from hystgen.emission import files
 

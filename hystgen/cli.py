@@ -6,7 +6,7 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,7 +38,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     """Run `action` and turn what it may raise into a message and an exit code."""
     from hystgen.models import NotInvertibleError
     from hystgen.params import ParameterError
-    from hystgen.problems import RecordError
+    from hystgen.problems import RecordError, UnsupportedEffectsError
     from hystgen.tables import FormatError
 
     try:
@@ -52,16 +52,18 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
         raise _Failed(str(error), 2) from None
     except NotInvertibleError as error:
         raise _Failed("\n".join(f"{path}: error: no inverse: {reason}" for reason in error.reasons), 1) from None
+    except UnsupportedEffectsError as error:
+        raise _Failed(f"{path}: error: {error}", 1) from None
     except FormatError as error:
         raise _Failed(f"{path}: error: {error}", 2) from None
     except (ValueError, OSError) as error:
         raise _Failed(f"error: {error}", 2) from None
 
 
-def _load(path: str) -> Model:
+def _load(path: str, effects: Sequence[str] = ()) -> Model:
     from hystgen.api import load
 
-    model: Model = _shown(path, lambda: load(path))
+    model: Model = _shown(path, lambda: load(path, effects))
     return model
 
 
@@ -71,6 +73,9 @@ operator_option = click.option(
 )
 arithmetic_option = click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="default: the file's")
 engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
+effects_option = click.option(
+    "--effects", multiple=True, type=click.Path(), metavar="FILE.py", help="effects of your own (user:..); repeatable"
+)
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,
@@ -213,7 +218,7 @@ _RECORD_OPTIONS = [
     click.option("--delimiter", help="default: a comma"),
     click.option("--history", metavar="V,V,..", help="drive values visited before"),
     click.option(
-        "--rest", type=float, callback=_seconds, default=0.0, help="seconds of pause, not seen by static models"
+        "--rest", type=float, callback=_seconds, default=0.0, help="seconds of pause, seen by effects alone"
     ),
 ]
 
@@ -232,10 +237,11 @@ def record_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @click.option("--operator", type=click.Choice(["forward", "inverse"]), default="forward", show_default=True)
 @click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="compute as the emitted C does; default: double")
 @click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="with --arithmetic")
+@effects_option
 @record_options
 def simulate(
     params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
-    history: str | None, rest: float, **reading: Any,  # noqa: ARG001  a model without dynamics sees no pause
+    effects: tuple[str, ...], history: str | None, rest: float, **reading: Any,
 ) -> None:
     """Run the model (column v) or its inverse (column u) over records; several files are one session.
 
@@ -247,7 +253,7 @@ def simulate(
         raise _Failed("error: several records need -o with a folder", 2)
     if len({Path(path).stem for path in data}) < len(data):
         raise _Failed("error: two records have the same name; their results would overwrite each other", 2)
-    model = _load(params)
+    model = _load(params, effects)
     visited = _numbers(history)
     how = _reading(**reading)
     column, answer = ("v", "y") if operator == "forward" else ("u", "v")
@@ -257,19 +263,17 @@ def simulate(
             raise _Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
         for note in record.notes:
             click.echo(f"warning: {record.name}: {note}", err=True)
-    clamp = operator == "inverse"
-    session = _shown(params, lambda: model.session(operator, arithmetic, engine, clamp))
-    if visited:
-        _shown(params, partial(session.visit, visited))
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
     _keep(targets, [params, *data])
-    for record, target in zip(read, targets, strict=True):
+    simulated = _shown(
+        params,
+        lambda: simulation.simulate_records(model, read, operator, arithmetic, engine, visited or (), rest),
+    )
+    for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
         columns = record.columns()
-        signal = columns[column]
-        answers, status = _shown(params, partial(session.run, signal))
-        for sentence in simulation.remarks(record.name, session, operator, signal, status):
+        for sentence in remarks:
             click.echo(f"warning: {sentence}", err=True)
         units = dict(record.units)
         if answer in columns:
@@ -424,14 +428,15 @@ def diagnose(
 @main.command()
 @params_argument
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
-def show(params: str, plot: str | None) -> None:
+@effects_option
+def show(params: str, plot: str | None, effects: tuple[str, ...]) -> None:
     """Print what a model can do: ranges, slopes, loop width, invertible or why not.
 
     Example: hystgen show stage_x.yaml --plot stage_x.svg
     """
     from hystgen.report import plots, properties
 
-    model = _load(params)
+    model = _load(params, effects)
     if plot:
         _keep([plot], [params])
         _shown(params, partial(plots.check_path, plot))

@@ -9,15 +9,22 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
+from hystgen import effects
 from hystgen import param_models as models
 from hystgen.names import name_problem
 from hystgen.param_models import MAX_NUMBER, MEMBERS, STAGE_KINDS, Parameters
 from hystgen.problems import Path, Problem, path_text, printable, shown
 from hystgen.yaml_positions import Document
+
+if TYPE_CHECKING:
+    from hystgen.effects import Effect
+
+Shapes = tuple["type[Effect]", ...]
+"""Classes of one name."""
 
 EFFECT_NAMES = (
     "creep",
@@ -65,12 +72,15 @@ _WRITTEN = {
 }
 
 
-def check(data: Mapping[str, Any], document: Document | None = None) -> tuple[Parameters | None, list[Problem]]:
+def check(
+    data: Mapping[str, Any], document: Document | None = None, user: Mapping[str, Shapes] | None = None
+) -> tuple[Parameters | None, list[Problem]]:
     """Parameters of `data` (lists as tuples), or None and every problem.
 
     `document` gives the positions and what reading has refused already; its poisoned values are not judged again.
+    `user`: classes of the user's own effects by name.
     """
-    checker = _Checker(data, document)
+    checker = _Checker(data, document, user or {})
     parameters = checker.structure()
     checker.fit()
     if parameters is None or checker.problems or (document and document.problems):
@@ -80,15 +90,22 @@ def check(data: Mapping[str, Any], document: Document | None = None) -> tuple[Pa
         pi = parameters.model.pi.model_copy(update={"thresholds": found.thresholds, "weights": found.weights})
         pi._density_error = found.error
         parameters = parameters.model_copy(update={"model": parameters.model.model_copy(update={"pi": pi})})
+    if checker.effects:
+        model = parameters.model.model_copy(update={"effects": tuple(checker.effects)})
+        parameters = parameters.model_copy(update={"model": model})
     return parameters, []
 
 
 class _Checker:
-    def __init__(self, data: Mapping[str, Any], document: Document | None) -> None:
+    def __init__(self, data: Mapping[str, Any], document: Document | None, user: Mapping[str, Shapes]) -> None:
         self.data = data
         self.document = document
+        self.user = user
         self.problems: list[Problem] = []
         self.discretisation: Any = None
+        self.effects: list[Effect] = []
+        self._classes: dict[Path, type[Effect]] = {}
+        self._seen: dict[str, str] = {}
         self._bad: set[Path] = set()
         self._above_bad: set[Path] = set()
         for path in document.poisoned if document else ():
@@ -174,14 +191,16 @@ class _Checker:
         if kind == "too_short" and len(value) >= context.get("min_length", 0):
             return  # too few sound values, each unsound one being reported itself
         self._mark(path)
+        effect = self._classes.get(path[:3])
+        hint = f" ({effect.hint})" if effect and effect.hint else ""
         if kind == "missing" and not isinstance(path[-1], int):
-            self.add(path, f"is missing; add `{_WRITTEN.get(key, f'{key}: 0.0')}`")
+            self.add(path, f"is missing; add `{self._written(effect, key)}`{hint}")
         elif kind == "missing":
             self.add(path[:-1], _TWO_NUMBERS)
         elif kind == "extra_forbidden":
             known = self._keys(path[:-1])
             near = _nearest(key, known)
-            self.add(path, f"unknown key; {near or 'known here are ' + ', '.join(known)}", at_key=True)
+            self.add(path, f"unknown key; {near or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
         elif isinstance(path[-1], int) and not kind.startswith("union_tag"):
@@ -189,8 +208,18 @@ class _Checker:
         else:
             self.add(path, _reworded(kind, key, value, context, said))
 
+    @staticmethod
+    def _written(effect: type[Effect] | None, key: str) -> str:
+        """How a missing key is written."""
+        if effect is None:
+            return _WRITTEN.get(key, f"{key}: 0.0")
+        examples = effect.model_fields[key].examples
+        return f"{key}: {examples[0] if examples else 0.0}"
+
     def _keys(self, path: Path) -> list[str]:
         """The keys of the mapping at `path`."""
+        if effect := self._classes.get(path):
+            return list(effect.model_fields)
         key = _last_key(path)
         part = _PARTS.get(key, Parameters)
         if key == "memoryless":
@@ -230,8 +259,8 @@ class _Checker:
                 self._memoryless(("model", "memoryless", i))
         elif isinstance(stages, Mapping):
             self._memoryless(("model", "memoryless"))
-        if isinstance(effects := self.at(("model", "effects")), tuple):
-            for i, effect in enumerate(effects):
+        if isinstance(listed := self.at(("model", "effects")), tuple):
+            for i, effect in enumerate(listed[: models.MAX_EFFECTS]):
                 self._effect(("model", "effects", i), effect)
 
     def _text(self, path: Path, lines: bool) -> None:
@@ -386,11 +415,61 @@ class _Checker:
             self.add(name, f"must be the name of an effect, not {shown(given)}; known are {', '.join(EFFECT_NAMES)}")
         elif given == "asymmetry":
             self.add(name, "asymmetry is not written here; make it a stage of model.memoryless")
-        elif given in EFFECT_NAMES or given.startswith("user:"):
-            self.add(name, f"the effect {printable(given)} is not supported by this version yet; remove the entry")
+        elif given in EFFECT_NAMES or given in self.user:
+            shapes = self.user[given] if given in self.user else effects.shapes(given)
+            first = self._seen.setdefault(given, path_text(path))
+            if first != path_text(path) and not shapes[0].repeatable:
+                self.add(name, f"{printable(given)} is given twice (first in {first}); keep one of them")
+            self._shaped(path, effect, shapes)
+        elif given.startswith("user:"):
+            there = f", only {', '.join(map(printable, self.user))}" if self.user else ""
+            self.add(name, f"{printable(given)} is defined in no file given{there}; give its file (--effects)")
         else:
-            advice = _nearest(given, EFFECT_NAMES) or f"known are {', '.join(EFFECT_NAMES)}"
+            names = (*EFFECT_NAMES, *self.user)
+            advice = _nearest(given, names) or f"known are {', '.join(names)}"
             self.add(name, f"unknown effect {printable(given)}; {advice}")
+
+    def _shaped(self, path: Path, effect: Mapping[str, Any], shapes: Shapes) -> None:
+        """An effect whose name is known: the class of its shape, its own checks, whether it stands there already."""
+        chosen, selector = shapes[0], shapes[0].selector
+        if selector in effect and selector in chosen.model_fields:
+            if self.judged((*path, selector)):
+                return
+            known = {literal: shape for shape in shapes for literal in _literals(shape, selector)}
+            given = effect[selector]
+            if not isinstance(given, str) or given not in known:
+                self.add((*path, selector), _choice(given, tuple(known)))
+                return
+            chosen = known[given]
+        self._classes[path] = chosen
+        made: Effect | None = None
+        before = len(self.problems)
+        try:
+            made = chosen.model_validate(effect)
+        except ValidationError as error:
+            for found in error.errors(include_url=False):
+                place = (*path, *found["loc"])
+                if not self.judged(place):
+                    self._structural(place, found["type"], found.get("ctx", {}), found["msg"])
+        if made is None or len(self.problems) > before or not self.sound(path):
+            return
+        for keys, message in made.problems(self._thresholds()):
+            self.add((*path, *keys), message)
+        self.effects.append(made)
+
+    def _thresholds(self) -> tuple[float, ...] | None:
+        """The model's thresholds, None where they are not sound."""
+        if self.discretisation is not None:
+            return tuple(self.discretisation.thresholds)
+        found = self.get("model", "pi", "thresholds")
+        return tuple(found) if found else None
+
+
+def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
+    """The words that a shape of an effect goes by."""
+    found: Any = shape.model_fields[key].annotation
+    words: tuple[str, ...] = found.__args__
+    return words
 
 
 _TWO_NUMBERS = "must be two numbers; write [lowest, highest]"

@@ -17,7 +17,6 @@ from pydantic import (
     Field,
     PrivateAttr,
     Tag,
-    WithJsonSchema,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
@@ -26,6 +25,7 @@ from hystgen.names import MAX_NAME, NAME_PATTERN
 
 MAX_PLAYS = 4096
 MAX_STAGES = 16
+MAX_EFFECTS = 64
 MAX_NUMBER = 1e30
 MAX_DESCRIPTION = 500
 MAX_UNIT = 40
@@ -211,9 +211,10 @@ class ModelParameters(_Part):
         description="stage in front of pi, or a list of stages in order from the drive",
     )
     output_offset: Number = Field(default=0.0, description="added to the model's output, output units")
-    effects: Annotated[tuple[Any, ...], WithJsonSchema({"type": "array", "maxItems": 0, "title": "Effects"})] = Field(
-        default=(), description="further effects; this version supports none yet"
+    effects: tuple[Any, ...] = Field(
+        default=(), max_length=MAX_EFFECTS, description="effects beyond the static model, in any order"
     )
+    """Instances of `hystgen.effects.Effect`; their classes are imported when a file names them."""
 
 
 class EmitDefaults(_Part):
@@ -276,7 +277,21 @@ def schema() -> dict[str, Any]:
     stages = made["$defs"]["ModelParameters"]["properties"]["memoryless"]
     several = {key: stages.pop(key) for key in ("type", "items", "maxItems")}
     stages["anyOf"] = [several["items"], several]
+    made["$defs"]["ModelParameters"]["properties"]["effects"]["items"] = {"anyOf": _effects(made["$defs"])}
     return made
+
+
+def _effects(definitions: dict[str, Any]) -> list[dict[str, Any]]:
+    """Schemas of the shapes of all effects, put among the definitions; a user's own has any keys."""
+    from hystgen import effects
+
+    found: list[dict[str, Any]] = []
+    for name in effects.CATALOGUE:
+        for shape in effects.shapes(name):
+            definitions[shape.__name__] = _tidy(shape.model_json_schema())
+            found.append({"$ref": f"#/$defs/{shape.__name__}"})
+    own = {"type": "string", "pattern": "^user:.", "description": "an effect of the user's own, with its keys"}
+    return [*found, {"type": "object", "required": ["name"], "properties": {"name": own}}]
 
 
 def _tidy(node: Any) -> Any:

@@ -10,9 +10,9 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hystgen.names import comment_text, name_problem
 from hystgen.param_checks import EFFECT_NAMES, check
@@ -31,6 +31,9 @@ from hystgen.param_models import (
 )
 from hystgen.problems import ParameterError, Problem
 from hystgen.yaml_positions import MAX_BYTES, read, resolve
+
+if TYPE_CHECKING:
+    from hystgen.effects import Effect
 
 __all__ = [
     "EFFECT_NAMES",
@@ -61,8 +64,8 @@ __all__ = [
 _WIDTH = 100
 
 
-def load_parameters(path: str | os.PathLike[str]) -> Parameters:
-    """The checked parameters in a YAML file (UTF-8, at most 1 MiB).
+def load_parameters(path: str | os.PathLike[str], user_effects: Sequence[type[Effect]] = ()) -> Parameters:
+    """The checked parameters in a YAML file (UTF-8, at most 1 MiB); `user_effects` from `load_user_effects`.
 
     Raises ParameterError with every problem and its position; also when the file cannot be read.
     """
@@ -83,10 +86,10 @@ def load_parameters(path: str | os.PathLike[str]) -> Parameters:
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
         message = f"byte 0x{content[error.start]:02X} is not UTF-8; save the file as UTF-8"
         raise ParameterError(file, [Problem("", message, line, column)]) from None
-    return parse_parameters(text, file)
+    return parse_parameters(text, file, user_effects)
 
 
-def parse_parameters(text: str, file: str = "<string>") -> Parameters:
+def parse_parameters(text: str, file: str = "<string>", user_effects: Sequence[type[Effect]] = ()) -> Parameters:
     """The checked parameters in a YAML text; `file` names it in messages. Raises ParameterError."""
     size = len(text.encode("utf-8", "surrogatepass"))
     if size > MAX_BYTES:
@@ -94,21 +97,33 @@ def parse_parameters(text: str, file: str = "<string>") -> Parameters:
     document = read(text.removeprefix("\ufeff"))
     if not document.complete:
         raise ParameterError(file, document.problems)
-    parameters, problems = check(document.data, document)
+    parameters, problems = check(document.data, document, _by_name(user_effects))
     if parameters is None:
         raise ParameterError(file, document.problems + problems)
     return parameters
 
 
-def make_parameters(data: Mapping[str, Any], file: str = "<data>") -> Parameters:
+def make_parameters(
+    data: Mapping[str, Any], file: str = "<data>", user_effects: Sequence[type[Effect]] = ()
+) -> Parameters:
     """The checked parameters in plain data of the file's form (lists or tuples; None is as if left out).
 
+    An entry of `effects` may be an `Effect` as it is.
     Raises ParameterError; its problems have no positions, `file` names the data in messages.
     """
-    parameters, problems = check(_plain(data))
+    parameters, problems = check(_plain(data), user=_by_name(user_effects))
     if parameters is None:
         raise ParameterError(file, problems)
     return parameters
+
+
+def _by_name(user_effects: Sequence[type[Effect]]) -> dict[str, tuple[type[Effect], ...]]:
+    """The user's effects by their names; several classes of one name are its shapes."""
+    found: dict[str, tuple[type[Effect], ...]] = {}
+    for effect in user_effects:
+        name = effect.model_fields["name"].annotation.__args__[0]  # type: ignore[union-attr]
+        found[name] = (*found.get(name, ()), effect)
+    return found
 
 
 def _too_large(size: int | None, file: str) -> ParameterError:
@@ -118,6 +133,8 @@ def _too_large(size: int | None, file: str) -> ParameterError:
 
 def _plain(value: Any) -> Any:
     """Lists as tuples, NumPy values as Python's, keys without a value left out."""
+    if hasattr(value, "model_dump"):
+        value = value.model_dump()
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items() if entry is not None}
     if hasattr(value, "tolist"):
@@ -196,6 +213,12 @@ def _block(
                 if stage.get("descending") == stage.get("ascending", ()):
                     stage = {name: entry for name, entry in stage.items() if name != "descending"}
                 lines = [line for name, entry in stage.items() for line in _entry(name, entry, indent + "    ")]
+                yield f"{indent}  - {lines[0].lstrip()}"
+                yield from lines[1:]
+        elif key == "effects" and value:
+            yield f"{indent}{key}:"
+            for effect in value:
+                lines = [line for name, entry in effect.items() for line in _entry(name, entry, indent + "    ")]
                 yield f"{indent}  - {lines[0].lstrip()}"
                 yield from lines[1:]
         elif isinstance(value, dict) and key not in _FLOW:

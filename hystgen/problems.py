@@ -92,4 +92,8 @@ class RecordError(ValueError):
 
 
 class EffectsError(ValueError):
-    """Something that cannot be done with a model's effects, or an effect that cannot be used."""
+    """An effect that cannot be used, or not with these records."""
+
+
+class UnsupportedEffectsError(EffectsError):
+    """Something that cannot be done yet for a model with effects; it names them."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from hystgen import compiled, fixed, reference, tables
 from hystgen.models import Cascade
 from hystgen.reference import Bytes
+
+if TYPE_CHECKING:
+    from hystgen.api import Model
+    from hystgen.records import Record
 
 
 class Session:
@@ -88,18 +92,54 @@ def simulate_inverse(cascade: Cascade, u: ArrayLike, clamp: bool = False) -> NDA
     return Session(cascade, "inverse", clamp=clamp).run(u)[0]
 
 
-def remarks(
+def simulate_records(
+    model: Model,
+    records: Sequence[Record],
+    operator: str = "forward",
+    arithmetic: str | None = None,
+    engine: str | None = None,
+    history: Sequence[float] = (),
+    rest: float = 0.0,
+) -> list[tuple[NDArray[Any], list[str]]]:
+    """Answers of the model (column v) or its inverse (column u) for records that are one session, each with remarks.
+
+    `history`: drives visited before the first record; `rest`: seconds of pause before every record, which effects
+    alone see. The forward model is not limited to `input_range`, the inverse and every `arithmetic` are. Raises
+    NotInvertibleError, FormatError, EffectsError and UnsupportedEffectsError.
+    """
+    if operator == "inverse":
+        model.inverse()
+    if model.effects and arithmetic is None:
+        runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
+        answers = model.chain.simulate(runs, history)
+        ends = model.cascade.input_range
+        return [(y, _outside(r.name, ends, r.v, False)) for r, y in zip(records, answers, strict=True)]
+    session = model.session(operator, arithmetic, engine, clamp=operator == "inverse")
+    if history:
+        session.visit(history)
+    found = []
+    for record in records:
+        signal = record.columns()["v" if operator == "forward" else "u"]
+        samples, status = session.run(signal)
+        found.append((samples, _remarks(record.name, session, operator, signal, status)))
+    return found
+
+
+def _outside(name: str, ends: tuple[float, float], signal: NDArray[np.float64], limited: bool) -> list[str]:
+    """A sentence about drives outside the range, if there are any."""
+    outside = int(np.count_nonzero((signal < ends[0]) | (signal > ends[1])))
+    how = "limited to it" if limited else "extrapolated, not limited"
+    said = f"{name}: {outside} of {len(signal)} samples lie outside input_range {ends[0]:g} to {ends[1]:g}, {how}"
+    return [said] if outside else []
+
+
+def _remarks(
     name: str, session: Session, operator: str, signal: NDArray[np.float64], status: Bytes
 ) -> list[str]:
     """What a user should know about a simulated record, one sentence each."""
-    low, high = session.drive_range
     if operator == "forward":
-        outside = int(np.count_nonzero((signal < low) | (signal > high)))
-        if outside:
-            limited = bool(np.any(status & reference.INPUT_CLAMPED))
-            how = "limited to it" if limited else "extrapolated, not limited"
-            return [f"{name}: {outside} of {len(signal)} samples lie outside input_range {low:g} to {high:g}, {how}"]
-        return []
+        limited = bool(np.any(status & reference.INPUT_CLAMPED))
+        return _outside(name, session.drive_range, signal, limited)
     said = []
     for bit, what in (
         (reference.INPUT_CLAMPED, "references lie outside the output range and were limited"),

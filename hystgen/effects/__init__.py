@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Place as Place
     from hystgen.effects.base import Run as Run
     from hystgen.effects.chain import Chain as Chain
+    from hystgen.effects.user import load_user_effects as load_user_effects
 
 CATALOGUE = (
     "creep",
@@ -40,9 +41,10 @@ _PLACES = {
     "Effect": "base",
     "Place": "base",
     "Run": "base",
+    "load_user_effects": "user",
 }
 
-__all__ = ["CATALOGUE", "About", "Candidate", "Chain", "Effect", "Place", "Run", "shapes"]
+__all__ = ["CATALOGUE", "About", "Candidate", "Chain", "Effect", "Place", "Run", "load_user_effects", "shapes"]
 
 
 @functools.cache

@@ -109,6 +109,10 @@ class Effect(BaseModel):
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""
         yield from ()
 
+    def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
+        """What else `hystgen show` says of the effect in a model of these thresholds, one line each."""
+        return []
+
     def drive(self, a: Array, run: Run) -> Array:
         """DRIVE: the drive (N,) behind the effect."""
         raise NotImplementedError

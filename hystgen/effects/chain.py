@@ -116,28 +116,28 @@ class Chain:
         y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
         for effect in self._of(Place.LINEAR):
             if effect.order == 0:
-                y = _checked(effect, effect.filtered(y, run), y)
+                y = _answer(effect, "filtered", y, y, run)
         for effect in self._of(Place.GAIN):
-            y = _checked(effect, effect.gain(run) * y + effect.offset(run), y)
+            y = _answer(effect, "gain", y, run) * y + _answer(effect, "offset", y, run)
         for effect in self._of(Place.LINEAR):
             if effect.order > 0:
-                y = _checked(effect, effect.filtered(y, run), y)
+                y = _answer(effect, "filtered", y, y, run)
         for effect in self._of(Place.OUTPUT):
             if effect.order == 0:
-                y = _checked(effect, effect.mapped(y, run), y)
+                y = _answer(effect, "mapped", y, y, run)
         y = y + self.cascade.output_offset
         for effect in self._of(Place.OUTPUT):
             if effect.order > 0:
-                y = _checked(effect, effect.mapped(y, run), y)
+                y = _answer(effect, "mapped", y, y, run)
         for effect in self._of(Place.ADDED):
-            y = y + _checked(effect, effect.added(run), y)
+            y = y + _answer(effect, "added", y, run)
         return y
 
     def play_input(self, run: Run) -> Array:
         """Input `w` (N,) of the plays: the drive behind delay, slew limit, lag and front."""
         a = np.ascontiguousarray(run.v, dtype=np.float64)
         for effect in self._of(Place.DRIVE):
-            a = _checked(effect, effect.drive(a, run), a)
+            a = _answer(effect, "drive", a, a, run)
         if not self.cascade.branches_differ:
             return through_stages(self.cascade.stages, a, None)
         before = float(self.cascade.front_inverse(self.cascade.pi.start[0])) if self.cascade.start_is_defined else 0.0
@@ -152,19 +152,26 @@ class Chain:
         for effect in self._of(Place.PLAYS):
             expected = np.empty((len(thresholds), len(w)))
             if rows is None:
-                rows = _checked(effect, effect.plays(w, run, thresholds, start), expected)
+                rows = _answer(effect, "plays", expected, w, run, thresholds, start)
             else:
-                rows = _checked(effect, effect.bent(rows, thresholds), expected)
+                rows = _answer(effect, "bent", expected, rows, thresholds)
         return operators.plays(w, thresholds, start) if rows is None else rows
 
     def _of(self, place: Place) -> list[Effect]:
         return [effect for effect in self.effects if effect.place is place]
 
 
-def _checked(effect: Effect, answer: Array, like: Array) -> Array:
-    """What an effect answered, if it has the form of `like`; a user's own effect may not."""
-    found = np.asarray(answer)
+def _answer(effect: Effect, method: str, like: Array, *arguments: object) -> Array:
+    """What an effect answers, if it has the form of `like`; a user's own effect may fail or answer anything."""
+    try:
+        found = np.asarray(getattr(effect, method)(*arguments))
+    except Exception as error:
+        if not effect.name.startswith("user:"):
+            raise
+        raise EffectsError(f"the effect {effect.name} failed in {method}: {type(error).__name__}: {error}") from error
     if found.shape != like.shape or found.dtype.kind not in "fiu":
         what = f"{found.dtype} of shape {found.shape}"
-        raise EffectsError(f"the effect {effect.name} answered {what}; numbers of shape {like.shape} were expected")
+        raise EffectsError(
+            f"the effect {effect.name} answered {what} in {method}; numbers of shape {like.shape} were expected"
+        )
     return np.ascontiguousarray(found, dtype=np.float64)

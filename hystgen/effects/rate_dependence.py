@@ -48,11 +48,13 @@ class ThresholdRate(_RateDependence):
             plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
             yield ("betas",), f"has {count} for {plays}; give one for each threshold but r_0"
 
-    def ordered_below(self, thresholds: tuple[float, ...]) -> float:
-        """Rate |w'|, input units per s, from which thresholds no longer rise in order; infinite where beta rises."""
+    def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
+        """The rate from which the thresholds are no longer in order, where beta falls along them."""
         gaps, falls = np.diff(thresholds[1:]), -np.diff(self.betas)
         closing = falls > 0.0
-        return float(np.min(gaps[closing] / falls[closing])) if np.any(closing) else float("inf")
+        if not np.any(closing):
+            return []
+        return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} a second"]
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """Plays with dynamic thresholds."""

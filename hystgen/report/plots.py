@@ -69,14 +69,15 @@ def show_model(model: Model, path: str | os.PathLike[str]) -> None:
     """
     c, units = model.cascade, model.parameters.units
     low, high = c.input_range
-    invertible = not c.inverse_problems()
+    invertible = not c.inverse_problems() and not model.effects
     figure, axes = _figure(3 if invertible else 2)
     t = np.linspace(0, 1, 1500)
     swing = np.concatenate([part * np.sin(2 * np.pi * t) for part in (1.0, 1.0, 0.6, 0.3)])
     v = (low + high) / 2 + (high - low) / 2 * swing
-    y = model.simulate(v)
+    y = c.simulate(v)
     axes[0].plot(v[1500:], y[1500:], color=OUTPUT, linewidth=1.2)
-    axes[0].set(title="Loop", xlabel=_label("drive", units.input), ylabel=_label("output", units.output))
+    title = "Loop without effects" if model.effects else "Loop"
+    axes[0].set(title=title, xlabel=_label("drive", units.input), ylabel=_label("output", units.output))
 
     x = np.linspace(0, max(abs(end) for end in c.play_range), 400)
     axes[1].plot(x, c.pi.loading_curve(x), color=DRIVE)

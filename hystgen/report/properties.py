@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hystgen import fixed_tables
 from hystgen.api import Model
 from hystgen.bounds import error_bounds
@@ -32,7 +34,9 @@ def properties(model: Model) -> str:
     if p.model.pi.density is not None:
         lines.append(f"density            loading curve within {p.model.pi.density_error:.3g}{output}")
     problems = c.inverse_problems()
-    if problems:
+    if model.effects:
+        lines += ["effects            the lines above are those of the model without them", *_effects(model)]
+    elif problems:
         lines += ["inverse            none:", *(f"    {problem}" for problem in problems)]
         lines += _fixed(model, drive, output)
     else:
@@ -50,6 +54,29 @@ def properties(model: Model) -> str:
         if c.branches_differ:
             lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
     return "\n".join(lines)
+
+
+def _effects(model: Model) -> list[str]:
+    """Each effect in the order of the chain, its parameters with what they are, and what it means for a compensator."""
+    lines = []
+    for effect in model.chain.effects:
+        shape = getattr(effect, effect.selector, "")
+        lines.append(f"    {effect.name}{f', {shape}' if shape else ''}")
+        for key, field in type(effect).model_fields.items():
+            if key not in ("name", effect.selector):
+                value = getattr(effect, key)
+                lines.append(f"        {key} = {_shown(value)}: {field.description}")
+        lines += [f"        {remark}" for remark in effect.remarks(tuple(model.cascade.pi.thresholds))]
+        if effect.compensation:
+            lines.append(f"        compensation: {effect.compensation}")
+    return lines
+
+
+def _shown(value: Any) -> str:
+    """A number or a list, which is cut where it is long."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_shown(entry) for entry in value[:8]) + (", ..]" if len(value) > 8 else "]")
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
@@ -74,6 +101,8 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
 
 def warnings(model: Model) -> list[str]:
     """What the user should know before relying on the model."""
+    if model.effects:
+        return []
     ratio = model.cascade.slope_ratio
     if ratio > HARD_RATIO and not model.cascade.inverse_problems():
         return [

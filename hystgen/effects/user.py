@@ -1,0 +1,86 @@
+"""Effects of the user's own, from Python files of the same form as those of the catalogue."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.machinery
+import importlib.util
+import os
+import sys
+import traceback
+from pathlib import Path
+
+from hystgen.effects.base import Effect, Place
+from hystgen.problems import EffectsError
+
+PREFIX = "user:"
+
+METHODS = {
+    Place.DRIVE: ("drive",),
+    Place.PLAYS: ("plays",),
+    Place.LINEAR: ("filtered",),
+    Place.GAIN: ("gain", "offset"),
+    Place.OUTPUT: ("mapped",),
+    Place.ADDED: ("added",),
+}
+"""What a class of each place has to define, one of them at least."""
+
+
+def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
+    """The effect classes that a Python file defines; the file is run, so it must be trusted.
+
+    Each is a subclass of `hystgen.effects.Effect` with `name: Literal["user:..."]`, a `place` and the method of that
+    place; several classes of one name are its shapes, the first is the default. Raises EffectsError, one message, for a
+    file that cannot be run or has no usable effect.
+    """
+    file = Path(path)
+    # A name of its own for every file and content, as pickling and numba find functions by it
+    try:
+        mark = hashlib.sha256(str(file.resolve()).encode() + file.read_bytes()).hexdigest()[:12]
+    except OSError as error:
+        raise EffectsError(f"{path}: cannot be read: {error.strerror or error}") from None
+    name = f"hystgen_user_effects_{mark}"
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_loader(name, importlib.machinery.SourceFileLoader(name, str(file)))
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except (Exception, SystemExit) as error:
+            del sys.modules[name]
+            raise EffectsError(f"{path}{_line(error, file)}: {type(error).__name__}: {error}") from None
+    found = [
+        value
+        for value in vars(sys.modules[name]).values()
+        if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == name
+        and not value.__name__.startswith("_")
+    ]  # fmt: skip
+    if not found:
+        raise EffectsError(f"{path}: defines no effect; write a class of hystgen.effects.Effect")
+    for effect in found:
+        if problem := _problem(effect):
+            raise EffectsError(f"{path}: class {effect.__name__} {problem}")
+    return tuple(found)
+
+
+def _line(error: BaseException, file: Path) -> str:
+    """`:LINE` of the file where running it failed, if it was there."""
+    if isinstance(error, SyntaxError):
+        return f":{error.lineno}"
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(file)]
+    return f":{lines[-1]}" if lines else ""
+
+
+def _problem(effect: type[Effect]) -> str:
+    """Why a class cannot be used, or nothing."""
+    words: tuple[object, ...] = getattr(effect.model_fields["name"].annotation, "__args__", ())
+    if len(words) != 1 or not str(words[0]).startswith(PREFIX) or words[0] == PREFIX:
+        return 'needs a name of its own; write name: Literal["user:my_effect"]'
+    if not isinstance(getattr(effect, "place", None), Place):
+        return "needs a place; write place: ClassVar[Place] = Place.OUTPUT, or another of hystgen.effects.Place"
+    methods = METHODS[effect.place]
+    if not any(getattr(effect, method) is not getattr(Effect, method) for method in methods):
+        return f"has place {effect.place.value}, for which it has to define {' or '.join(methods)}"
+    return ""
