@@ -141,11 +141,12 @@ static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corne
     p->k = (uint_least16_t)k;
 }
 
-/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. */
+/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where it
+   has left none it can only be the lowest; that is asked so that no table, however wrong, leads outside the list. */
 static const hystgen_corner_t *hystgen_entered_by(const hystgen_corner_t *corner, unsigned int left,
                                                   unsigned int depth, unsigned int k)
 {
-    return left < depth && corner[left].end == k ? &corner[left] : &corner[left - 1];
+    return left == 0 || (left < depth && corner[left].end == k) ? &corner[left] : &corner[left - 1];
 }
 
 /* Whether the place that solving found is where the move has come to. */

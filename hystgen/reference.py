@@ -240,7 +240,7 @@ def corners_find(
 
 def entered_by(s: State, left: int, depth: int, k: int) -> int:
     """Corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1."""
-    if left < depth and s.end[left] == k:
+    if left == 0 or (left < depth and s.end[left] == k):
         return left
     return left - 1
 

@@ -231,6 +231,9 @@ def _extended(parameters: Parameters, fitted: Fitted, ready: believed.Prepared) 
     r = fitted.structure.thresholds
     kept = (p > 0.0) | (r == 0.0)
     actuator = fitted.actuator
+    fewer = tuple(r[kept].tolist())
+    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # numbers of its own for every play
+        kept[:] = True
     offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
     content = {
         **parameters.model_dump(),

@@ -23,8 +23,11 @@ SCREENED = 12_000
 
 SCREENING_STEPS = 4
 
-KEPT = 6
-"""Shapes of different effects that are followed up after the screening."""
+KEPT, ALSO = 5, 2
+"""Shapes that are followed up after the screening: the best on held-out records, and others that fit best."""
+
+SHAPES = 2
+"""Of one effect no more than so many."""
 
 ROUNDS = 5
 
@@ -95,11 +98,10 @@ def select(
     tick: Callable[[], None] = lambda: None,
 ) -> Outcome:
     """Refit the believed structure, then add effects as long as one qualifies."""
-    p = np.zeros(len(base.thresholds))
-    p[0] = 1.0
     refitted = now = fits.fit(base, to_fit, start, _first_weights(base, to_fit, start))
     every = max(1, sum(int(np.count_nonzero(item.known)) for item in to_fit) // SCREENED)
     thin = [item.thinned(every) for item in to_fit]
+    thin_held = [item.thinned(every) for item in held]
     known = about(to_fit, base.thresholds)
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
@@ -107,7 +109,7 @@ def select(
     for _ in range(ROUNDS):
         if fits.rms(now.errors(held)) <= AT_FLOOR * noise:
             break
-        tried = _followed_up(now, _screened(now, thin, options(now, known, user), tick), to_fit, held, tick)
+        tried = _followed_up(now, _screened(now, thin, thin_held, options(now, known, user), tick), to_fit, held, tick)
         if not tried:
             break
         rankings.append(tuple(tried))
@@ -137,22 +139,27 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
 
 
 def _screened(
-    now: Fitted, thin: Sequence[Item], found: Sequence[Option], tick: Callable[[], None]
+    now: Fitted,
+    thin: Sequence[Item],
+    held: Sequence[Item],
+    found: Sequence[Option],
+    tick: Callable[[], None],
 ) -> list[tuple[Option, Fitted]]:
-    """The options after a few steps on thinned records, the best shapes of the best effects."""
-    ranked = []
+    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not."""
+    tried = []
     for option in found:
         tick()
         fitted = fits.fit(option.structure, thin, option.start, now.weights, SCREENING_STEPS)
-        ranked.append((option, fitted))
-    ranked.sort(key=lambda pair: pair[1].rms)
+        if math.isfinite(fitted.rms):
+            tried.append((fitted.rms, fits.rms(fitted.errors(held)), option, fitted))
     kept: list[tuple[Option, Fitted]] = []
-    for option, fitted in ranked:
-        of_name = sum(other.name == option.name for other, _ in kept)
-        if of_name < 2:
-            kept.append((option, fitted))
-        if len(kept) == KEPT:
-            break
+    for measure, most in ((1, KEPT), (0, KEPT + ALSO)):
+        for each in sorted(tried, key=lambda one: one[measure]):
+            _, _, option, fitted = each
+            if len(kept) == most:
+                break
+            if sum(other.name == option.name for other, _ in kept) < SHAPES and all(o is not option for o, _ in kept):
+                kept.append((option, fitted))
     return kept
 
 

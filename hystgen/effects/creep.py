@@ -13,6 +13,12 @@ from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, de
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative, Positive
 
+FASTEST = 0.01
+"""s; what follows a move faster than this is a lag or friction of the domain walls, and has other names."""
+
+MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.1
+"""Largest shares that are tried: stages creep by 1 to 2 % a decade, and up to three times as much."""
+
 PER_DECADE = 2
 """States a decade of a logarithmic spectrum; their ripple on the straight line over log t is 0.1 % of its slope."""
 
@@ -73,8 +79,8 @@ class ExponentialCreep(_Creep):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One, two and three states; time constants from a few samples to beyond the session, weights to 30 %."""
-        low, high = span(4.0 * about.sample_time, 3.0 * about.session)
+        """One, two and three states; time constants from a few samples to beyond the session, weights to 10 %."""
+        low, high = span(max(4.0 * about.sample_time, FASTEST), 3.0 * about.session)
 
         def build(x: Array) -> ExponentialCreep:
             half = len(x) // 2
@@ -91,7 +97,7 @@ class ExponentialCreep(_Creep):
                 Candidate(
                     f"creep, exponential, {n} state{'s' if n > 1 else ''}",
                     np.concatenate([np.full(n, low), np.zeros(n)]),
-                    np.concatenate([np.full(n, high), np.full(n, 3.0)]),
+                    np.concatenate([np.full(n, high), np.full(n, MOST_OF_A_STATE / 0.1)]),
                     np.concatenate([places, np.full(n, 0.1)]),
                     build,
                     np.concatenate([places, np.zeros(n)]),
@@ -143,7 +149,7 @@ class LogarithmicCreep(_Creep):
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """The share a decade over the whole recorded time, then with free ends of the spectrum."""
-        low, high = span(0.5 * about.sample_time, 10.0 * about.session)
+        low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
         # A longer spectrum only changes the gain, which the weights of the plays take up
         whole = (10.0**low, 10.0**high)
@@ -163,11 +169,11 @@ class LogarithmicCreep(_Creep):
         wide = high - low
         return [
             Candidate(
-                "creep, logarithmic", np.zeros(1), np.array([2.0]), np.array([0.1]), even, np.zeros(1)
+                "creep, logarithmic", np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1)
             ),
             Candidate(
                 "creep, logarithmic, free ends",
-                np.array([0.0, low, min(0.3, wide)]), np.array([2.0, high - 0.3, wide]),
+                np.array([0.0, low, min(0.3, wide)]), np.array([MOST_A_DECADE / 0.1, high - 0.3, wide]),
                 np.array([0.1, low, wide]), ended, np.array([0.0, low, wide]),
             ),
         ]  # fmt: skip
