@@ -216,8 +216,8 @@ static void plain_find_by_input(const plain_tables_t *t, const plain_corner_t *c
     p->k = (uint_least16_t)k;
 }
 
-/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where it
-   has left none it can only be the lowest; that is asked so that no table, however wrong, leads outside the list. */
+/* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
+   corner is left, as when a move goes on with all plays, it can only be the lowest. */
 static const plain_corner_t *plain_entered_by(const plain_corner_t *corner, unsigned int left,
                                                   unsigned int depth, unsigned int k)
 {
