@@ -99,7 +99,7 @@ class Model:
         """An instance of an operator that keeps its memory from record to record."""
         from hystgen.simulation import Session
 
-        self.need_static("an operator that runs sample by sample")
+        self.need_static("a sample-by-sample operator" if arithmetic is None else "the bit reference")
         if arithmetic is not None:
             check_arithmetic(arithmetic)
             chosen = self.engine(engine, arithmetic=arithmetic)

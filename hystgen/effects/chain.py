@@ -21,12 +21,27 @@ VISIT = 10.0
 
 VISIT_SAMPLES = 200
 
-_PLACES = list(Place)
+GAP = 10.0
+"""Between two records of a session the drive holds if that many median steps lie between them, else it is straight."""
+
+_BEHIND_OFFSET = 6
+
+
+def _rank(effect: Effect) -> int:
+    """Position in the chain: gains lie between linear filters of order 0 and others, the offset between outputs."""
+    return {
+        Place.DRIVE: 0,
+        Place.PLAYS: 1,
+        Place.LINEAR: 2 if effect.order == 0 else 4,
+        Place.GAIN: 3,
+        Place.OUTPUT: 5 if effect.order == 0 else _BEHIND_OFFSET,
+        Place.ADDED: 7,
+    }[effect.place]
 
 
 def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """The effects as the chain meets them; those of one place and order as they were given."""
-    return tuple(sorted(effects, key=lambda effect: (_PLACES.index(effect.place), effect.order)))
+    return tuple(sorted(effects, key=lambda effect: (_rank(effect), effect.order)))
 
 
 @dataclass(frozen=True)
@@ -41,8 +56,8 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
     """The runs of a session on one time axis.
 
     A record whose times lie behind those before it keeps them (session time), unless a rest would not fit between; any
-    other starts one sample after the record before and its rest. In gaps and rests the drive holds, until one sample
-    before the next record. The values of `history` are visited before the first record, each on a straight move of
+    other starts one median step after the record before and its rest. In rests and in gaps of more than `GAP` steps the
+    drive holds, until one step before the next record. The values of `history` are visited before the first record, each on a straight move of
     `VISIT` seconds from the one before, and held for its rest. Raises ValueError for records of no samples.
     """
     if not runs or any(len(run.t) == 0 for run in runs):
@@ -63,7 +78,7 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
         count += len(times)
 
     for i, run in enumerate(runs):
-        step = float(run.t[1] - run.t[0]) if len(run.t) > 1 else 1.0
+        step = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
         times = np.asarray(run.t, dtype=np.float64)
         if i == 0 and history:
             end = float(times[0]) - step - run.rest
@@ -78,7 +93,8 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
             wanted = end + run.rest + step
             if times[0] <= end or (run.rest > 0.0 and times[0] < wanted):
                 times = times + (wanted - times[0])
-        if count and times[0] - step > t[-1][-1] + 1e-6 * step:
+        pause = float(times[0] - t[-1][-1]) if count else 0.0
+        if pause > GAP * step or (run.rest > 0.0 and pause > 1.5 * step):
             held = {name: extra[name][-1][-1:] for name in names}
             put(np.array([times[0] - step]), v[-1][-1:], held)
         parts.append(slice(count, count + len(times)))
@@ -114,24 +130,20 @@ class Chain:
     def output(self, run: Run) -> Array:
         """Output (N,) of one run, from the start memory and at rest at its first sample."""
         y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
-        for effect in self._of(Place.LINEAR):
-            if effect.order == 0:
+        behind = [effect for effect in self.effects if effect.place not in (Place.DRIVE, Place.PLAYS)]
+        offset = self.cascade.output_offset
+        for effect in behind:
+            if _rank(effect) >= _BEHIND_OFFSET:
+                y, offset = y + offset, 0.0
+            if effect.place is Place.LINEAR:
                 y = _answer(effect, "filtered", y, y, run)
-        for effect in self._of(Place.GAIN):
-            y = _answer(effect, "gain", y, run) * y + _answer(effect, "offset", y, run)
-        for effect in self._of(Place.LINEAR):
-            if effect.order > 0:
-                y = _answer(effect, "filtered", y, y, run)
-        for effect in self._of(Place.OUTPUT):
-            if effect.order == 0:
+            elif effect.place is Place.GAIN:
+                y = _answer(effect, "gain", y, run) * y + _answer(effect, "offset", y, run)
+            elif effect.place is Place.OUTPUT:
                 y = _answer(effect, "mapped", y, y, run)
-        y = y + self.cascade.output_offset
-        for effect in self._of(Place.OUTPUT):
-            if effect.order > 0:
-                y = _answer(effect, "mapped", y, y, run)
-        for effect in self._of(Place.ADDED):
-            y = y + _answer(effect, "added", y, run)
-        return y
+            else:
+                y = y + _answer(effect, "added", y, run)
+        return y + offset
 
     def play_input(self, run: Run) -> Array:
         """Input `w` (N,) of the plays: the drive behind delay, slew limit, lag and front."""

@@ -14,11 +14,14 @@ from hystgen import compiled
 
 Array = NDArray[np.float64]
 
-MOST_PIECES = 16
+MOST_PIECES = 1000
 """A step of a nonlinear relaxation is cut into at most so many."""
 
-CLOSE = 1e-6
-"""Error of a step of a nonlinear relaxation at which it is cut, in largest thresholds."""
+CLOSE = 1e-7
+"""Error of a piece of a nonlinear relaxation, in largest thresholds."""
+
+SLIGHT = 1e-4
+"""Share of the speed that friction may take while it is left out."""
 
 
 def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Array) -> None:
@@ -66,42 +69,62 @@ def dilated_play(w: Array, rate: Array, r: float, beta: float, state: float, out
 def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
     """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
 
-    Steps that are exact for the equation straightened about `e` (exponential Rosenbrock-Euler), kept on their side of
-    the equilibrium.
+    The linear case is exact. Else steps that are exact for the equation straightened about `e` (exponential
+    Rosenbrock-Euler), as long as the curvature allows, that do not pass the equilibrium.
     """
     if exponent == 1.0:
         part = duration / tau
-        decay = math.exp(-part)
-        final = decay * e + (speed * duration * (1.0 - decay) / part if part > 1e-8 else speed * duration)
-        if final >= 0.0:
+        final = math.exp(-part) * e - speed * tau * math.expm1(-part)
+        if part < 1e-8:
+            final = e + (speed - e / tau) * duration
+        if final > 0.0 or (final == 0.0 and speed >= 0.0):
             return final, 0.0
         taken = tau * math.log1p(e / (-speed * tau))
-        return 0.0, max(duration - taken, 0.0)
-    balance = scale * (speed * tau / scale) ** (1.0 / exponent) if speed > 0.0 else 0.0
+        return 0.0, duration - taken if taken < duration else 0.0
     left = duration
-    for piece in range(MOST_PIECES):
-        about = max(e, 0.1 * balance, 1e-12 * scale)
-        slope = exponent / tau * (about / scale) ** (exponent - 1.0)
-        fall = slope / exponent * about if about == e else scale / tau * (e / scale) ** exponent
+    step = left
+    for _ in range(MOST_PIECES):
+        fall = scale / tau * (e / scale) ** exponent
+        if not fall < 1e200:
+            return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
-        bend = abs(exponent - 1.0) * slope / about
-        step = left
-        if piece < MOST_PIECES - 1:
-            wrong = left * left * left * bend * change * change / 12.0
-            if wrong > CLOSE * scale:
-                step = left / min(math.ceil(math.sqrt(wrong / (CLOSE * scale))), MOST_PIECES - piece)
+        balance = -1.0
+        if speed > 0.0 and abs(change) > 0.1 * speed:
+            balance = scale * (speed * tau / scale) ** (1.0 / exponent)
+            little = balance * SLIGHT ** (1.0 / exponent)
+            if e < little:  # nothing but the speed counts
+                taken = (little - e) / speed
+                if taken >= left:
+                    return e + speed * left, 0.0
+                e = little
+                left -= taken
+                continue
+        if not e > 0.0:
+            return 0.0, left if speed < 0.0 else 0.0
+        slope = exponent * fall / e
+        step = min(step, left)
         part = slope * step
         final = e + change * step * (-math.expm1(-part) / part if part > 1e-8 else 1.0)
-        if change > 0.0:
-            final = min(final, balance)
-        elif speed >= 0.0:
-            final = max(final, balance)
+        if speed == 0.0:
+            final = max(final, 0.0)
+        elif balance >= 0.0:
+            final = min(final, balance) if change > 0.0 else max(final, balance)
+        bend = slope / e
+        if abs(final - e) > 0.1 * e:
+            end = max(final, 0.1 * e)
+            bend = max(bend, exponent * scale / tau * (end / scale) ** exponent / end / end)
+        wrong = step * step * step * bend * abs(exponent - 1.0) * change * change / 12.0
+        if wrong > CLOSE * scale and (final > 0.0 or e > CLOSE * scale):
+            step *= max(0.2, 0.9 * (CLOSE * scale / wrong) ** (1.0 / 3.0))
+            continue
         if final < 0.0:
-            return 0.0, max(left - step * e / (e - final), 0.0)
+            taken = -math.log1p(slope * e / change) / slope if part > 1e-8 else -e / change
+            return 0.0, max(left - min(taken, step), 0.0)
         e = final
         left -= step
-        if left <= 1e-12 * duration:
+        if left <= 1e-12 * duration or not e > 0.0:
             break
+        step *= 4.0
     return e, 0.0
 
 

@@ -1,0 +1,747 @@
+"""Every effect against closed forms, ODE solvers, scipy.signal and plain loops that share nothing with it."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy import integrate, interpolate, signal, special
+
+import hystgen
+from hystgen import effects
+from hystgen.effects import About, Chain, Effect, Place, Run
+from hystgen.effects.chain import VISIT, in_order, join
+from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
+from hystgen.problems import EffectsError
+
+Array = NDArray[np.float64]
+
+THRESHOLDS = np.array([0.0, 0.45, 0.9, 1.35])
+WEIGHTS = np.array([0.72, 0.6, 0.48, 0.36])
+CASCADE = Cascade(PI(THRESHOLDS.tolist(), WEIGHTS.tolist()), (), 0.3, (-4.0, 4.0))
+
+
+def make(name: str, **keys: Any) -> Effect:
+    """An effect as a parameter file gives it."""
+    shapes = effects.shapes(name)
+    selector = shapes[0].selector
+    known = {shape.model_fields[selector].annotation.__args__[0]: shape for shape in shapes} if selector in keys else {}  # type: ignore[union-attr]
+    return known.get(keys.get(selector), shapes[0]).model_validate({"name": name, **keys})
+
+
+EVERY = [
+    make("creep", time_constants=(0.02, 0.3), weights=(0.05, 0.1)),
+    make("creep", shape="logarithmic", per_decade=0.03),
+    make("rate_dependence", betas=(0.01, 0.02, 0.03)),
+    make("rate_dependence", shape="relaxation", time_constant=0.01),
+    make("rate_dependence", shape="relaxation", time_constant=0.01, exponent=1.7),
+    make("resonance", frequency=40.0, damping=0.05),
+    make("resonance", frequency=40.0, damping=2.0),
+    make("lag", time_constant=0.01),
+    make("delay", time=0.0137),
+    make("slew_limit", rate=30.0, falling_rate=20.0),
+    make("saturation", level=2.0),
+    make("saturation", shape="hard", level=2.0),
+    make("thermal", gain_per_degree=0.01, offset_per_degree=0.02, reference=21.0),
+    make("thermal", source="self_heating", gain_per_degree=0.01, time_constant=2.0, heating=0.2),
+    make("drift", rate=0.5),
+    make("ageing", loss=0.1, travel=20.0),
+    make("ageing", shape="exponential", loss=0.1, travel=20.0),
+    make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
+    make("noncongruent", coefficients=((0.1,), (0.05, 0.02), (-0.1,))),
+    make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
+]
+
+
+def label(effect: Effect) -> str:
+    return f"{effect.name}-{getattr(effect, effect.selector, '')}"
+
+
+each = pytest.mark.parametrize("effect", EVERY, ids=label)
+
+
+def drive(n: int = 2000, seed: int = 0) -> tuple[Array, Array]:
+    """A smooth random drive on even times over one second."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n) / n
+    parts = [rng.normal() * np.sin(2 * np.pi * (f * t + rng.uniform())) for f in (1, 2.3, 5.1, 11.7)]
+    return t, 1.2 * np.sum(parts, axis=0)
+
+
+def uneven(n: int = 1500, seed: int = 1) -> tuple[Array, Array]:
+    """Random corners of a broken line, at random times over one second."""
+    rng = np.random.default_rng(seed)
+    t = np.concatenate([[0.0], np.sort(rng.uniform(0, 1, n - 1))])
+    return t, np.cumsum(rng.normal(size=n)) * 0.15
+
+
+def record(t: Array, v: Array) -> Run:
+    return Run(t, v, {"temperature": 20.0 + 3.0 * np.sin(t)})
+
+
+def of(effect: Effect, t: Array, v: Array) -> Array:
+    return Chain(CASCADE, [effect]).simulate([record(t, v)])[0]
+
+
+# What every effect has to keep ----------------------------------------------------------------------------
+
+
+def test_the_catalogue_is_complete() -> None:
+    assert {effect.name for effect in EVERY} == set(effects.CATALOGUE)
+    assert {type(effect) for effect in EVERY} == {shape for name in effects.CATALOGUE for shape in effects.shapes(name)}
+    for effect in EVERY:
+        for key, field in type(effect).model_fields.items():
+            assert field.description, (effect.name, key)
+        assert effect.compensation
+        assert (type(effect).__doc__ or "").strip()
+
+
+def test_without_effects_the_chain_is_the_model() -> None:
+    t, v = drive()
+    fronts = (DeadZone([-1, 0, 0.4], [0.3, 1.2, -0.2]), TanhEnvelope((6, 0.4, 0.1, 0.2), (6, 0.4, 0.1, 0.5)))
+    for stages in ((), fronts[:1], fronts[1:], fronts):
+        cascade = Cascade(PI(THRESHOLDS.tolist(), WEIGHTS.tolist(), [0, 0.3, 0.1, 0.4]), stages, 0.3, (-4.0, 4.0))
+        for x in (v, -v, np.array([1.0, 1.0, 1.0, 0.5, 0.5])):
+            (y,) = Chain(cascade, []).simulate([Run(t[: len(x)], x)])
+            assert np.max(np.abs(y - cascade.simulate(x))) < 1e-13
+
+
+NOTHING = [
+    make("creep", time_constants=(0.1,), weights=(0.0,)),
+    make("creep", shape="logarithmic", per_decade=0.0),
+    make("rate_dependence", betas=(0.0, 0.0, 0.0)),
+    make("rate_dependence", shape="relaxation", time_constant=0.0, exponent=2.0),
+    make("lag", time_constant=0.0),
+    make("delay", time=0.0),
+    make("slew_limit", rate=1e30),
+    make("saturation", level=1e30),
+    make("saturation", shape="hard", level=1e30),
+    make("thermal"),
+    make("thermal", source="self_heating", gain_per_degree=0.1, time_constant=1.0, heating=0.0),
+    make("drift", rate=0.0),
+    make("ageing", loss=0.0, travel=1.0),
+    make("ageing", shape="exponential", loss=0.0, travel=1.0),
+    make("sensor_nonlinearity", coefficients=(0.0, 0.0), scale=1.0),
+    make("noncongruent", coefficients=((0.0,), (0.0,), (0.0,))),
+    make("noncongruent", shape="centre", amplitude=0.0, centre=1.0, width=1.0),
+]
+
+
+@pytest.mark.parametrize("effect", NOTHING, ids=label)
+def test_no_strength_changes_nothing(effect: Effect) -> None:
+    for t, v in (drive(), uneven()):
+        assert np.max(np.abs(of(effect, t, v) - CASCADE.simulate(v))) < 1e-13
+
+
+@each
+def test_strength_changes_something(effect: Effect) -> None:
+    t, v = drive()
+    assert np.max(np.abs(of(effect, t, v) - CASCADE.simulate(v))) > 1e-3
+
+
+@each
+def test_a_record_in_pieces_is_the_record(effect: Effect) -> None:
+    for t, v in (drive(), uneven()):
+        chain = Chain(CASCADE, [effect])
+        whole = record(t, v)
+        cuts = (0, 317, 318, 900, len(t))
+        parts = [
+            Run(t[a:b], v[a:b], {"temperature": whole.extra["temperature"][a:b]})
+            for a, b in zip(cuts, cuts[1:], strict=False)
+        ]
+        assert np.array_equal(np.concatenate(chain.simulate(parts)), chain.simulate([whole])[0])
+
+
+@each
+def test_finer_samples_give_the_same(effect: Effect) -> None:
+    """Random time steps against a fine even grid that contains them."""
+    rng = np.random.default_rng(4)
+    fine, dense = drive(120_001)
+    kept = np.unique(np.concatenate([[0, len(fine) - 1], rng.integers(0, len(fine), 30_000)]))
+    here, there = of(effect, fine[kept], dense[kept]), of(effect, fine, dense)[kept]
+    # A rate taken from the sample before, and a limit that ends within a step, are of the first order in the step
+    first_order = isinstance(effect, type(EVERY[2])) or effect.name == "slew_limit"
+    assert np.max(np.abs(here - there)) < (5e-3 if first_order else 3e-4) * np.ptp(there)
+
+
+@pytest.mark.parametrize("effect", [e for e in EVERY if e.name in ("lag", "creep", "resonance")], ids=label)
+def test_filters_are_exact_between_corners(effect: Effect) -> None:
+    """On a broken line samples between its corners change nothing, whatever the steps."""
+    rng = np.random.default_rng(4)
+    t, v = uneven(400)
+    fine = np.sort(np.concatenate([t, rng.uniform(0, t[-1], 5000)]))
+    dense = np.interp(fine, t, v)
+    ask = effect.drive if effect.place is Place.DRIVE else effect.filtered
+    assert np.max(np.abs(ask(v, Run(t, v)) - ask(dense, Run(fine, dense))[np.searchsorted(fine, t)])) < 1e-10
+
+
+@each
+def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
+    if effect.place is not Place.LINEAR:
+        pytest.skip("not a linear filter")
+    t, h = uneven()
+    other = np.sin(7 * t)
+    run = record(t, h)
+    both = effect.filtered(np.stack([h, other, 2.0 * h - 3.0 * other]), run)
+    assert np.allclose(both[2], 2.0 * both[0] - 3.0 * both[1], atol=1e-11)
+    assert np.array_equal(both[0], effect.filtered(h, run))
+    constant = effect.filtered(np.full(50, 2.0), Run(t[:50], t[:50]))
+    assert np.allclose(constant, constant[0], rtol=1e-13), "at rest at the first sample"
+
+
+@each
+def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
+    t, v = drive(400)
+    speed, travel = np.max(np.abs(np.diff(v) / np.diff(t))), np.sum(np.abs(np.diff(v)))
+    about = About((-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), frozenset({"temperature"}))
+    rng = np.random.default_rng(5)
+    found = type(effect).candidates(about)
+    assert found
+    for candidate in found:
+        n = len(candidate.low)
+        assert candidate.low.shape == candidate.high.shape == candidate.start.shape == (n,)
+        assert np.all(candidate.low < candidate.high)
+        assert np.all((candidate.low <= candidate.start) & (candidate.start <= candidate.high))
+        tried = [candidate.low, candidate.high, candidate.start]
+        tried += [candidate.low + (candidate.high - candidate.low) * rng.uniform(size=n) for _ in range(8)]
+        for x in tried:
+            built = candidate.build(x)
+            assert isinstance(built, type(effect))
+            type(built).model_validate(built.model_dump())
+            y = of(built, t, v)
+            assert np.all(np.isfinite(y))
+            near = of(candidate.build(x + 1e-9 * (candidate.high - x)), t, v)
+            assert np.max(np.abs(near - y)) < 1e-4 * (1.0 + np.max(np.abs(y))), "continuous"
+        if candidate.none is not None:
+            nothing = of(candidate.build(candidate.none), t, v)
+            tolerance = 2e-6 if effect.name == "saturation" else 1e-12
+            assert np.max(np.abs(nothing - CASCADE.simulate(v))) < tolerance
+
+
+def test_candidates_without_plays_or_temperature_are_left_out() -> None:
+    about = About((0.0, 1.0), 1.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,))
+    for name in ("rate_dependence", "noncongruent"):
+        assert not any(shape.candidates(about) for shape in effects.shapes(name))
+    assert not effects.shapes("thermal")[0].candidates(about)
+
+
+positive = st.floats(0, 1e30, exclude_min=True)
+times = st.floats(0, 1e30)
+share = st.floats(-1e30, 1e30)
+VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
+    "creep": st.one_of(
+        st.builds(lambda a, b: {"time_constants": (a,), "weights": (b,)}, positive, times),
+        st.builds(
+            lambda g, t0, a, b: {"shape": "logarithmic", "per_decade": g, "t0": t0, "t_min": a, "t_max": a * b},
+            times, positive, st.floats(1e-15, 1e15), st.floats(1.001, 1e12),
+        ),
+    ),
+    "rate_dependence": st.one_of(
+        st.builds(lambda b: {"betas": (b, 0.0, b)}, times),
+        st.builds(
+            lambda tau, m: {"shape": "relaxation", "time_constant": tau, "exponent": m}, times, st.floats(0.1, 10.0)
+        ),
+    ),
+    "resonance": st.builds(lambda f, z: {"frequency": f, "damping": z}, positive, st.floats(0, 10, exclude_min=True)),
+    "lag": st.builds(lambda tau: {"time_constant": tau}, times),
+    "delay": st.builds(lambda time: {"time": time}, times),
+    "slew_limit": st.builds(lambda a, b: {"rate": a, "falling_rate": b}, positive, positive),
+    "saturation": st.builds(lambda s, x: {"shape": s, "level": x}, st.sampled_from(["tanh", "hard"]), positive),
+    "thermal": st.one_of(
+        st.builds(lambda a, b, c: {"gain_per_degree": a, "offset_per_degree": b, "reference": c}, share, share, share),
+        st.builds(
+            lambda a, b, c: {"source": "self_heating", "gain_per_degree": a, "time_constant": b, "heating": c},
+            share, positive, times,
+        ),
+    ),
+    "drift": st.builds(lambda rate: {"rate": rate}, share),
+    "ageing": st.builds(
+        lambda s, a, b: {"shape": s, "loss": a, "travel": b},
+        st.sampled_from(["logarithmic", "exponential"]), share, positive,
+    ),
+    "sensor_nonlinearity": st.builds(
+        lambda a, b, s: {"coefficients": (a, b), "scale": s}, share, share, st.floats(1e-30, 1e30)
+    ),
+    "noncongruent": st.one_of(
+        st.builds(lambda a, b: {"coefficients": ((a,), (a, b), (b,))}, share, share),
+        st.builds(
+            lambda a, c, w: {"shape": "centre", "amplitude": a, "centre": c, "width": w},
+            st.floats(-1, 1e30, exclude_min=True), share, positive,
+        ),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", effects.CATALOGUE)
+@settings(max_examples=60)
+@given(st.data())
+def test_no_valid_parameters_make_nan(name: str, data: st.DataObject) -> None:
+    effect = make(name, **data.draw(VALID[name]))
+    steps = data.draw(st.lists(st.sampled_from([1e-9, 1e-4, 0.5, 1e6]), min_size=1, max_size=12))
+    v = np.array(data.draw(st.lists(st.floats(-1e3, 1e3), min_size=len(steps) + 1, max_size=len(steps) + 1)))
+    with np.errstate(all="ignore"):
+        y = of(effect, np.concatenate([[0.0], np.cumsum(steps)]), v)
+    assert not np.any(np.isnan(y))
+
+
+# Lag, delay, slew limit -----------------------------------------------------------------------------------
+
+
+def test_lag_step_and_ramp() -> None:
+    tau = 0.05
+    lag = make("lag", time_constant=tau)
+    t = np.array([0.0, 1e-9, 0.01, 0.013, 0.05, 0.4, 3.0])
+    step = lag.drive(np.where(t > 0, 1.0, 0.0), Run(t, t))
+    assert np.allclose(step[1:], 1.0 - np.exp(-t[1:] / tau), atol=2e-8)
+    ramp = lag.drive(3.0 * t, Run(t, t))
+    assert np.allclose(ramp, 3.0 * (t - tau * (1.0 - np.exp(-t / tau))), rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("tau", [1e-5, 1e-3, 0.2, 50.0])
+def test_lag_against_scipy(tau: float) -> None:
+    t, v = drive()
+    expected = v[0] + signal.lsim(([1.0], [tau, 1.0]), v - v[0], t)[1]
+    assert np.max(np.abs(make("lag", time_constant=tau).drive(v, Run(t, v)) - expected)) < 1e-10
+
+
+def test_delay_shifts_a_band_limited_signal() -> None:
+    t = np.arange(4000) * 1e-3
+    run = Run(t, t)
+    for time in (0.0, 1e-3, 0.0125, 0.01234):
+        found = make("delay", time=time).drive(np.sin(2 * np.pi * 5 * t), run)
+        late = t > time + 1e-9
+        assert np.max(np.abs(found[late] - np.sin(2 * np.pi * 5 * (t[late] - time)))) < (2 * np.pi * 5e-3) ** 2 / 8
+    step = make("delay", time=0.0105).drive((t >= 1.0).astype(float), run)
+    assert np.array_equal(step[np.abs(t - 1.0105) > 1.1e-3], (t >= 1.0105).astype(float)[np.abs(t - 1.0105) > 1.1e-3])
+
+
+def test_slew_limit_against_a_loop() -> None:
+    t, v = uneven()
+    up, down = 12.0, 7.0
+    a, expected = v[0], []
+    for k in range(len(v)):
+        if k:
+            dt = t[k] - t[k - 1]
+            a = a + min(up * dt, v[k] - a) if v[k] > a else a - min(down * dt, a - v[k])
+        expected.append(a)
+    found = make("slew_limit", rate=up, falling_rate=down).drive(v, Run(t, v))
+    assert np.max(np.abs(found - expected)) < 1e-12
+    slopes = np.diff(found) / np.diff(t)
+    assert slopes.max() <= up * (1 + 1e-6)
+    assert slopes.min() >= -down * (1 + 1e-6)
+    assert make("slew_limit", rate=up) == make("slew_limit", rate=up, falling_rate=up)
+
+
+# Creep ----------------------------------------------------------------------------------------------------
+
+
+def test_creep_states_against_an_ode_solver() -> None:
+    tau, weights = (0.01, 0.2), (0.3, 0.5)
+    t, h = uneven(300)
+    states = [np.full(2, h[0])]
+    for k in range(len(t) - 1):
+        slope = (h[k + 1] - h[k]) / (t[k + 1] - t[k])
+
+        def rate(s: float, x: Array, k: int = k, slope: float = slope) -> Array:
+            return np.asarray((h[k] + slope * (s - t[k]) - x) / np.array(tau))
+
+        states.append(integrate.solve_ivp(rate, t[k : k + 2], states[-1], rtol=1e-11, atol=1e-12).y[:, -1])
+    expected = h + np.array(weights) @ np.array(states).T
+    assert np.max(np.abs(make("creep", time_constants=tau, weights=weights).filtered(h, Run(t, h)) - expected)) < 1e-8
+
+
+def test_logarithmic_creep_is_straight_over_log_t() -> None:
+    g, t0 = 0.02, 0.1
+    effect = make("creep", shape="logarithmic", per_decade=g, t0=t0, t_min=1e-3, t_max=1e5)
+    since = np.logspace(-2, 3, 200)
+    t = np.concatenate([[-1e-9, 0.0], since])
+    h = np.concatenate([[0.0], np.ones(len(t) - 1)])
+    y = effect.filtered(h, Run(t, h))[2:]
+    middle = (since > 0.1) & (since < 101)
+    slopes = np.diff(y[middle]) / np.diff(np.log10(since[middle]))
+    assert np.all(np.abs(slopes / g - 1.0) < 0.015)
+    assert np.max(np.abs(y[middle] - (1.0 + g * np.log10(since[middle] / t0)))) < 0.01 * g
+    # The continuous spectrum has the closed form of an exponential integral
+    inside = special.exp1(since / 1e5) - special.exp1(since / 1e-3) + math.log(1e8)
+    at_t0 = special.exp1(t0 / 1e5) - special.exp1(t0 / 1e-3) + math.log(1e8)
+    reference = 1.0 - g / math.log(10) * ((math.log(1e8) - inside) - (math.log(1e8) - at_t0)) * -1.0
+    assert np.max(np.abs(y - reference)) < 0.05 * g
+
+
+def test_creep_forgets_its_start_as_its_transients_do() -> None:
+    effect = make("creep", time_constants=(0.05, 0.4), weights=(0.3, 0.2))
+    t, h = drive()
+    longer = np.concatenate([[5.0 - h[0]], h])  # one earlier sample, another start
+    before = np.concatenate([[-0.3], t])
+    difference = effect.filtered(longer, Run(before, longer))[1:] - effect.filtered(h, Run(t, h))
+    rows = effect.transients(Run(t, h))
+    share, *_ = np.linalg.lstsq(rows.T, difference, rcond=None)
+    assert np.max(np.abs(difference - share @ rows)) < 1e-10
+    assert np.max(np.abs(difference)) > 0.1
+
+
+# Resonance ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.3, 1.0, 1.0 + 1e-9, 4.0])
+@pytest.mark.parametrize("frequency", [0.05, 3.0, 80.0, 4000.0])
+def test_resonance_against_scipy(frequency: float, damping: float) -> None:
+    t, h = drive()
+    w = 2 * np.pi * frequency
+    system = ([0.0, 0.0, w * w], [1.0, 2 * damping * w, w * w])
+    expected = h[0] + signal.lsim(system, h - h[0], t)[1]
+    found = make("resonance", frequency=frequency, damping=damping).filtered(h, Run(t, h))
+    assert np.max(np.abs(found - expected)) < 1e-8
+
+
+@pytest.mark.parametrize("ratio", [0.2, 1.0, 1.7])
+def test_resonance_gain_and_phase(ratio: float) -> None:
+    f0, zeta = 50.0, 0.05
+    t = np.arange(40_000) * 5e-5
+    phase = 2 * np.pi * f0 * ratio * t
+    y = make("resonance", frequency=f0, damping=zeta).filtered(np.sin(phase), Run(t, t))[20_000:]
+    basis = np.stack([np.sin(phase), np.cos(phase)])[:, 20_000:]
+    a, b = np.linalg.lstsq(basis.T, y, rcond=None)[0]
+    response = 1.0 / (1.0 - ratio**2 + 2j * zeta * ratio)
+    assert abs(complex(a, b) - response) < 2e-3 * abs(response)
+
+
+def test_resonance_rings_at_its_damped_frequency() -> None:
+    f0, zeta = 30.0, 0.02
+    t = np.arange(20_000) * 5e-5
+    h = np.where(t > 0, 1.0, 0.0)
+    y = make("resonance", frequency=f0, damping=zeta).filtered(h, Run(t, h))
+    peak = np.argmax(y)
+    root = math.sqrt(1 - zeta**2)
+    assert y[peak] == pytest.approx(1 + math.exp(-math.pi * zeta / root), abs=1e-4)
+    assert t[peak] == pytest.approx(0.5 / (f0 * root), rel=5e-3)
+    rows = make("resonance", frequency=f0, damping=zeta).transients(Run(t, h))
+    share, *_ = np.linalg.lstsq(rows[:, 1:].T, (y - h)[1:], rcond=None)
+    assert np.max(np.abs(y - h - share @ rows)[1:]) < 1e-9
+
+
+# Plays ----------------------------------------------------------------------------------------------------
+
+
+def test_threshold_rate_against_a_loop() -> None:
+    betas = (0.01, 0.0, 0.05)
+    t, w = uneven()
+    start = np.array([0.0, 0.2, -0.3, 0.1])
+    found = make("rate_dependence", betas=betas).plays(w, Run(t, w), THRESHOLDS, start)
+    state, expected = list(start), []
+    for k in range(len(w)):
+        rate = abs((w[k] - w[k - 1]) / (t[k] - t[k - 1])) if k else 0.0
+        row = [w[k]]
+        for i in range(1, 4):
+            r = THRESHOLDS[i] + betas[i - 1] * rate
+            state[i] = max(w[k] - r, min(w[k] + r, state[i]))
+            row.append(state[i])
+        expected.append(row)
+    assert np.max(np.abs(found - np.array(expected).T)) < 1e-12
+
+
+@pytest.mark.parametrize(("exponent", "tolerance"), [(1.0, 1e-7), (0.4, 2e-5), (2.0, 2e-5), (3.0, 2e-5)])
+@pytest.mark.parametrize("tau", [5e-3, 0.03, 1.0])
+def test_relaxing_plays_against_the_ode(tau: float, exponent: float, tolerance: float) -> None:
+    rng = np.random.default_rng(3)
+    t = np.concatenate([[0.0], np.sort(rng.uniform(0, 1, 25))])
+    w = rng.normal(size=26) * 2.0
+    z = np.clip(np.zeros(4), w[0] - THRESHOLDS, w[0] + THRESHOLDS)
+    scale, pieces = THRESHOLDS[-1], 3000
+
+    def rate(x: float, z: Array) -> Array:
+        gap = x - z
+        beyond = np.maximum(np.abs(gap) - THRESHOLDS, 0.0)
+        return np.asarray(np.sign(gap) * scale / tau * (beyond / scale) ** exponent)
+
+    expected = [z]
+    for k in range(25):  # Runge-Kutta of order 4, contacts are not located but steps are short
+        h = (t[k + 1] - t[k]) / pieces
+        for part in range(pieces):
+            x, y = (w[k] + (w[k + 1] - w[k]) * (part + shift) / pieces for shift in (0.0, 1.0))
+            a = rate(x, z)
+            b = rate((x + y) / 2, z + h / 2 * a)
+            c = rate((x + y) / 2, z + h / 2 * b)
+            z = z + h / 6 * (a + 2 * b + 2 * c + rate(y, z + h * c))
+        expected.append(z)
+    effect = make("rate_dependence", shape="relaxation", time_constant=tau, exponent=exponent)
+    found = effect.plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    assert np.array_equal(found[0], w)
+    assert np.max(np.abs(found - np.array(expected).T)[1:]) < tolerance * np.max(np.abs(w))
+
+
+def test_fast_relaxation_is_the_play() -> None:
+    t, w = drive()
+    effect = make("rate_dependence", shape="relaxation", time_constant=1e-9)
+    expected = make("rate_dependence", betas=(0.0,) * 3).plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    assert np.max(np.abs(effect.plays(w, Run(t, w), THRESHOLDS, np.zeros(4)) - expected)) < 1e-6
+
+
+def brute_plays(w: Array) -> Array:
+    state, rows = np.zeros(4), []
+    for x in w:
+        state = np.maximum(x - THRESHOLDS, np.minimum(x + THRESHOLDS, state))
+        rows.append(state)
+    return np.array(rows).T
+
+
+def test_play_functions_against_sums() -> None:
+    t, w = drive()
+    terms = ((0.1,), (0.05, 0.02), (-0.1, 0.0, 0.03))
+    found = make("noncongruent", coefficients=terms).plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    plain, scale = brute_plays(w), THRESHOLDS[-1]
+    expected = plain.copy()
+    for i, coefficients in enumerate(terms, 1):
+        for power, c in enumerate(coefficients, 2):
+            expected[i] = expected[i] + scale * c * (plain[i] / scale) ** power
+    assert np.max(np.abs(found - expected)) < 1e-12
+
+
+def test_loop_centre_against_a_sum_of_relays() -> None:
+    """A play is half the sum of relays over all centres; their density is what the parameters say."""
+    amplitude, centre, width = 0.6, 0.4, 0.7
+    t, w = drive(600)
+    found = make("noncongruent", shape="centre", amplitude=amplitude, centre=centre, width=width)
+    rows = found.plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    spacing = 1e-3
+    centres = np.arange(-8, 8, spacing) + spacing / 2
+    density = 1.0 + amplitude / np.cosh((centres - centre) / width) ** 2
+    for i in (1, 2, 3):
+        relay = np.where(centres < 0.0, 1.0, -1.0)  # the virgin state
+        expected = []
+        for x in w:
+            relay = np.where(x >= centres + THRESHOLDS[i], 1.0, np.where(x <= centres - THRESHOLDS[i], -1.0, relay))
+            expected.append(0.5 * spacing * np.sum(density * (relay - np.where(centres < 0.0, 1.0, -1.0))))
+        assert np.max(np.abs(rows[i] - expected)) < 3e-3
+
+
+@pytest.mark.parametrize("effect", [e for e in EVERY if e.name == "noncongruent"], ids=label)
+def test_congruency_fails_while_rate_independence_holds(effect: Effect) -> None:
+    def loop(centre: float, with_effect: bool) -> Array:
+        """A minor loop about `centre`, from where it starts."""
+        minor = centre + np.concatenate([np.linspace(-1, 1, 200), np.linspace(1, -1, 200)[1:]])
+        v = np.concatenate([[0.0, -4.0], minor, minor])
+        y = Chain(CASCADE, [effect] if with_effect else []).simulate([Run(np.arange(len(v)) * 1.0, v)])[0][-399:]
+        return y - y[0]
+
+    assert np.max(np.abs(loop(0.0, False) - loop(1.0, False))) < 1e-12
+    assert np.max(np.abs(loop(0.0, True) - loop(1.0, True))) > 1e-2
+    t, v = drive()
+    assert np.array_equal(of(effect, t, v), of(effect, t**3 + 5 * t, v))
+    repeated = np.repeat(v, 3)
+    assert np.array_equal(of(effect, np.arange(len(repeated)) * 1.0, repeated)[::3], of(effect, t, v))
+
+
+def test_rate_dependence_and_noncongruency_act_together() -> None:
+    t, w = drive()
+    rate = make("rate_dependence", betas=(0.01, 0.02, 0.03))
+    bent = make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2)
+    rows = Chain(CASCADE, [bent, rate]).plays(w, Run(t, w))
+    dilated = rate.plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    lift = 0.4 * 1.2 * (np.tanh((dilated - 0.5) / 1.2) + np.tanh(0.5 / 1.2))
+    lift[0] = 0.0
+    assert np.max(np.abs(rows - dilated - lift)) < 1e-12
+
+
+# Gain, output, drift --------------------------------------------------------------------------------------
+
+
+def test_ageing_against_the_distance_travelled() -> None:
+    t, v = uneven()
+    distance = np.array([sum(abs(b - a) for a, b in zip(v[:k], v[1 : k + 1], strict=True)) for k in range(len(v))])
+    logarithmic = make("ageing", loss=0.05, travel=3.0).gain(Run(t, v))
+    assert np.allclose(logarithmic, 1 - 0.05 * np.log10(1 + distance / 3.0), rtol=1e-12)
+    exponential = make("ageing", shape="exponential", loss=0.05, travel=3.0).gain(Run(t, v))
+    assert np.allclose(exponential, 1 - 0.05 * (1 - np.exp(-distance / 3.0)), rtol=1e-12)
+    still = make("ageing", loss=0.05, travel=3.0).gain(Run(t, np.ones(len(t))))
+    assert np.array_equal(still, np.ones(len(t)))
+
+
+def test_logged_temperature() -> None:
+    t, v = drive()
+    temperature = 20 + 5 * np.sin(3 * t)
+    effect = make("thermal", gain_per_degree=-0.01, offset_per_degree=0.2, reference=22.0)
+    (y,) = Chain(CASCADE, [effect]).simulate([Run(t, v, {"temperature": temperature})])
+    h = CASCADE.simulate(v) - 0.3
+    assert np.allclose(y, (1 - 0.01 * (temperature - 22)) * h + 0.2 * (temperature - 22) + 0.3, atol=1e-12)
+    with pytest.raises(EffectsError, match="the effect thermal needs the column temperature"):
+        Chain(CASCADE, [effect]).simulate([Run(t, v)])
+
+
+def test_self_heating_against_an_ode_solver() -> None:
+    tau, heating = 0.3, 0.7
+    t, v = drive(1500)
+    line = interpolate.interp1d(t, v)
+    slopes = np.diff(v) / np.diff(t)
+
+    def rate(s: float, rise: Array) -> Array:
+        slope = slopes[min(np.searchsorted(t, s, side="right") - 1, len(slopes) - 1)]
+        return np.asarray((heating * abs(float(line(min(s, t[-1]))) * slope) / 2 - rise) / tau)
+
+    solved = integrate.solve_ivp(rate, (0, t[-1]), [0.0], t_eval=t, rtol=1e-8, atol=1e-10, max_step=t[1])
+    effect = make("thermal", source="self_heating", gain_per_degree=1.0, time_constant=tau, heating=heating)
+    rise = effect.gain(Run(t, v)) - 1.0
+    # Heat is spread over each step: the difference is of the second order in the step
+    assert np.max(np.abs(rise - solved.y[0])) < 2e-3 * np.max(rise)
+
+
+@pytest.mark.parametrize("shape", [np.sin, lambda x: signal.sawtooth(x + np.pi / 2, 0.5)])
+def test_self_heating_is_frequency_times_amplitude_squared(shape: Callable[[Array], Array]) -> None:
+    amplitude, frequency, heating = 3.0, 50.0, 0.2
+    t = np.arange(200_000) * 1e-4
+    effect = make("thermal", source="self_heating", gain_per_degree=1.0, time_constant=1.0, heating=heating)
+    rise = effect.gain(Run(t, amplitude * shape(2 * np.pi * frequency * t))) - 1.0
+    assert np.mean(rise[-2000:]) == pytest.approx(heating * frequency * amplitude**2, rel=2e-3)
+
+
+def test_sensor_polynomial_and_saturation_and_their_order() -> None:
+    t, v = drive()
+    h = WEIGHTS @ brute_plays(v)
+    parts = [
+        make("drift", rate=0.5),
+        make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
+        make("saturation", level=2.0),
+    ]
+    limited = 2.0 * np.tanh(h / 2.0) + 0.3
+    expected = limited + 3.0 * (0.05 * (limited / 3) ** 2 - 0.02 * (limited / 3) ** 3) + 0.5 * t
+    assert np.max(np.abs(Chain(CASCADE, parts).simulate([Run(t, v)])[0] - expected)) < 1e-12
+    hard = make("saturation", shape="hard", level=1.0)
+    assert np.max(np.abs(of(hard, t, v) - (np.minimum(np.maximum(h, -1), 1) + 0.3))) < 1e-12
+
+
+def test_order_of_the_chain_is_not_that_of_the_file() -> None:
+    rng = np.random.default_rng(0)
+    names = [
+        "delay", "slew_limit", "lag", "rate_dependence", "noncongruent", "creep", "ageing", "thermal", "resonance",
+        "saturation", "sensor_nonlinearity", "drift",
+    ]  # fmt: skip
+    first = {effect.name: effect for effect in reversed(EVERY)}
+    listed = list(first.values())
+    for _ in range(20):
+        rng.shuffle(listed)  # type: ignore[arg-type]
+        found = [effect.name for effect in in_order(listed)]
+        assert [name for name in found if name != "ageing"] == [name for name in names if name != "ageing"]
+    t, v = drive()
+    several = Chain(CASCADE, listed).simulate([record(t, v)])[0]
+    assert np.array_equal(several, Chain(CASCADE, listed[::-1]).simulate([record(t, v)])[0])
+
+
+def test_creep_comes_before_gains_and_resonances_after() -> None:
+    t, v = drive()
+    run = record(t, v)
+    parts = [EVERY[5], EVERY[12], EVERY[0]]
+    creep, mode, thermal = EVERY[0], EVERY[5], EVERY[12]
+    h = creep.filtered(WEIGHTS @ brute_plays(v), run)
+    y = mode.filtered(thermal.gain(run) * h + thermal.offset(run), run) + 0.3
+    assert np.max(np.abs(Chain(CASCADE, parts).simulate([run])[0] - y)) < 1e-12
+
+
+# Sessions -------------------------------------------------------------------------------------------------
+
+
+def test_records_keep_session_time_and_others_follow_their_rest() -> None:
+    t = np.arange(5) * 0.1
+    own = join([Run(t, t), Run(t + 7.0, t)])
+    assert np.allclose(own.run.t, [*t, 6.9, *(t + 7.0)])
+    assert np.allclose(own.run.v, [*t, t[-1], *t])
+    assert own.parts == (slice(0, 5), slice(6, 11))
+    follow = join([Run(t, t), Run(t, -t, rest=2.0)])
+    assert np.allclose(follow.run.t, [*t, 2.4, *(2.5 + t)])
+    assert np.allclose(follow.run.v, [*t, 0.4, *-t])
+    after = join([Run(t, t, rest=3.0)], [2.0, -1.0])
+    assert after.run.t[after.parts[0]][0] == 0.0
+    assert after.run.v[0] == 2.0
+    assert after.run.t[0] == pytest.approx(-0.1 - 3.0 - VISIT)
+    before = after.run.t < -0.05
+    assert np.all(after.run.v[(after.run.t > -3.1) & before] == -1.0)
+    for nothing in ([], [Run(t[:0], t[:0])]):
+        with pytest.raises(ValueError, match="samples"):
+            join(nothing)
+
+
+def test_history_sets_the_memory_and_a_rest_lets_creep_fade() -> None:
+    t, v = np.arange(100) * 0.01, np.zeros(100)
+    effect = make("creep", time_constants=(2.0,), weights=(0.5,))
+    plays = np.clip(0.0, *(np.array([4.0]) + s * THRESHOLDS[:, None] for s in (-1, 1)))[:, 0]
+    for x in (-4.0, 0.0):
+        plays = np.clip(plays, x - THRESHOLDS, x + THRESHOLDS)
+    settled = 1.5 * float(WEIGHTS @ plays) + 0.3
+    errors = []
+    for rest in (0.0, 5.0, 50.0):
+        (y,) = Chain(CASCADE, [effect]).simulate([Run(t, v, rest=rest)], [4.0, -4.0, 0.0])
+        errors.append(abs(y[0] - settled))
+    assert errors[0] > 0.1
+    assert errors[1] == pytest.approx(errors[0] * math.exp(-2.5), rel=1e-2)
+    assert errors[2] < 1e-9
+    (static,) = Chain(CASCADE, []).simulate([Run(t, v, rest=7.0)], [4.0, -4.0, 0.0])
+    assert static[0] == pytest.approx(float(WEIGHTS @ plays) + 0.3, abs=1e-12)
+
+
+# The model ------------------------------------------------------------------------------------------------
+
+FILE = """hystgen: 1
+name: stage
+input_range: [-4, 4]
+model:
+  pi: {thresholds: [0, 0.45, 0.9, 1.35], weights: [0.72, 0.6, 0.48, 0.36]}
+  output_offset: 0.3
+  effects:
+"""
+
+
+def model_of(text: str, head: str = FILE) -> hystgen.Model:
+    from hystgen.params import parse_parameters
+
+    return hystgen.Model(parse_parameters(head + text))
+
+
+def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
+    t, v = drive()
+    lag = "    - {name: lag, time_constant: 0.02}\n"
+    model = model_of(lag)
+    y = model.simulate(v, t=t)
+    assert np.array_equal(y, of(make("lag", time_constant=0.02), t, v))
+    period = model_of(lag, FILE.replace("input_range", f"sample_time: {t[1]}\ninput_range"))
+    assert np.max(np.abs(period.simulate(v) - y)) < 1e-12
+    with pytest.raises(EffectsError, match=r"the effects \(lag\) need time; give t, or sample_time"):
+        model.simulate(v)
+    assert np.array_equal(model.simulate(v, t=t, clamp=True), model.simulate(np.clip(v, -4, 4), t=t))
+    warm = model_of("    - {name: thermal, gain_per_degree: 0.01}\n")
+    cold = warm.simulate(v, extra={"temperature": np.full(len(v), 20.0)})
+    assert np.allclose(cold, CASCADE.simulate(v), atol=1e-12)
+    for wrong, said in (
+        ({"t": t[::-1]}, "t has to rise"), ({"t": t[1:]}, "t has to be 2000 finite"),
+        ({"t": t, "extra": {"temperature": [1.0]}}, "temperature has to be 2000"),
+    ):  # fmt: skip
+        with pytest.raises(EffectsError, match=said):
+            warm.simulate(v, **wrong)
+    static = hystgen.Model(model_of("").parameters) if False else model_of("    []\n", FILE.replace("effects:\n", "effects:"))
+    assert np.array_equal(static.simulate(v, t=t), static.simulate(v))
+
+
+@pytest.mark.parametrize("ask", [
+    lambda m: m.inverse(), lambda m: hystgen.emit(m, "nowhere"), lambda m: hystgen.verify(m),
+    lambda m: m.simulate([0.0], "float32"), lambda m: m.session(),
+])  # fmt: skip
+def test_what_effects_do_not_have_yet_is_refused_by_name(ask: Callable[[hystgen.Model], Any]) -> None:
+    model = model_of("    - {name: lag, time_constant: 1}\n    - {name: drift, rate: 1}\n")
+    with pytest.raises(EffectsError, match=r"of a model with effects \(lag, drift\) is not supported yet"):
+        ask(model)
+
+
+def test_loading_a_plain_model_imports_no_effect() -> None:
+    code = (
+        "import sys, hystgen.params as p; p.parse_parameters('hystgen: 1\\nname: a\\ninput_range: [0, 1]\\n"
+        "model: {pi: {thresholds: [0], weights: [1]}}'); print(*sys.modules)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert "hystgen.effects" in loaded
+    assert not {"hystgen.effects.base", "hystgen.effects.lag", "numpy", "numba", "scipy"} & set(loaded)
