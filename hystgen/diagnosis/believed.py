@@ -97,7 +97,11 @@ def prepare(
         records = [record for k, record in enumerate(records) if k % 3 != 2]
         notes.append("no record was given as held out: " + ", ".join(record.name for record in holdout) + " set aside")
     fit_courses, held_courses = ([_course(record, history, notes) for record in group] for group in (records, holdout))
-    notes += prepared.mask_outliers(fit_courses, held_courses, None, 0.0, 0)
+    prepared.mask_outliers(fit_courses, held_courses, None, 0.0, 0)
+    for course in (*fit_courses, *held_courses):
+        wrong = course.first + np.flatnonzero(np.isnan(course.y[course.first :]))
+        if len(wrong):
+            notes.append(faults.told(course.name, wrong, faults.NOT_COMPARED))
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     if not held:
@@ -111,11 +115,10 @@ def prepare(
 
 
 def _course(record: Record, history: tuple[float, ...] | None, notes: list[str]) -> Course:
-    course = pi.course(record, history, 0)
-    spikes = faults.drive_spikes(course.v, course.y)
-    if spikes.any():
-        notes.append(faults.told(course.name, spikes, "v jump away and back unseen by y, bridged"))
-        course = replace(course, v=faults.bridged(course.v, spikes))
+    course = prepared.bridged(pi.course(record, history, 0), 0)
+    spikes = np.flatnonzero(course.v != record.v)
+    if len(spikes):
+        notes.append(faults.told(course.name, spikes, faults.BRIDGED))
     return course
 
 

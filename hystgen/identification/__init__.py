@@ -19,13 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import memory
-from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads, uncertainty
+from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads, uncertainty, used
 from hystgen.identification.fit import HELD_OUT, Fit, Source, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
 from hystgen.identification.thresholds import rounded
+from hystgen.identification.used import Used
 from hystgen.models import DeadZone, Stage, TanhEnvelope
 from hystgen.progress import Progress
 from hystgen.records import SHORTEST, Record, agreed_units, read_records
@@ -93,7 +94,7 @@ def identify(
     IdentificationError for records that nothing can be fitted to, ValueError for wrong arguments.
     """
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve)
-    to_fit, to_hold = _several(records), _several(holdout)
+    to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
@@ -110,7 +111,7 @@ def identify(
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
     with threads.alone(), Progress(passes * samples, progress, "fitting") as bar:
-        told += prepared.mask_outliers(courses, held, how.wanted, p0_floor, skip)
+        prepared.mask_outliers(courses, held, how.wanted, p0_floor, skip)
         if held:
             tried = [_try(courses, held, kind, how, bar) for kind in kinds]
             chosen = _choose(tried)
@@ -122,6 +123,10 @@ def identify(
             if reason:
                 told.append(reason)
             fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, skip, bar.tick)
+    masks = used.of_records(fit_records, compared, False, skip)
+    if held:
+        masks += used.of_records(held_records, done.held, True, skip)
+    told += [text for each in masks for text in each.told()]
     errors = [_compare(item, fitted) for item in compared]
     own = pi.row("fit" if held or not rows else "all", "written", errors, [skip] * len(compared))
     rows.append(own)
@@ -139,7 +144,9 @@ def identify(
     with threads.alone():
         sure = uncertainty.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
-    return Fit(_parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), sure, before)
+    return Fit(
+        _parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), sure, masks, before
+    )
 
 
 def check_options(
@@ -183,10 +190,11 @@ class _How:
 
 @dataclass(frozen=True)
 class _Tried:
-    """A model of one kind, the courses it was fitted to, and how it does on what it has not seen."""
+    """A model of one kind, the courses it was fitted to, those it has not seen, and how it does on them."""
 
     fitted: Fitted
     compared: list[Course]
+    held: list[Course]
     errors: list[pi.Errors]
     held_out: Row
 
@@ -213,7 +221,7 @@ def _try(
                 f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
             )
     errors = [_compare(item, fitted) for item in settled]
-    return _Tried(fitted, compared, errors, pi.row("held out", "written", errors, starts))
+    return _Tried(fitted, compared, settled, errors, pi.row("held out", "written", errors, starts))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
@@ -237,7 +245,8 @@ def _check_loading_curve(record: Record) -> None:
         )
 
 
-def _several(sources: Source | Iterable[Source]) -> list[Source]:
+def several(sources: Source | Iterable[Source]) -> list[Source]:
+    """One record or path, or several, as a list."""
     return [sources] if isinstance(sources, Record | str | os.PathLike) else list(sources)
 
 
@@ -356,11 +365,14 @@ def identifier_from(text: str) -> str:
 
 __all__ = [
     "MODELS",
+    "PARSIMONY",
     "Fit",
     "IdentificationError",
     "Row",
+    "Used",
     "check_options",
     "identifier_from",
     "identify",
+    "several",
     "stage_content",
 ]

@@ -132,11 +132,14 @@ def between_gaps(record: Record) -> list[Piece]:
     ]
 
 
-def told(name: str, wrong: NDArray[np.bool_], what: str) -> str:
-    """The sentence that counts them."""
-    number = int(np.count_nonzero(wrong))
-    first = int(np.argmax(wrong))
-    return f"{name}: {number} isolated sample{'' if number == 1 else 's'} of {what}; the first is sample {first}"
+BRIDGED, NOT_COMPARED = "v jump away and back unseen by y, bridged", "y far from their neighbours, not compared"
+"""What is done about isolated wrong samples."""
+
+
+def told(name: str, found: NDArray[np.intp], what: str) -> str:
+    """The sentence that counts isolated wrong samples, given where they are."""
+    plural = "" if len(found) == 1 else "s"
+    return f"{name}: {len(found)} isolated sample{plural} of {what}; the first is sample {found[0]}"
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -7,16 +7,17 @@ import os
 import textwrap
 import warnings as python_warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.identification import joint, reduction, remarks
+from hystgen.identification import faults, joint, reduction, remarks
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
 from hystgen.identification.uncertainty import Intervals
+from hystgen.identification.used import Used
 from hystgen.records import Record, read_record, write_atomically
 
 if TYPE_CHECKING:
@@ -33,19 +34,20 @@ class Fit:
     """A fitted model and how good it is.
 
     `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
-    sentence each; `intervals`: 95 % confidence intervals; `history`: drive values visited before each record, None
-    when unknown.
+    sentence each; `intervals`: 95 % confidence intervals; `used`: what was compared of each record, those held out
+    last; `history`: drive values visited before each record, None when unknown.
     """
 
     parameters: Parameters
     rows: tuple[Row, ...]
     warnings: tuple[str, ...]
     intervals: Intervals
+    used: tuple[Used, ...]
     history: tuple[float, ...] | None = None
 
     def table(self) -> str:
         """The fit table as text: rms and largest error, absolute and in % of the output range."""
-        return table(self.rows, self._unit, self._remarks)
+        return table(self.rows, self.unit, self.remarks)
 
     def predict(
         self, record: Source, history: Sequence[float] | None = None, free_offset: bool = False
@@ -68,6 +70,28 @@ class Fit:
                 raise ValueError(f"{data.name} has no measured column y to take the offset from")
             return np.asarray(predicted + float(np.mean(data.y - predicted)))
         return np.asarray(predicted + self.parameters.model.output_offset)
+
+    def along(self, record: Record, used: Used) -> NDArray[np.float64]:
+        """Free-run output (N,) along a record as the fit compared it.
+
+        Where the drive was bridged it is here too; every part between gaps starts anew and has the free offset that
+        fits its compared samples best; NaN in parts that were left out. Raises ValueError where `used` is of another
+        record.
+        """
+        if (record.name, len(record)) != (used.name, used.samples) or record.y is None:
+            raise ValueError(f"{record.name} is not the record {used.name} of {used.samples} samples that was compared")
+        wrong, compared = np.zeros(len(record), dtype=bool), used.compared
+        wrong[used.bridged] = True
+        part = self.parameters.model.pi
+        found = np.full(len(record), np.nan)
+        for start, stop in used.parts:
+            here = slice(start, stop)
+            drive = replace(record.section(start, stop), v=faults.bridged(record.v[here], wrong[here]))
+            inner = self._inner(drive, None if start in used.gaps else self.history)
+            output = reduction.prediction(inner.v, inner.history, np.array(part.thresholds), np.array(part.weights))
+            known = compared[here]
+            found[here] = output + float(np.mean((record.y[here] - output)[known]))
+        return found
 
     def settled(self, record: Source) -> int:
         """First sample of a record at which no play remembers an unknown start; 0 where a history was given."""
@@ -110,12 +134,14 @@ class Fit:
         return said
 
     @property
-    def _unit(self) -> str:
+    def unit(self) -> str:
+        """Unit of the output, empty where it is not known."""
         units = self.parameters.units
         return (units.output or "") if units is not None else ""
 
     @property
-    def _remarks(self) -> list[str]:
+    def remarks(self) -> list[str]:
+        """What the fit table's words mean, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
         told = [
             f"{n} play{'' if n == 1 else 's'}. Errors of a free run with a free offset a record; % of the largest "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,16 +23,17 @@ def courses(
     """
     made: list[Course] = []
     told: list[str] = []
-    for record in records:
+    for number, record in enumerate(records):
         pieces = faults.between_gaps(record)
         if len(pieces) == 1:
-            made.append(pi.course(record, history, skip))
+            made.append(replace(pi.course(record, history, skip), origin=(number, 0)))
             continue
         found = []
         for piece in pieces:
             try:
                 before = None if piece.after_gap else history
-                found.append(pi.course(piece.record, before, max(skip - piece.first, 0)))
+                course = pi.course(piece.record, before, max(skip - piece.first, 0))
+                found.append(replace(course, origin=(number, piece.first)))
             except IdentificationError as failure:
                 told.append(f"left out: {failure}")
         if not found:
@@ -41,26 +43,29 @@ def courses(
             f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
-    for k, item in enumerate(made):
-        spikes = faults.drive_spikes(item.v, item.y)
-        if spikes.any():
-            made[k] = replace(item, v=faults.bridged(item.v, spikes))
-            told.append(faults.told(item.name, spikes, "v jump away and back unseen by y, bridged"))
-    return made, told
+    return [bridged(item, max(skip - item.origin[1], 0)) for item in made], told
+
+
+def bridged(item: Course, begin: int) -> Course:
+    """The course, from sample `begin` on, with straight lines in place of isolated spikes of its drive."""
+    spikes = faults.drive_spikes(item.v, item.y)
+    if not spikes.any():
+        return item
+    # a spike is no extreme of the drive: the start memory is known at another sample than it looked
+    return pi.resettled(replace(item, v=faults.bridged(item.v, spikes)), math.inf, begin)
 
 
 def mask_outliers(
     to_fit: list[Course], held: list[Course], wanted: int | tuple[float, ...] | None, floor: float, skip: int
-) -> list[str]:
-    """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours; say how many."""
+) -> None:
+    """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
+
+    Those at the start too: how much of it is compared is known only in the end.
+    """
     solution, _ = pi.solve(to_fit, wanted, floor, skip)
-    told = []
     for group in (to_fit, held):
         for k, item in enumerate(group):
             error = pi.compare(replace(item, first=0), solution.thresholds, solution.weights).error
             wrong = faults.outliers(error)
-            wrong[: item.first] = False
             if wrong.any():
                 group[k] = replace(item, y=np.where(wrong, np.nan, item.y))
-                told.append(faults.told(item.name, wrong, "y far from their neighbours, not compared"))
-    return told

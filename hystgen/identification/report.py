@@ -43,8 +43,12 @@ class Row:
         )
 
 
-def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
-    """The rows in aligned columns, remarks below."""
+LEFT = (0, 1, 8)
+"""Columns of the table that hold words."""
+
+
+def cells(rows: Sequence[Row], unit: str) -> list[tuple[str, ...]]:
+    """The table's head and rows."""
     suffix = f" [{unit}]" if unit else ""
     head = ("part", "model", "samples", "ignored", f"rms{suffix}", "rms %", f"max{suffix}", "max %", "records")
     body = [
@@ -61,10 +65,15 @@ def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
         )
         for row in rows
     ]
-    widths = [max(len(line[k]) for line in (head, *body)) for k in range(len(head))]
-    left = (0, 1, len(head) - 1)
+    return [head, *body]
+
+
+def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
+    """The rows in aligned columns, remarks below."""
+    content = cells(rows, unit)
+    widths = [max(len(line[k]) for line in content) for k in range(len(content[0]))]
     lines = [
-        "  ".join(line[k].ljust(width) if k in left else line[k].rjust(width) for k, width in enumerate(widths))
-        for line in (head, *body)
+        "  ".join(line[k].ljust(width) if k in LEFT else line[k].rjust(width) for k, width in enumerate(widths))
+        for line in content
     ]
     return "\n".join([*(line.rstrip() for line in lines), *remarks]) + "\n"
