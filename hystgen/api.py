@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hystgen.effects import Chain, Effect, Run
     from hystgen.emission.module import Options
     from hystgen.fixed import FixedTables
+    from hystgen.identification.fit import Fit, Source
     from hystgen.reference import Tables
     from hystgen.simulation import Session
 
@@ -299,6 +300,25 @@ def identify_batch(sources: Any, output: str | os.PathLike[str], **options: Any)
     return fleet.identify_batch(sources, output, **options)
 
 
+def report_fit(
+    fit: Fit,
+    records: Source | Iterable[Source],
+    folder: str | os.PathLike[str],
+    holdout: Source | Iterable[Source] = (),
+) -> Path:
+    """Write the report of a fit: `report.html`, which needs nothing else, and its pictures; the path of the page.
+
+    `records`, `holdout`: as `identify` was given them, in the same order; what it read with options such as `columns`
+    has to come as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError
+    for other records, RecordError, OSError.
+    """
+    from hystgen.identification import several
+    from hystgen.records import read_records
+    from hystgen.report import identification
+
+    return identification.write(fit, read_records([*several(records), *several(holdout)]), folder)
+
+
 __all__ = [
     "InverseModel",
     "Model",
@@ -310,5 +330,6 @@ __all__ = [
     "identify",
     "identify_batch",
     "load",
+    "report_fit",
     "verify",
 ]

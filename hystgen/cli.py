@@ -307,11 +307,12 @@ def simulate(
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option("--units", metavar="V,um", help="units of drive and output; default: the records'")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
+@click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
     holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None, units: str | None, plot: str | None,
-    history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None, jobs: int | None,
+    report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None, jobs: int | None,
     scheduler: str | None, **reading: Any,
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
@@ -321,6 +322,7 @@ def identify(
     Example: hystgen identify --batch 'units/*.csv' -o params/
     """
     from hystgen import identification
+    from hystgen.report import identification as pages
 
     drive, _, displacement = (units or "").partition(",")
     how = _reading(**reading)
@@ -336,7 +338,7 @@ def identify(
     }
     only_batch: dict[str, Any] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}
     if batch:
-        for option, value in (("--name", name), ("--plot", plot)):
+        for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
             if value is not None:
                 raise click.UsageError(f"{option} is for one model; leave it out with --batch")
         # An unquoted pattern comes expanded by the shell: its first file with the option, the rest as arguments
@@ -352,7 +354,8 @@ def identify(
         raise click.UsageError("Missing argument 'DATA...'.")
     if Path(output).is_dir():
         raise click.BadParameter(f"File '{output}' is a directory.", param_hint="'-o'")
-    _keep((output, plot), (*data, *holdout))
+    made = [str(Path(report) / name) for name in pages.names()] if report else []
+    _keep((output, plot, *made), (*data, *holdout))
 
     def run() -> None:
         from hystgen import records
@@ -360,6 +363,8 @@ def identify(
 
         if plot:
             plots.check_path(plot)
+        if report:
+            pages.check_folder(report)
         read = records.read_records([*data, *holdout], **how)
         fit = identification.identify(
             read[: len(data)],
@@ -374,8 +379,10 @@ def identify(
         click.echo(fit.table())
         click.echo(output)
         if plot:
-            plots.show_fit(fit, [*read[len(data) :], *read[: len(data)]], plot)
+            plots.show_fit(fit, read, plot)
             click.echo(plot)
+        if report:
+            click.echo(str(pages.write(fit, read, report, Path(output).name)))
 
     _shown(data[0], run)
 

@@ -9,17 +9,27 @@ from collections.abc import Mapping
 from pathlib import Path
 
 
-def write(folder: Path, files: Mapping[str, str]) -> list[Path]:
-    """Write `files` (name to text) into `folder`; each appears complete, none before all are ready."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".hystgen-", dir=folder) as staging:
-        for name, text in files.items():
-            (Path(staging) / name).write_bytes(text.encode("ascii"))
+def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
+    """Write `files` (name to ASCII text or bytes) into `folder`; each appears complete, none before all are ready.
+
+    A folder that is not there yet appears with all of them; of one that is, other files stay as they are.
+    """
+    new = not folder.exists()
+    around = folder.parent if new else folder
+    around.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".hystgen-", dir=around) as staging:
+        made = Path(staging) / "made"
+        made.mkdir()
+        for name, content in files.items():
+            (made / name).write_bytes(content if isinstance(content, bytes) else content.encode("ascii"))
+        if new:
+            made.rename(folder)
+            return [folder / name for name in files]
         for name in files:  # the one thing that could stop a replacement half-way
             if (folder / name).is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
         for name in files:
-            os.replace(Path(staging) / name, folder / name)
+            os.replace(made / name, folder / name)
     return [folder / name for name in files]
 
 

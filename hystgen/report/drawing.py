@@ -1,0 +1,127 @@
+"""What all pictures share: colours, labels, thinned lines, and the same bytes for the same picture.
+
+matplotlib is imported when one is drawn; its settings, and those of the user, stay as they are.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MEASURED, MODEL, RESIDUAL, OTHER = "#1f5a99", "#c2410c", "#3f7d3a", "#5b4a91"
+IGNORED, GAP, FAULT, QUIET = "#8a929c", "#e0a526", "#b01030", "#6b7280"
+
+LINES = {
+    "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
+    "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
+}
+"""The model as a thin line on a broad one: neither hides the other."""
+
+STYLE = {
+    "svg.hashsalt": "hystgen",
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#4b5563",
+    "axes.titlesize": 11,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.labelsize": 10,
+    "xtick.labelsize": 9,
+    "ytick.labelsize": 9,
+    "legend.fontsize": 9,
+    "legend.frameon": False,
+    "agg.path.chunksize": 20000,
+    "savefig.dpi": 110,
+}
+
+BLOCKS = 1000
+"""A line is thinned to the extremes of so many blocks of samples."""
+
+MOST_POINTS = 4000
+"""Lines with more points than this that cannot be thinned become pixels in an SVG; most points of a cloud."""
+
+
+class PlotError(ValueError):
+    """A plot that cannot be drawn here."""
+
+
+def require() -> None:
+    """Raise PlotError without matplotlib."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        raise PlotError("plots need matplotlib; install it with: pip install 'hystgen[plot]'") from None
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """The style of all pictures, whatever matplotlib's own settings; to draw and to save in. Raises PlotError."""
+    require()
+    from matplotlib import style
+
+    with style.context(["default", STYLE]):
+        yield
+
+
+def figure(width: float, height: float) -> Any:
+    """An empty figure, in inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def content(drawn: Any, kind: str) -> bytes:
+    """The bytes of a PNG or SVG (`kind`) of a figure, without date or version."""
+    out = io.BytesIO()
+    metadata = {"Software": None} if kind == "png" else dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    drawn.savefig(out, format=kind, metadata=metadata)
+    return out.getvalue()
+
+
+def label(what: str, unit: str | None) -> str:
+    """`drive (V)`; without a unit the word alone."""
+    return f"{what} ({unit})" if unit else what
+
+
+def legend_above(axes: Any, columns: int = 3) -> None:
+    """A legend above the plot area, where it hides nothing."""
+    axes.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.4,
+        columnspacing=1.2,
+    )  # fmt: skip
+
+
+def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
+    """Indices from start to stop that draw the same lines: of each block of samples the extremes of every signal."""
+    count = stop - start
+    if count <= 4 * BLOCKS:
+        return np.arange(start, stop)
+    edges = np.linspace(0, count, BLOCKS + 1).astype(int)
+    found = [np.array([0, count - 1])]
+    for signal in signals:
+        part = signal[start:stop]
+        for sign in (1.0, -1.0):
+            # a block's first sample stands for it where none of its samples has a value
+            values = np.where(np.isnan(part), -np.inf, sign * part)
+            peak = np.maximum.reduceat(values, edges[:-1])
+            at_peak = np.flatnonzero(values == np.repeat(peak, np.diff(edges)))
+            found.append(at_peak[np.searchsorted(at_peak, edges[:-1])])
+    return np.asarray(start + np.unique(np.concatenate(found)))
+
+
+def sampled(count: int) -> NDArray[np.intp]:
+    """Indices of a fair sample of many points, spread evenly without a period that could beat with the signal's."""
+    if count <= MOST_POINTS:
+        return np.arange(count)
+    golden = (np.sqrt(5.0) - 1.0) / 2.0
+    return np.asarray(np.unique((np.arange(MOST_POINTS) * golden % 1.0 * count).astype(np.intp)))

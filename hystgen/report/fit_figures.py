@@ -1,0 +1,412 @@
+"""The pictures of a fit. Every one can be drawn for a wide page and for a phone, with the same content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.api import cascade_of
+from hystgen.identification import faults
+from hystgen.report import drawing
+from hystgen.report.drawing import label
+
+if TYPE_CHECKING:
+    from hystgen.identification import Fit, Used
+    from hystgen.records import Record
+
+Array = NDArray[np.float64]
+
+BINS, FEWEST = 40, 5
+"""Bins of the residual's mean, and the fewest samples in one that is shown."""
+
+TAIL, FAR = 0.002, 3.0
+"""An axis ends at these quantiles where the extremes lie so many times further out."""
+
+AGREE = 1.2
+"""Two estimates of the noise that differ by no more than this factor are one."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A record, what the fit compared of it, and the model's output (N,) along it."""
+
+    record: Record
+    used: Used
+    model: Array
+
+    @cached_property
+    def time(self) -> Array:
+        """Seconds from the record's first sample."""
+        return np.asarray(self.record.t - self.record.t[0])
+
+    @cached_property
+    def drive(self) -> Array:
+        """The drive, wrong samples bridged."""
+        wrong = np.zeros(len(self.record), dtype=bool)
+        wrong[self.used.bridged] = True
+        return faults.bridged(self.record.v, wrong)
+
+    @cached_property
+    def measured(self) -> Array:
+        """The measured output; NaN at outliers."""
+        assert self.record.y is not None
+        y = np.array(self.record.y)
+        y[self.used.outliers] = np.nan
+        return y
+
+    @cached_property
+    def residual(self) -> Array:
+        """Measured less model; NaN where not compared."""
+        return np.where(self.used.compared, self.measured - self.model, np.nan)
+
+    @property
+    def rms(self) -> float:
+        """rms of the residual."""
+        return float(np.sqrt(np.nanmean(self.residual**2)))
+
+    @cached_property
+    def rate(self) -> Array:
+        """Drive per second, over stretches in which the drive typically moves by half a percent of its range."""
+        steps = float(np.mean(np.abs(np.diff(self.drive))))
+        reach = int(np.clip(round(0.0025 * float(np.ptp(self.drive)) / steps), 1, max(1, len(self.drive) // 50)))
+        rate = np.full(len(self.drive), np.nan)
+        for start, stop in self.used.parts:
+            middle = np.arange(start, stop)
+            before, after = np.maximum(middle - reach, start), np.minimum(middle + reach, stop - 1)
+            rate[start:stop] = (self.drive[after] - self.drive[before]) / (self.time[after] - self.time[before])
+        return rate
+
+    @property
+    def noise(self) -> float | None:
+        """Standard deviation of white noise in y; None where the residual is not white on the scale of samples.
+
+        Differences of second order take what is smooth out of a residual and leave noise times the root of 6 (Gasser,
+        Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth do
+        neighbours tell the same as every other sample.
+        """
+        found = []
+        for lag in (1, 2):
+            parts = [self.residual[a:b] for a, b in self.used.parts]
+            second = np.concatenate([e[2 * lag :] - 2.0 * e[lag:-lag] + e[: -2 * lag] for e in parts])
+            # the kinks at reversals are few, and no noise
+            found.append(1.4826 * float(np.nanmedian(np.abs(second))) / np.sqrt(6.0))
+        if not 0.0 < max(found) <= AGREE * min(found):
+            return None
+        return float(found[0])
+
+
+def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
+    """The records of a fit with what is drawn of them; those held out last, as in `fit.used`."""
+    if len(records) != len(fit.used):
+        raise ValueError(f"the fit compared {len(fit.used)} records, those held out among them, not {len(records)}")
+    return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
+
+
+def drawn_ones(shown: Sequence[Shown]) -> list[Shown]:
+    """Of the fitted and of the held-out records the one with the largest error."""
+    groups = [[each for each in shown if each.used.held_out == held] for held in (False, True)]
+    return [max(group, key=lambda each: each.rms) for group in groups if group]
+
+
+def role(each: Shown) -> str:
+    """`fit` or `held out`."""
+    return "held out" if each.used.held_out else "fit"
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of drive and output, empty where not known."""
+
+    drive: str
+    output: str
+
+    @property
+    def weight(self) -> str:
+        """Unit of a weight."""
+        return f"{self.output}/{self.drive}" if self.drive and self.output else ""
+
+
+def units_of(fit: Fit) -> Units:
+    """The units of a fit's parameters."""
+    units = fit.parameters.units
+    return Units(units.input or "", units.output or "")
+
+
+# Panels: what is drawn into one pair of axes ---------------------------------------------------------------
+
+
+def loop_panel(axes: Any, each: Shown, units: Units) -> None:
+    """Measured loop and model over the compared samples."""
+    for k, (start, stop) in enumerate(each.used.parts):
+        here = slice(start, stop)
+        known = each.used.compared[here]
+        for values, name in ((each.measured, "measured"), (each.model, "model")):
+            axes.plot(
+                each.drive[here], np.where(known, values[here], np.nan), **drawing.LINES[name],
+                label=None if k else name, rasterized=stop - start > drawing.MOST_POINTS,
+            )  # fmt: skip
+    axes.set(xlabel=label("drive", units.drive), ylabel=label("displacement", units.output))
+    axes.set_title(f"{each.record.name} ({role(each)})", pad=20)
+    drawing.legend_above(axes)
+
+
+def _shade(axes: Any, each: Shown, named: bool) -> None:
+    """What was not compared: the start of each part, what was left out, gaps."""
+    t = each.time
+    step = each.record.sample_time
+    masked = np.zeros(each.used.samples + 2, dtype=np.int8)
+    for found in (each.used.skipped, each.used.ignored, each.used.left_out):
+        masked[found + 1] = 1
+    starts, ends = np.flatnonzero(np.diff(masked) == 1), np.flatnonzero(np.diff(masked) == -1)
+    for k, (a, b) in enumerate(zip(starts, ends, strict=True)):
+        axes.axvspan(
+            t[a], t[b - 1] + step, color=drawing.IGNORED, alpha=0.25, linewidth=0,
+            label="ignored" if named and not k else None,
+        )  # fmt: skip
+    for k, g in enumerate(each.used.gaps):
+        axes.axvspan(
+            t[g - 1], t[g], color=drawing.GAP, alpha=0.3, linewidth=0,
+            label="gap" if named and not k else None,
+        )  # fmt: skip
+
+
+def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
+    """Measured and model along time, what was not compared shaded or marked."""
+    _shade(axes, each, True)
+    good = each.measured[np.isfinite(each.measured)]
+    low, high = float(good.min()), float(good.max())
+    margin = 0.06 * (high - low)
+    for values, name in ((each.measured, "measured"), (each.model, "model")):
+        for k, (start, stop) in enumerate(each.used.parts):
+            chosen = drawing.kept(start, stop, values)
+            axes.plot(each.time[chosen], values[chosen], **drawing.LINES[name], label=None if k else name)
+    axes.set_ylim(low - margin, high + margin)
+    t = each.time
+    if len(each.used.outliers):
+        assert each.record.y is not None
+        # beyond the axis they stand at its edge
+        places = np.clip(each.record.y[each.used.outliers], low - 0.7 * margin, high + 0.7 * margin)
+        axes.plot(t[each.used.outliers], places, "x", color=drawing.FAULT, markersize=5, label="outlier")
+    if len(each.used.bridged):
+        places = np.full(len(each.used.bridged), low - 0.7 * margin)
+        axes.plot(t[each.used.bridged], places, "^", color=drawing.OTHER, markersize=4, label="drive bridged")
+    axes.set(ylabel=label("displacement", units.output))
+    axes.set_title(f"{each.record.name} ({role(each)})", pad=20 if len(axes.get_legend_handles_labels()[1]) < 4 else 34)
+    drawing.legend_above(axes, 3)
+
+
+def residual_panel(axes: Any, each: Shown, units: Units, colour: str = drawing.RESIDUAL) -> None:
+    """What is left along time."""
+    for k, (start, stop) in enumerate(each.used.parts):
+        chosen = drawing.kept(start, stop, each.residual)
+        axes.plot(
+            each.time[chosen], each.residual[chosen], color=colour, linewidth=0.8,
+            label=None if k else f"{each.record.name} ({role(each)})",
+        )  # fmt: skip
+    axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
+    axes.set(xlabel="time (s)", ylabel=label("residual", units.output))
+
+
+def _against_panel(axes: Any, x: Array, residual: Array, noise: float | None) -> None:
+    """Residuals as points, their mean and scatter in bins of x."""
+    known = np.isfinite(residual) & np.isfinite(x)
+    x, residual = x[known], residual[known]
+    chosen = drawing.sampled(len(x))
+    axes.plot(x[chosen], residual[chosen], ".", color=drawing.RESIDUAL, alpha=0.5, markersize=3.0,
+              markeredgewidth=0, rasterized=True, label="samples")  # fmt: skip
+    low, high = _limits(x)
+    middle, mean, spread = binned(x, residual, low, high)
+    axes.fill_between(
+        middle, mean - spread, mean + spread, color=drawing.RESIDUAL, alpha=0.25, linewidth=0,
+        label="mean \N{PLUS-MINUS SIGN} 1 sd in bins",
+    )  # fmt: skip
+    axes.plot(middle, mean, color="#14532d", linewidth=1.6, label="mean in bins", marker="o", markersize=2.2)
+    axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
+    if noise is not None:
+        for sign, name in ((1.0, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-1.0, None)):
+            axes.axhline(sign * noise, color=drawing.FAULT, linewidth=1.0, linestyle="--", label=name)
+    margin = 0.02 * (high - low)
+    axes.set_xlim(low - margin, high + margin)
+
+
+def binned(x: Array, values: Array, low: float, high: float) -> tuple[Array, Array, Array]:
+    """Middle (BINS,), mean and standard deviation of the values in even bins of x; NaN in bins with too few."""
+    edges = np.linspace(low, high, BINS + 1)
+    inside = (x >= low) & (x <= high)
+    place = np.clip(np.searchsorted(edges, x[inside], side="right") - 1, 0, BINS - 1)
+    count = np.bincount(place, minlength=BINS)
+    enough = count >= FEWEST
+    mean, spread = np.full(BINS, np.nan), np.full(BINS, np.nan)
+    mean[enough] = np.bincount(place, values[inside], BINS)[enough] / count[enough]
+    squares = np.bincount(place, (values[inside] - mean[place]) ** 2, BINS)
+    spread[enough] = np.sqrt(squares[enough] / count[enough])
+    return (edges[1:] + edges[:-1]) / 2.0, mean, spread
+
+
+def _limits(x: Array) -> tuple[float, float]:
+    """Ends of an axis: all there is, or all but the few that lie far out."""
+    low, high = float(x.min()), float(x.max())
+    inner_low, inner_high = (float(q) for q in np.quantile(x, (TAIL, 1.0 - TAIL)))
+    return (inner_low, inner_high) if high - low > FAR * (inner_high - inner_low) > 0.0 else (low, high)
+
+
+def weight_panel(axes: Any, fit: Fit, units: Units, places: Sequence[int]) -> None:
+    """Some of the weights as bars, named by their thresholds, with their intervals."""
+    part = fit.parameters.model.pi
+    at = np.arange(len(places))
+    axes.bar(at, [part.weights[k] for k in places], width=0.7, color=drawing.OTHER, alpha=0.75)
+    sure = np.array(fit.intervals.weights)[list(places)]
+    axes.vlines(at, sure[:, 0], sure[:, 1], color="#1b1f24", linewidth=1.1)
+    for ends in sure.T:
+        axes.plot(at, ends, "_", color="#1b1f24", markersize=6)
+    every = -(-len(places) // 24)
+    axes.set_xticks(
+        at[::every], [f"{part.thresholds[k]:.3g}" for k in places[::every]], rotation=45 if len(places) > 6 else 0
+    )
+    axes.grid(axis="x", visible=False)
+    axes.set_xlim(-0.7, len(places) - 0.3)
+    axes.set_ylim(bottom=0.0)
+    axes.set(ylabel=label("weight", units.weight))
+
+
+# Figures ---------------------------------------------------------------------------------------------------
+
+
+def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
+    """Measured loops and the model's, of a fitted and of a held-out record."""
+    pair, units = drawn_ones(shown), units_of(fit)
+    figure = drawing.figure(9.6, 4.4) if wide else drawing.figure(4.4, 4.0 * len(pair))
+    axes = figure.subplots(1, len(pair), squeeze=False) if wide else figure.subplots(len(pair), 1, squeeze=False)
+    for ax, each in zip(axes.flat, pair, strict=True):
+        loop_panel(ax, each, units)
+    return figure
+
+
+def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
+    """Measured and model along time with the residual below, of a fitted and of a held-out record."""
+    pair, units = drawn_ones(shown), units_of(fit)
+    figure = drawing.figure(9.6 if wide else 4.4, 4.3 * len(pair))
+    rows = figure.subfigures(len(pair), 1, squeeze=False)
+    for row, each in zip(rows.flat, pair, strict=True):
+        above, below = row.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+        overlay_panel(above, each, units)
+        _shade(below, each, False)
+        residual_panel(below, each, units)
+        below.set_xlim(each.time[0], each.time[-1])
+        for ax in (above, below):
+            ax.yaxis.set_label_coords(-0.06 if wide else -0.15, 0.5)
+    return figure
+
+
+def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
+    """Residual against drive, rate, time and displacement: of the held-out records, where there are any."""
+    chosen, units = judged(shown), units_of(fit)
+    noise = noise_of(chosen)
+    left = np.concatenate([each.residual for each in chosen])
+    figure = drawing.figure(9.6, 6.4) if wide else drawing.figure(4.4, 11.0)
+    axes = figure.subplots(2, 2, sharey=True) if wide else figure.subplots(4, 1)
+    per_second = f"{units.drive}/s" if units.drive else "1/s"
+    against: list[tuple[Callable[[Shown], Array], str]] = [
+        (lambda each: each.drive, label("drive", units.drive)),
+        (lambda each: each.rate, label("drive rate", per_second)),
+        (lambda each: each.time, "time (s)"),
+        (lambda each: each.measured, label("displacement", units.output)),
+    ]
+    for k, (ax, (values, name)) in enumerate(zip(axes.flat, against, strict=True)):
+        _against_panel(ax, np.concatenate([values(each) for each in chosen]), left, noise)
+        ax.set(xlabel=name)
+        if not wide or k % 2 == 0:
+            ax.set(ylabel=label("residual", units.output))
+    known = left[np.isfinite(left)]
+    peak = float(np.max(np.abs(known))) if len(known) else 1.0
+    for ax in axes.flat:
+        ax.set_ylim(-1.08 * peak, 1.08 * peak)
+    handles, names = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper right", ncols=4 if wide else 2, markerscale=2)
+    return figure
+
+
+def judged(shown: Sequence[Shown]) -> list[Shown]:
+    """The held-out records, or all where there are none."""
+    return [each for each in shown if each.used.held_out] or list(shown)
+
+
+def noise_of(shown: Sequence[Shown]) -> float | None:
+    """The largest noise of the records, None where that of any cannot be told."""
+    found = [each.noise for each in shown]
+    told = [sigma for sigma in found if sigma is not None]
+    return max(told) if told and len(told) == len(found) else None
+
+
+def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
+    """Initial loading curve with its band; with a front, its curve and how far it is from a straight line."""
+    units, cascade = units_of(fit), cascade_of(fit.parameters)
+    bent = bool(cascade.stages)
+    if wide:
+        figure = drawing.figure(9.6, 7.0 if bent else 3.8)
+        axes = figure.subplots(2, 2) if bent else figure.subplots(1, 2, squeeze=False)
+    else:
+        figure = drawing.figure(4.4, 3.1 * (4 if bent else 2))
+        axes = figure.subplots(4 if bent else 2, 1, squeeze=False)
+    curve, band, *front = axes.flat
+    r = np.asarray(cascade.pi.thresholds)
+    x = np.linspace(0.0, max(abs(end) for end in cascade.play_range), 400)
+    middle = cascade.pi.loading_curve(x)
+    low, high = fit.intervals.loading_curve(r, x)
+    inner = label("input of the plays" if bent else "drive", units.drive)
+    curve.fill_between(x, low, high, color=drawing.MODEL, alpha=0.3, linewidth=0, label="95 % band")
+    curve.plot(x, middle, color=drawing.MODEL, linewidth=1.4, label="loading curve")
+    inside = r[r <= x[-1]]
+    curve.plot(inside, cascade.pi.loading_curve(inside), "o", color=drawing.MODEL, markersize=3.2, label="thresholds")
+    low_end, high_end = cascade.play_range
+    for ax in (curve, band):
+        ax.axvline((high_end - low_end) / 2.0, color=drawing.QUIET, linewidth=0.9, linestyle=":")
+    curve.set(xlabel=inner, ylabel=label("displacement", units.output))
+    curve.set_title("Initial loading curve", pad=20)
+    drawing.legend_above(curve)
+    band.fill_between(x, low - middle, high - middle, color=drawing.MODEL, alpha=0.3, linewidth=0)
+    band.axhline(0.0, color=drawing.MODEL, linewidth=1.2)
+    band.set(xlabel=inner, ylabel=label("band - curve", units.output))
+    band.set_title("Its 95 % band, enlarged", pad=20)
+    if bent:
+        v = np.linspace(*cascade.input_range, 600)
+        branches = [(True, drawing.MEASURED, "drive rising" if cascade.branches_differ else "front")]
+        if cascade.branches_differ:
+            branches.append((False, drawing.RESIDUAL, "drive falling"))
+        for ax, straight, title in ((front[0], 0.0, "Front"), (front[1], 1.0, "Its departure from the line")):
+            for up, colour, name in branches:
+                ax.plot(v, cascade.front(v, up) - straight * v, color=colour, linewidth=1.4, label=name)
+            ax.plot(v, (1.0 - straight) * v, color=drawing.QUIET, linewidth=0.9, linestyle="--", label="straight line")
+            ax.set(xlabel=label("drive", units.drive), ylabel=label("front" if not straight else "front - line",
+                                                                    units.drive))  # fmt: skip
+            ax.set_title(title, pad=20)
+        drawing.legend_above(front[0])
+    return figure
+
+
+def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
+    """The weights over their thresholds, p_0 on an axis of its own."""
+    units = units_of(fit)
+    n = len(fit.parameters.model.pi.thresholds) - 1
+    figure = drawing.figure(9.6 if wide else 4.4, 3.6)
+    if not n:
+        weight_panel(figure.subplots(), fit, units, [0])
+        return figure
+    first, others = figure.subplots(1, 2, width_ratios=(1, 8 if wide else 4))
+    weight_panel(first, fit, units, [0])
+    weight_panel(others, fit, units, range(1, n + 1))
+    first.set_title("p\N{SUBSCRIPT ZERO}")
+    others.set_title("plays")
+    others.set(xlabel=label("threshold", units.drive), ylabel="")
+    return figure
+
+
+FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Any]] = {
+    "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
+}  # fmt: skip
+"""All of them by the name of their file."""

@@ -1,0 +1,93 @@
+"""One HTML page that stands alone: text, tables and pictures in it, no script, nothing to load."""
+
+from __future__ import annotations
+
+import base64
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import jinja2
+from markupsafe import Markup
+
+from hystgen.emission import runtime
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph; `command` is set below it as code."""
+
+    text: str
+    command: str = ""
+    kind: str = "text"
+
+
+@dataclass(frozen=True)
+class Listing:
+    """A bulleted list."""
+
+    items: Sequence[str]
+    kind: str = "listing"
+
+
+@dataclass(frozen=True)
+class Table:
+    """`rows[0]` is the head; columns in `words` hold words, the others numbers; row `marked` stands out."""
+
+    rows: Sequence[Sequence[str]]
+    words: Sequence[int]
+    marked: int | None = None
+    kind: str = "table"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture as SVG, in a layout for wide pages and one for phones; `alt` says in words what it shows."""
+
+    name: str
+    wide: bytes
+    narrow: bytes
+    caption: str
+    alt: str
+    kind: str = "figure"
+
+
+@dataclass(frozen=True)
+class Details:
+    """Text as it is, behind a summary that opens it."""
+
+    summary: str
+    text: str
+    kind: str = "details"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what is below it."""
+
+    title: str
+    blocks: Sequence[Text | Listing | Table | Figure | Details]
+
+
+def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:
+    """The page: `title`, a `lead` that says the most important in a few words, the sections."""
+    template = _environment().get_template("report.html.j2")
+    return template.render(title=title, lead=lead, sections=sections)
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    made = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(runtime.data_folder("templates")),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=True,
+    )
+    made.filters["data_uri"] = _data_uri
+    return made
+
+
+def _data_uri(svg: bytes) -> Markup:
+    return Markup("data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii"))

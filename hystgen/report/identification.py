@@ -1,0 +1,396 @@
+"""The report of an identification: one page for people who look, and its pictures beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hystgen import __version__
+from hystgen.api import Model, cascade_of
+from hystgen.emission import files
+from hystgen.identification import PARSIMONY
+from hystgen.identification.fit import HELD_OUT
+from hystgen.identification.report import LEFT, cells
+from hystgen.models import DeadZone
+from hystgen.params import parameters_sha256
+from hystgen.report import drawing, fit_figures, properties
+from hystgen.report.fit_figures import Shown
+from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
+
+if TYPE_CHECKING:
+    from hystgen.identification import Fit, Row
+    from hystgen.records import Record
+
+PAGE = "report.html"
+
+
+def names() -> list[str]:
+    """Names of the files of a report."""
+    return [PAGE, *(f"{name}.{kind}" for name in fit_figures.FIGURES for kind in ("svg", "png"))]
+
+
+def check_folder(folder: str | os.PathLike[str]) -> None:
+    """Raise PlotError without matplotlib, NotADirectoryError where there is a file of that name."""
+    drawing.require()
+    target = Path(folder)
+    for place in (target, *target.parents):
+        if place.exists():
+            if not place.is_dir():
+                raise NotADirectoryError(f"{place} is a file; give a folder for the report")
+            return
+
+
+def write(
+    fit: Fit, records: Sequence[Record], folder: str | os.PathLike[str], parameter_file: str | None = None
+) -> Path:
+    """Write report.html and every picture as SVG and PNG into a folder, all or nothing; the path of the page.
+
+    `records`: those of the fit, then those held out. `parameter_file`: its name in the command to run next. Raises
+    PlotError without matplotlib, ValueError for other records than those of the fit, OSError.
+    """
+    check_folder(folder)
+    shown = fit_figures.of_fit(fit, records)
+    made: dict[str, str | bytes] = {}
+    figures = {}
+    with drawing.styled():
+        for name, draw in fit_figures.FIGURES.items():
+            wide = draw(fit, shown, True)
+            svg = drawing.content(wide, "svg")
+            made |= {f"{name}.svg": svg, f"{name}.png": drawing.content(wide, "png")}
+            figures[name] = Figure(
+                name, svg, drawing.content(draw(fit, shown, False), "svg"), CAPTIONS[name](fit, shown),
+                ALTERNATIVES[name](fit, shown),
+            )  # fmt: skip
+    text = page(
+        f"{fit.parameters.name}: identification report",
+        _verdict(fit, parameter_file or f"{fit.parameters.name}.yaml"),
+        _sections(fit, shown, figures),
+    )
+    return files.write(Path(folder), {PAGE: text.encode("utf-8"), **made})[0]
+
+
+# What is said ----------------------------------------------------------------------------------------------
+
+
+def _kind(fit: Fit) -> str:
+    """What kind of model it is, in words."""
+    plays = fit.parameters.model.pi.thresholds
+    cascade = cascade_of(fit.parameters)
+    count = _count(len(plays) - 1, "play")
+    if not cascade.stages:
+        return f"A Prandtl-Ishlinskii model with {count}"
+    (stage,) = cascade.stages
+    if isinstance(stage, DeadZone):
+        bends = _count(sum(r != 0.0 for r in stage.thresholds), "bend")
+        return f"A generalized Prandtl-Ishlinskii model with {count} behind a dead-zone front with {bends}"
+    branches = "two branches" if stage.branches_differ else "one branch"
+    return f"A generalized Prandtl-Ishlinskii model with {count} behind a tanh front with {branches}"
+
+
+def held_out_row(fit: Fit) -> Row | None:
+    """The row of what the model was judged by; None where nothing was held out."""
+    return next((row for row in fit.rows if row.part == "held out"), None)
+
+
+def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
+    row, unit = held_out_row(fit), f" {fit.unit}" if fit.unit else ""
+    if row is None:
+        own = fit.rows[-1]
+        error = (
+            f" follows the records it was fitted to within {own.rms:.3g}{unit} rms ({own.rms_percent:.3g} % of the "
+            "output range); nothing was held out, so that it is not known how it does on others"
+        )
+    else:
+        which = (
+            " predicts records it has not seen"
+            if row.model == "written"
+            else f"; fitted to the first {100 * (1 - HELD_OUT):g} % of the records, such a model predicts the rest"
+        )
+        error = f"{which} to {row.rms:.3g}{unit} rms, {row.rms_percent:.3g} % of the output range"
+        if fit.intervals.held_out is not None:
+            low, high = fit.intervals.held_out
+            share = 100.0 / row.output_range if row.output_range else 0.0
+            error += (
+                f" (95 % interval {low:.3g} to {high:.3g}{unit}, {low * share:.3g} to {high * share:.3g} %)"
+            )
+    problems = cascade_of(fit.parameters).inverse_problems()
+    said = [f"{_kind(fit)}{error}; {'it has no inverse' if problems else 'it is invertible'}."]
+    if problems:
+        said.append("Why there is no inverse: " + "; ".join(problems) + ". It can be used forward.")
+    operator = " --operator forward" if problems else ""
+    said += [f"Mind that {text}." for text in properties.warnings(Model(fit.parameters))]
+    if fit.warnings:
+        said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {_count(len(fit.warnings), 'warning')} below.")
+    command = f"hystgen emit {parameter_file} -o firmware/{operator}"
+    return [*(Text(text) for text in said), Text("To get the C code, run:", command)]
+
+
+def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> list[Section]:
+    yaml = Details("Parameter file", fit.text())
+    return [
+        Section("How good it is", _table(fit)),
+        Section("Loops", [figures["loop"]]),
+        Section("Along time", [figures["time"]]),
+        Section("What is left, and what it depends on", [figures["residual"]]),
+        Section("Initial loading curve", [figures["loading"]]),
+        Section("Thresholds and weights", [figures["weights"]]),
+        Section("What was done to the data", _data(shown)),
+        Section("Warnings", [Listing(fit.warnings) if fit.warnings else Text("None.")]),
+        Section("Drive range", _range(fit, shown)),
+        Section("Parameters", [yaml]),
+        Section("Provenance", _provenance(fit, shown)),
+    ]
+
+
+def _table(fit: Fit) -> list[Text | Table | Listing]:
+    row = held_out_row(fit)
+    marked = next((k for k, each in enumerate(fit.rows) if each is row), len(fit.rows) - 1)
+    blocks: list[Text | Table | Listing] = [Table(cells(fit.rows, fit.unit), LEFT, marked)]
+    candidates = [each for each in fit.rows if each.part == "candidate"]
+    if candidates and row is not None:
+        best = min(each.rms for each in candidates)
+        chosen = next(each for each in candidates if each.rms == row.rms)
+        blocks.append(
+            Text(
+                f"{chosen.model} was chosen: of the candidates, the simplest first, it is the first whose held-out "
+                f"error is within {100 * (PARSIMONY - 1):.3g} % of the least, {best:.4g}"
+                f"{f' {fit.unit}' if fit.unit else ''}."
+            )
+        )
+    return [*blocks, Listing(fit.remarks)]
+
+
+def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
+    head = (
+        "record", "part", "samples", "compared", "start, as asked", "start, memory unknown", "outliers of y",
+        "v bridged", "gaps", "left out between gaps",
+    )  # fmt: skip
+    rows = [
+        (
+            each.used.name,
+            fit_figures.role(each),
+            *(
+                str(number)
+                for number in (
+                    each.used.samples,
+                    np.count_nonzero(each.used.compared),
+                    *(len(found) for found in _masks(each)),
+                )
+            ),
+        )
+        for each in shown
+    ]
+    notes = [f"{each.used.name}: {note}" for each in shown for note in each.record.notes]
+    blocks: list[Text | Table | Listing] = [
+        Table([head, *rows], (0, 1)),
+        Text(
+            "Not compared are samples at the start, before the drive has wiped an unknown memory, and outliers of y: "
+            "isolated samples far from their neighbours. Isolated samples of v that y takes no notice of are bridged "
+            "by a straight line. A record is cut at gaps, behind which the memory is unknown again; every part has a "
+            "free offset."
+        ),
+    ]
+    return [*blocks, Text("On reading:"), Listing(notes)] if notes else blocks
+
+
+def _masks(each: Shown) -> tuple[Sequence[int], ...]:
+    """What is counted of a record, in the order of the table."""
+    used = each.used
+    return tuple(
+        found.tolist()
+        for found in (used.skipped, used.ignored, used.outliers, used.bridged, used.gaps, used.left_out)
+    )
+
+
+def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
+    low, high = fit.parameters.input_range
+    unit = f" {fit.parameters.units.input}" if fit.parameters.units.input else ""
+    rows, beyond = [], 0
+    for each in shown:
+        drive = each.drive
+        outside = int(np.count_nonzero((drive < low) | (drive > high)))
+        far = max(low - float(drive.min()), float(drive.max()) - high, 0.0)
+        beyond += outside
+        rows.append(
+            (
+                each.used.name, fit_figures.role(each), f"{drive.min():.6g}", f"{drive.max():.6g}", str(outside),
+                f"{far:.4g}" if outside else "0", f"{100.0 * far / (high - low):.3g} %",
+            )
+        )  # fmt: skip
+    said = (
+        f"The model was fitted on drives from {low:.6g} to {high:.6g}{unit}, and the emitted code keeps its drive "
+        "inside them. "
+    )
+    said += (
+        f"{_count(beyond, 'sample')} of the records below lie outside: there the model is a guess."
+        if beyond
+        else "No record leaves them."
+    )
+    head = (
+        "record", "part", f"least{unit and f' [{unit.strip()}]'}", f"largest{unit and f' [{unit.strip()}]'}",
+        "samples outside", f"farthest outside{unit and f' [{unit.strip()}]'}", "of the range",
+    )  # fmt: skip
+    return [Text(said), Table([head, *rows], (0, 1))]
+
+
+def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
+    rows = [
+        (
+            each.used.name, fit_figures.role(each), str(each.used.samples), f"{each.record.sample_time:.4g}",
+            f"{each.time[-1]:.4g}", _fingerprint(each.record),
+        )
+        for each in shown
+    ]  # fmt: skip
+    head = ("record", "part", "samples", "sample time [s]", "duration [s]", "SHA-256 of t, v, y")
+    made = (
+        f"Made by hystgen {__version__}. SHA-256 of the parameters: {parameters_sha256(fit.parameters)[:16]}. The same "
+        "records and options give the same page, byte for byte."
+    )
+    return [Text(made), Table([head, *rows], (0, 1, 5))]
+
+
+def _fingerprint(record: Record) -> str:
+    """Of the numbers as they were read, so that it does not depend on the file's format."""
+    digest = hashlib.sha256()
+    for values in (record.t, record.v, record.y):
+        assert values is not None
+        digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+# Captions and what pictures show in words -------------------------------------------------------------------
+
+
+def _several(shown: Sequence[Shown]) -> str:
+    """Which records of several are drawn."""
+    drawn = fit_figures.drawn_ones(shown)
+    return " Of several records the one with the largest error is drawn." if len(drawn) < len(shown) else ""
+
+
+def _errors(shown: Sequence[Shown], fit: Fit) -> str:
+    unit = f" {fit.unit}" if fit.unit else ""
+    return ", ".join(
+        f"{each.used.name} ({fit_figures.role(each)}) {each.rms:.3g}{unit} rms"
+        for each in fit_figures.drawn_ones(shown)
+    )
+
+
+def _loop_caption(fit: Fit, shown: Sequence[Shown]) -> str:
+    return (
+        "Measured loops and those of the model, a free run over the measured drive with a free offset: "
+        f"{_errors(shown, fit)}. Only compared samples are drawn.{_several(shown)}"
+    )
+
+
+def _loop_alt(fit: Fit, shown: Sequence[Shown]) -> str:
+    return f"Displacement over drive, measured and model: {_errors(shown, fit)}"
+
+
+def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
+    said = []
+    for each in fit_figures.drawn_ones(shown):
+        skipped, ignored, outliers, bridged, gaps, left_out = map(len, _masks(each))
+        counts = [
+            _count(skipped + ignored, "sample") + " ignored at the start",
+            _count(outliers, "outlier"),
+            _count(bridged, "bridged drive sample"),
+            _count(gaps, "gap"),
+        ]
+        counts += [_count(left_out, "sample") + " left out between gaps"] if left_out else []
+        said.append(f"{each.used.name}: {', '.join(counts)}")
+    return (
+        "Measured and model along time; below it, measured less model where it was compared. Grey: ignored; yellow: "
+        f"gaps; crosses: outliers. {'; '.join(said)}.{_several(shown)}"
+    )
+
+
+def _time_alt(fit: Fit, shown: Sequence[Shown]) -> str:
+    return f"Displacement along time, measured and model, with the residual below: {_errors(shown, fit)}"
+
+
+def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:
+    judged = fit_figures.judged(shown)
+    noise = fit_figures.noise_of(judged)
+    unit = f" {fit.unit}" if fit.unit else ""
+    said = ", ".join(f"{each.used.name} ({fit_figures.role(each)})" for each in judged)
+    level = (
+        f"The noise, told from differences of neighbouring samples, is about {noise:.2g}{unit} (1 sd): a mean "
+        "outside that band is structure that the model misses."
+        if noise is not None
+        else "The noise cannot be told from these samples: it is not white, or small beside what the model misses."
+    )
+    compared = sum(int(np.count_nonzero(each.used.compared)) for each in judged)
+    some = f" ({drawing.MOST_POINTS} of {compared} are drawn)" if compared > drawing.MOST_POINTS else ""
+    return (
+        f"What is left of {said}: samples{some}, their mean and scatter in {fit_figures.BINS} bins. A mean that "
+        f"stays at zero means that nothing depends on what is on the axis. {level} The axis of the drive rate ends "
+        f"where {100 * (1 - fit_figures.TAIL):.3g} % of the samples do if a few lie far out."
+    )
+
+
+def _residual_alt(fit: Fit, shown: Sequence[Shown]) -> str:
+    unit = f" {fit.unit}" if fit.unit else ""
+    peak = max(float(np.nanmax(np.abs(each.residual))) for each in fit_figures.judged(shown))
+    return f"Residual against drive, drive rate, time and displacement; the largest is {peak:.3g}{unit}"
+
+
+def _loading_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
+    said = (
+        "Output of the model on the first rise of a virgin actuator, with the 95 % band of the bootstrap, and that "
+        "band alone. Loops inside the drive range use it up to the dotted line; only a virgin actuator goes on."
+    )
+    cascade = cascade_of(fit.parameters)
+    if cascade.stages:
+        said += (
+            " The horizontal axis is the input of the plays, that is the drive as it comes out of the front. Below: "
+            "the front against the straight line of slope one, and how far it departs from it"
+        )
+        said += ", while the drive rises and while it falls." if cascade.branches_differ else "."
+    return said
+
+
+def _loading_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
+    curve = cascade_of(fit.parameters)
+    top = max(abs(end) for end in curve.play_range)
+    unit = f" {fit.unit}" if fit.unit else ""
+    rises = f"Initial loading curve with its 95 % band, rising to {float(curve.pi.loading_curve(top)):.4g}{unit}"
+    return rises + ("; the front and its departure from a straight line" if curve.stages else "")
+
+
+def _weights_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
+    return (
+        "Weights over their thresholds; the lines are 95 % intervals. p_0 is the part without hysteresis, on a scale "
+        "of its own. Neighbouring plays can stand in for each other: a wide interval of one weight does not make the "
+        "loading curve uncertain."
+        + (" Thresholds are in the output of the front." if fit.parameters.model.memoryless else "")
+    )
+
+
+def _weights_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
+    part = fit.parameters.model.pi
+    said = f"Weights as bars with intervals: p_0 is {part.weights[0]:.3g}"
+    if len(part.weights) > 1:
+        k = int(np.argmax(part.weights[1:])) + 1
+        said += (
+            f", {_count(len(part.weights) - 1, 'play')} up to a threshold of {part.thresholds[-1]:.3g}, the largest "
+            f"weight {part.weights[k]:.3g} at {part.thresholds[k]:.3g}"
+        )
+    return said
+
+
+CAPTIONS = {
+    "loop": _loop_caption, "time": _time_caption, "residual": _residual_caption, "loading": _loading_caption,
+    "weights": _weights_caption,
+}  # fmt: skip
+ALTERNATIVES = {
+    "loop": _loop_alt, "time": _time_alt, "residual": _residual_alt, "loading": _loading_alt, "weights": _weights_alt,
+}  # fmt: skip
