@@ -18,12 +18,13 @@ $(VENV)/ready: pyproject.toml
 demo: $(VENV)/ready
 	mkdir -p examples/out
 	$(BIN)/hystgen identify examples/stage_recording.csv --holdout examples/stage_holdout.csv \
-	    -o examples/out/stage.yaml --units V,um --plot examples/out/stage.png
+	    -o examples/out/stage.yaml --units V,um --plot examples/out/stage.png --report examples/out/report
 	$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out >/dev/null
 	$(BIN)/hystgen verify examples/out/stage.yaml
-	@echo; echo "The C, ready to compile, and the plot:"
+	@echo; echo "The C, ready to compile, the plot and the report:"
 	@$(BIN)/hystgen emit examples/out/stage.yaml -o examples/out --list-outputs
 	@echo examples/out/stage.png
+	@echo examples/out/report/report.html
 
 test: $(VENV)/ready lint
 	$(BIN)/python -m pytest -n 2
