@@ -14,7 +14,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from recordings import brute_output, brute_plays, noisy, wander, write_csv
 from scipy.stats import binned_statistic
 
 import hystgen
-from hystgen.identification import Fit, Used
+from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import drawing, fit_figures
 from hystgen.report import identification as pages
@@ -167,6 +167,13 @@ class TestMasks:
             assert row.samples + row.ignored + len(used.skipped) + len(used.outliers) == len(record)
             assert row.rms == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-8)
             assert row.max == pytest.approx(np.max(np.abs(error)), rel=1e-8)
+
+    def test_a_spike_is_no_extreme_of_the_drive(self) -> None:
+        clean = made("clean", 4, np.asarray)
+        v = clean.v.copy()
+        v[list(SPIKES)] = 170.0
+        (item,), _ = prepared.courses([replace(clean, v=v)], None, 0)
+        assert item.first == max(np.argmax(clean.v), np.argmin(clean.v)) < min(SPIKES)
 
     def test_of_a_part_that_is_too_short(self) -> None:
         whole = made("cut.csv", 4, np.asarray)
