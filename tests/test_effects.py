@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import subprocess
 import sys
@@ -155,7 +156,7 @@ def test_a_record_in_pieces_is_the_record(effect: Effect) -> None:
         cuts = (0, 317, 318, 900, len(t))
         parts = [
             Run(t[a:b], v[a:b], {"temperature": whole.extra["temperature"][a:b]})
-            for a, b in zip(cuts, cuts[1:], strict=False)
+            for a, b in itertools.pairwise(cuts)
         ]
         assert np.array_equal(np.concatenate(chain.simulate(parts)), chain.simulate([whole])[0])
 
@@ -556,7 +557,7 @@ def test_rate_dependence_and_noncongruency_act_together() -> None:
 
 def test_ageing_against_the_distance_travelled() -> None:
     t, v = uneven()
-    distance = np.array([sum(abs(b - a) for a, b in zip(v[:k], v[1 : k + 1], strict=True)) for k in range(len(v))])
+    distance = np.array([sum(abs(b - a) for a, b in itertools.pairwise(v[: k + 1])) for k in range(len(v))])
     logarithmic = make("ageing", loss=0.05, travel=3.0).gain(Run(t, v))
     assert np.allclose(logarithmic, 1 - 0.05 * np.log10(1 + distance / 3.0), rtol=1e-12)
     exponential = make("ageing", shape="exponential", loss=0.05, travel=3.0).gain(Run(t, v))
@@ -723,7 +724,7 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
     ):  # fmt: skip
         with pytest.raises(EffectsError, match=said):
             warm.simulate(v, **wrong)
-    static = hystgen.Model(model_of("").parameters) if False else model_of("    []\n", FILE.replace("effects:\n", "effects:"))
+    static = model_of("    []\n", FILE.replace("effects:\n", "effects:"))
     assert np.array_equal(static.simulate(v, t=t), static.simulate(v))
 
 

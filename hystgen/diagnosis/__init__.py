@@ -117,6 +117,8 @@ def diagnose(
     given = model.parameters.model.effects
     several = [records] if isinstance(records, Record | str | os.PathLike) else list(records)
     others = [holdout] if isinstance(holdout, Record | str | os.PathLike) else list(holdout)
+    if not several:
+        raise ValueError("there is no record to fit")
     read = read_records([*several, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
     with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:

@@ -146,16 +146,16 @@ def _screened(
     tick: Callable[[], None],
 ) -> list[tuple[Option, Fitted]]:
     """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not."""
-    tried = []
+    tried: list[tuple[float, Option, Fitted]] = []
     for option in found:
         tick()
         fitted = fits.fit(option.structure, thin, option.start, now.weights, SCREENING_STEPS)
         if math.isfinite(fitted.rms):
-            tried.append((fitted.rms, fits.rms(fitted.errors(held)), option, fitted))
+            tried.append((fits.rms(fitted.errors(held)), option, fitted))
     kept: list[tuple[Option, Fitted]] = []
-    for measure, most in ((1, KEPT), (0, KEPT + ALSO)):
-        for each in sorted(tried, key=lambda one: one[measure]):
-            _, _, option, fitted = each
+    by_held_out, by_fit = sorted(tried, key=lambda one: one[0]), sorted(tried, key=lambda one: one[2].rms)
+    for order, most in ((by_held_out, KEPT), (by_fit, KEPT + ALSO)):
+        for _, option, fitted in order:
             if len(kept) == most:
                 break
             if sum(other.name == option.name for other, _ in kept) < SHAPES and all(o is not option for o, _ in kept):

@@ -1,0 +1,149 @@
+"""Diagnosis: on plants that share nothing with the package, made by `tests/plants`, and on measured records."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from recordings import part_of_file
+
+import hystgen
+from hystgen.diagnosis import floor, selection
+from hystgen.diagnosis.structure import Item
+from hystgen.effects.base import Run
+from tests.plants.__main__ import main as plants
+
+Array = NDArray[np.float64]
+Call = Callable[..., tuple[int, str, str]]
+
+SINGLES = 13
+"""Seeds of the tuning block, one a single effect of the catalogue."""
+
+NONE = 6
+
+
+def made(folder: Path, kind: str, seeds: int) -> list[tuple[Path, dict[str, Any]]]:
+    """Cases of the tuning block with their labels."""
+    assert not plants(["generate", "--block", "tune", "--kind", kind, "--seeds", f"0:{seeds}", "--no-rivals",
+                       "-o", str(folder)])  # fmt: skip
+    labels = sorted((folder / "labels").glob("*.json"))
+    return [(folder / "cases" / path.stem, json.loads(path.read_text())) for path in labels]
+
+
+def diagnosed(case: Path) -> dict[str, Any]:
+    told = json.loads((case / "session.json").read_text())
+    found = hystgen.diagnose(
+        case / "params.yaml",
+        [case / name for name in told["fit"]],
+        holdout=[case / name for name in told["holdout"]],
+        history=told["history"],
+        rest=told["rest"] or 0.0,
+    )
+    content: dict[str, Any] = found.content
+    return content
+
+
+class TestBlindPlants:
+    def test_single_effects(self, tmp_path: Path) -> None:
+        """A bounded sample: most are named, first and alone, and the gap shrinks."""
+        right, alone, wrong = 0, 0, []
+        for case, label in made(tmp_path, "single", SINGLES):
+            content = diagnosed(case)
+            names = [effect["name"] for effect in content["effects"]]
+            (true,) = [effect["name"] for effect in label["effects"]]
+            tied = [set(pair) for pair in content["not_separable"]]
+            right += names[:1] == [true] or {names[0] if names else "", true} in tied
+            alone += names == [true]
+            wrong += [] if names[:1] == [true] else [(true, names)]
+            if names == [true]:
+                assert content["gap"]["after"]["holdout"] < 0.5 * content["gap"]["refitted"]["holdout"]
+                (effect,) = content["effects"]
+                before, after = effect["holdout_before"], effect["holdout_after"]
+                assert effect["share_of_gap"] == pytest.approx((before - after) / content["gap"]["refitted"]["holdout"])
+                assert after == content["gap"]["after"]["holdout"]
+        assert right >= SINGLES - 3, wrong
+        assert alone >= SINGLES - 4, wrong
+
+    def test_nothing_is_named_where_nothing_is_missing(self, tmp_path: Path) -> None:
+        for case, label in made(tmp_path, "none", NONE):
+            content = diagnosed(case)
+            assert content["effects"] == []
+            assert content["gap"]["after"]["holdout"] <= 1.25 * label["noise"]["rms"]
+            assert content["noise_floor"] == pytest.approx(label["noise"]["rms"], rel=0.45)
+
+    def test_the_command(self, tmp_path: Path, run: Call) -> None:
+        (case, label), *_ = made(tmp_path, "single", 1)
+        told = json.loads((case / "session.json").read_text())
+        words = ["diagnose", case / "params.yaml", *(case / name for name in told["fit"]), "-o", tmp_path / "out"]
+        words += [word for name in told["holdout"] for word in ("--holdout", case / name)]
+        words += [f"--history={','.join(map(str, told['history']))}"] if told["history"] else []
+        words += ["--rest", told["rest"] or 0.0]
+        code, out, err = run(*words)
+        assert code == 0, err
+        content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+        assert out.splitlines()[1:] == [str(tmp_path / "out" / name) for name in ("diagnosis.json", "params.yaml")]
+        again = hystgen.load(tmp_path / "out" / "params.yaml")
+        names = [effect["name"] for effect in content["effects"]]
+        assert [effect.name for effect in again.parameters.model.effects] == [
+            name for name in names if name not in ("asymmetry", "saturation")
+        ]
+        first = (tmp_path / "out" / "diagnosis.json").read_bytes()
+        assert run(*words)[0] == 0
+        assert (tmp_path / "out" / "diagnosis.json").read_bytes() == first
+        del label
+
+
+@pytest.mark.data
+def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
+    """Fitted on the sine, held out on the fades: half a percent of range or better."""
+    sine = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
+    fades = part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300)
+    hystgen.identify(sine).write(tmp_path / "stage.yaml")
+    content = hystgen.diagnose(tmp_path / "stage.yaml", sine, holdout=fades).content
+    assert content["verdict"] == "effects_found"
+    assert content["gap"]["refitted"]["holdout"] > 0.011 * content["output_range"]
+    assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
+
+
+class TestNoise:
+    def item(self, y: Array, v: Array, name: str = "made") -> Item:
+        return Item(name, Run(np.arange(len(v)) * 1e-3, v), y, None, float(np.ptp(y)))
+
+    @pytest.mark.parametrize("drive", ["hold", "period", "move"])
+    def test_white_noise(self, drive: str) -> None:
+        rng = np.random.default_rng(3)
+        t = np.arange(6000) * 1e-3
+        v = {
+            "hold": np.interp(t, [0, 1, 3, 4, 6], [0, 50, 50, 10, 10]),
+            "period": 50.0 + 40.0 * np.sin(2 * np.pi * 2.0 * t),
+            "move": 50.0 + 40.0 * np.sin(2 * np.pi * (0.3 * t + 0.05 * t**2)),
+        }[drive]
+        found = floor.noise_floor([self.item(0.1 * v + rng.normal(0.0, 0.02, len(v)), v)])
+        assert found.rms == pytest.approx(0.02, rel=0.12)
+
+    def test_p_value(self) -> None:
+        rng = np.random.default_rng(5)
+        before = [rng.normal(size=2000) for _ in range(3)]
+        same = [rng.normal(size=2000) for _ in range(3)]
+        less = [0.8 * e for e in before]
+        assert selection.difference(before, less) < 1e-6
+        assert selection.difference(before, same) > 1e-3
+        assert selection.difference(less, before) > 0.9
+
+
+def test_no_records_to_judge_by(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="record"):
+        hystgen.diagnose(hystgen.load(_model(tmp_path)), [])
+
+
+def _model(folder: Path) -> Path:
+    path = folder / "stage.yaml"
+    path.write_text(
+        "hystgen: 1\nname: stage\ninput_range: [0, 100]\nmodel: {pi: {thresholds: [0, 10], weights: [1, 0.5]}}\n"
+    )
+    return path
