@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -184,10 +186,8 @@ def test_filters_are_exact_between_corners(effect: Effect) -> None:
     assert np.max(np.abs(ask(v, Run(t, v)) - ask(dense, Run(fine, dense))[np.searchsorted(fine, t)])) < 1e-10
 
 
-@each
+@pytest.mark.parametrize("effect", [e for e in EVERY if e.place is Place.LINEAR], ids=label)
 def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
-    if effect.place is not Place.LINEAR:
-        pytest.skip("not a linear filter")
     t, h = uneven()
     other = np.sin(7 * t)
     run = record(t, h)
@@ -557,7 +557,7 @@ def test_rate_dependence_and_noncongruency_act_together() -> None:
 
 def test_ageing_against_the_distance_travelled() -> None:
     t, v = uneven()
-    distance = np.array([sum(abs(b - a) for a, b in itertools.pairwise(v[: k + 1])) for k in range(len(v))])
+    distance = np.array([sum(abs(v[j] - v[j - 1]) for j in range(1, k + 1)) for k in range(len(v))])
     logarithmic = make("ageing", loss=0.05, travel=3.0).gain(Run(t, v))
     assert np.allclose(logarithmic, 1 - 0.05 * np.log10(1 + distance / 3.0), rtol=1e-12)
     exponential = make("ageing", shape="exponential", loss=0.05, travel=3.0).gain(Run(t, v))
@@ -724,7 +724,7 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
     ):  # fmt: skip
         with pytest.raises(EffectsError, match=said):
             warm.simulate(v, **wrong)
-    static = model_of("    []\n", FILE.replace("effects:\n", "effects:"))
+    static = model_of("", FILE.replace("effects:\n", "effects: []\n"))
     assert np.array_equal(static.simulate(v, t=t), static.simulate(v))
 
 
@@ -746,3 +746,163 @@ def test_loading_a_plain_model_imports_no_effect() -> None:
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert "hystgen.effects" in loaded
     assert not {"hystgen.effects.base", "hystgen.effects.lag", "numpy", "numba", "scipy"} & set(loaded)
+
+
+# Effects of the user's own --------------------------------------------------------------------------------
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "my_effect.py"
+OWN = """from typing import ClassVar, Literal
+import numpy as np
+from hystgen.effects import Effect, Place, Run
+
+class Own(Effect):
+    name: Literal["user:own"]
+    height: float
+    place: ClassVar[Place] = Place.ADDED
+
+    def added(self, run: Run):
+        return self.height * np.ones(len(run.t))
+"""
+
+
+def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
+    path = tmp_path / "stage.yaml"
+    listed = "    - {name: user:neighbour, amplitude: 0.5, period: 2.0}\n    - {name: lag, time_constant: 0.02}\n"
+    path.write_text(FILE + listed)
+    model = hystgen.load(path, effects=[EXAMPLE])
+    t, v = drive()
+    y = model.simulate(v, t=t)
+    assert np.max(np.abs(y - of(make("lag", time_constant=0.02), t, v) - 0.25 * (1 - np.cos(np.pi * t)))) < 1e-12
+    (neighbour,) = effects.load_user_effects(EXAMPLE)
+    about = About((-4.0, 4.0), 8.0, 1e-3, 1.0, 1.0, 50.0, 30.0, (0.0, 1.0))
+    (candidate,) = neighbour.candidates(about)
+    assert np.array_equal(candidate.build(candidate.none).added(Run(t, v)), np.zeros(len(t)))
+    assert effects.load_user_effects(EXAMPLE) == (neighbour,), "loaded once"
+    from hystgen.params import ParameterError, dump_parameters, load_parameters, parse_parameters
+
+    text = dump_parameters(model.parameters)
+    assert parse_parameters(text, "f", [neighbour]) == model.parameters
+    with pytest.raises(ParameterError, match=r"stage.yaml:8:14: .*user:neighbour is defined in no file given; give"):
+        load_parameters(path)
+    path.write_text(FILE + "    - {name: user:neighbour, amplitude: 0.5, perod: 2.0}\n")
+    with pytest.raises(ParameterError) as caught:
+        hystgen.load(path, effects=[EXAMPLE])
+    assert [p.message for p in caught.value.problems] == [
+        "is missing; add `period: 0.0`", "unknown key; did you mean period?",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    (None, r"own.py: cannot be read: No such file or directory"),
+    ("def (", r"own.py:1: SyntaxError: invalid syntax"),
+    ("import nowhere_at_all\n", r"own.py:1: ModuleNotFoundError: No module named 'nowhere_at_all'"),
+    ("x = 1\nraise SystemExit(3)\n", r"own.py:2: SystemExit: 3"),
+    ("x = 1\n", r"own.py: defines no effect; write a class of hystgen.effects.Effect"),
+    (OWN.replace("user:own", "own"), r'own.py: class Own needs a name of its own; write name: Literal["user:my_'),
+    (OWN.replace("Literal[\"user:own\"]", "str"), r"own.py: class Own needs a name of its own"),
+    (OWN.replace("    place: ClassVar[Place] = Place.ADDED\n", ""), r"own.py: class Own needs a place; write place: "),
+    (OWN.replace("def added", "def addd"), r"own.py: class Own has place added, for which it has to define added"),
+    (OWN.replace("height: float", "height: nothing"), r"own.py:7: NameError: name 'nothing' is not defined"),
+])  # fmt: skip
+def test_a_wrong_file_gives_one_message(tmp_path: Path, text: str | None, said: str) -> None:
+    path = tmp_path / "own.py"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(EffectsError, match=re.escape(said)) as caught:
+        effects.load_user_effects(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("answer", "said"), [
+    ("1 / 0", "the effect user:own failed in added: ZeroDivisionError: division by zero"),
+    ("run.v[:-1]", "the effect user:own answered float64 of shape (1999,) in added; numbers of shape (2000,)"),
+    ("'text'", "the effect user:own answered <U4 of shape () in added"),
+])  # fmt: skip
+def test_an_own_effect_that_fails_is_named(tmp_path: Path, answer: str, said: str) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(OWN.replace("self.height * np.ones(len(run.t))", answer))
+    (own,) = effects.load_user_effects(path)
+    t, v = drive()
+    with pytest.raises(EffectsError, match=re.escape(said)):
+        of(own.model_validate({"name": "user:own", "height": 1.0}), t, v)
+
+
+# The command line -----------------------------------------------------------------------------------------
+
+
+def written(folder: Path, name: str, t: Array, v: Array, **further: Array) -> str:
+    path = folder / name
+    columns = {"t": t, "v": v, **further}
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    path.write_text("\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+    return str(path)
+
+
+def test_simulate_runs_a_session_with_history_and_rest(
+    run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "stage.yaml"
+    own = "    - {name: user:neighbour, amplitude: 1, period: 9}\n"
+    path.write_text(FILE + "    - {name: creep, time_constants: [0.5], weights: [0.1]}\n" + own)
+    t, v = drive(300)
+    files = [written(tmp_path, "a.csv", t, v), written(tmp_path, "b.csv", t, -v)]
+    code, _, err = run(
+        "simulate", path, *files, "-o", tmp_path / "out", "--effects", EXAMPLE, "--history", "4,-4", "--rest", 2
+    )
+    assert code == 0, err
+    model = hystgen.load(path, effects=[EXAMPLE])
+    expected = model.chain.simulate([Run(t, v, rest=2.0), Run(t, -v, rest=2.0)], [4.0, -4.0])
+    for name, y in zip("ab", expected, strict=True):
+        found = np.genfromtxt(tmp_path / "out" / f"{name}.csv", delimiter=",", names=True)
+        assert np.array_equal(found["y"], y)
+    assert not np.array_equal(expected[0], model.chain.simulate([Run(t, v)], [4.0, -4.0])[0])
+    code, out, err = run("simulate", path, files[0])
+    assert (code, out) == (2, "")
+    assert "user:neighbour is defined in no file given" in err
+    code, out, err = run("simulate", path, files[0], "--effects", tmp_path / "none.py")
+    assert (code, out, err) == (2, "", f"error: {tmp_path}/none.py: cannot be read: No such file or directory")
+
+
+def test_simulate_warns_outside_the_range_and_needs_its_columns(
+    run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "stage.yaml"
+    path.write_text(FILE + "    - {name: thermal, gain_per_degree: 0.01}\n")
+    t, v = drive(300)
+    v = 3 * v
+    code, _, err = run("simulate", path, written(tmp_path, "a.csv", t, v))
+    assert (code, err) == (2, "error: the effect thermal needs the column temperature, which a record does not have")
+    code, _, err = run("simulate", path, written(tmp_path, "a.csv", t, v, temperature=20 + t))
+    outside = int(np.count_nonzero(np.abs(v) > 4))
+    assert (code, err) == (
+        0, f"warning: a.csv: {outside} of 300 samples lie outside input_range -4 to 4, extrapolated, not limited",
+    )  # fmt: skip
+
+
+def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    path = tmp_path / "stage.yaml"
+    path.write_text(FILE + "    - {name: lag, time_constant: 1}\n    - {name: drift, rate: 1}\n")
+    data = written(tmp_path, "a.csv", *drive(20), u=np.zeros(20))
+    out = tmp_path / "out"
+    for words in (
+        ("emit", path, "-o", out), ("emit", path, "-o", out, "--check"), ("verify", path),
+        ("simulate", path, data, "--operator", "inverse"), ("simulate", path, data, "--arithmetic", "q31"),
+    ):  # fmt: skip
+        code, said, err = run(*words)
+        assert (code, said) == (1, "")
+        refusal = r"\S.* of a model with effects \(lag, drift\) is not supported yet; remove model.effects, .*"
+        assert re.fullmatch(f"{path}: error: {refusal}", err)
+        assert not out.exists()
+
+
+def test_show_lists_effects_and_what_they_mean(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    path = tmp_path / "stage.yaml"
+    rate = "    - {name: rate_dependence, betas: [0.3, 0.2, 0.1]}\n"
+    path.write_text(FILE + "    - {name: lag, time_constant: 0.0125}\n" + rate)
+    code, out, err = run("show", path, "--plot", tmp_path / "stage.svg")
+    assert (code, err) == (0, "")
+    assert "lag\n        time_constant = 0.0125: tau, s; 0 is no lag\n        compensation: a lead with a pole" in out
+    assert "rate_dependence, threshold\n        betas = [0.3, 0.2, 0.1]: " in out
+    assert "thresholds stay in order up to |w'| = 4.5 a second" in out
+    assert "inverse  " not in out
+    assert (tmp_path / "stage.svg").stat().st_size > 1000

@@ -520,8 +520,40 @@ REFUSED = [
     case('offset', H + "model: {pi: {thresholds: [0], weights: [1]}, output_offset: x}\n", [
         '4:61: model.output_offset: must be a number, not the text "x"; write it like 0.45',
     ]),
-    case('effect_known', eff("[{name: creep, time_constants: [1], weights: [1]}]"), [
-        '4:69: model.effects[0].name: the effect creep is not supported by this version yet; remove the entry',
+    case('effect_keys', eff("[{name: lag, time_constnt: 1}, {name: creep, shape: slow}, {name: drift, shape: x, rate: q}]"), [
+        '4:62: model.effects[0].time_constant: is missing; add `time_constant: 0.0125`',
+        '4:74: model.effects[0].time_constnt: unknown key; did you mean time_constant?',
+        '4:113: model.effects[1].shape: must be exponential or logarithmic, not the text "slow"; choose one of them',
+        '4:134: model.effects[2].shape: unknown key; known here are name, rate',
+        '4:150: model.effects[2].rate: must be a number, not the text "q"; write it like 0.45',
+    ]),
+    case('effect_numbers', eff("[{name: lag, time_constant: -1}, {name: resonance, frequency: 0, damping: 11}, {name: drift, rate: .inf}]"), [
+        '4:89: model.effects[0].time_constant: must be at least 0, not -1; correct the number',
+        '4:123: model.effects[1].frequency: must be above 0, not 0; correct the number',
+        '4:135: model.effects[1].damping: must be at most 10, not 11; correct the number',
+        '4:160: model.effects[2].rate: must be a finite number, not inf; write one of at most 1e+30 in size',
+    ]),
+    case('effect_lengths', eff("[{name: creep, time_constants: [1, 2], weights: [1]}, {name: rate_dependence, betas: [1, 2]}, {name: noncongruent, coefficients: [[1], [2]]}]"), [
+        '4:109: model.effects[0].weights: has 1 value for 2 in time_constants; give as many as time_constants',
+        '4:146: model.effects[1].betas: has 2 values for 1 play; give one for each threshold but r_0',
+        '4:190: model.effects[2].coefficients: has 2 lists for 1 play; give one for each threshold but r_0',
+    ]),
+    case('effect_no_plays', H + "model: {pi: {thresholds: [0], weights: [1]}, effects: [{name: rate_dependence, betas: [1]}]}\n", [
+        '4:63: model.effects[0].name: acts on plays with a threshold, and the model has none; remove the entry',
+    ]),
+    case('effect_twice', eff("[{name: lag, time_constant: 1}, {name: resonance, frequency: 1, damping: 1}, {name: lag, time_constant: 2}]"), [
+        '4:145: model.effects[2].name: lag is given twice (first in model.effects[0]); keep one of them',
+    ]),
+    case('effect_spectrum', eff("[{name: creep, shape: logarithmic, per_decade: 0.1, t_min: 2, t_max: 1}]"), [
+        '4:130: model.effects[0].t_max: 1.0 is not above t_min = 2.0; give seconds, t_min < t_max',
+    ]),
+    case('effect_saturation_in_front', eff("[{name: saturation, side: front}]"), [
+        '4:62: model.effects[0].level: is missing; add `level: 50.0` (this is saturation behind the plays, one in front is a stage of model.memoryless)',
+        '4:81: model.effects[0].side: unknown key; known here are name, shape, level (this is saturation behind the plays, one in front is a stage of model.memoryless)',
+    ]),
+    case('effect_empty_values', eff("[{name: lag, time_constant: }, {name: slew_limit, rate: 1, falling_rate: }]"), [
+        '4:74: model.effects[0].time_constant: has no value; write one, or remove it',
+        '4:120: model.effects[1].falling_rate: has no value; write one, or remove it',
     ]),
     case('effect_near', eff("[{name: creap}]"), [
         '4:69: model.effects[0].name: unknown effect creap; did you mean creep?',
@@ -530,7 +562,7 @@ REFUSED = [
         '4:69: model.effects[0].name: unknown effect zzz; known are creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
     ]),
     case('effect_user', eff("[{name: 'user:x'}]"), [
-        '4:69: model.effects[0].name: the effect user:x is not supported by this version yet; remove the entry',
+        '4:69: model.effects[0].name: user:x is defined in no file given; give its file (--effects)',
     ]),
     case('effect_asymmetry', eff("[{name: asymmetry}]"), [
         '4:69: model.effects[0].name: asymmetry is not written here; make it a stage of model.memoryless',
@@ -840,6 +872,15 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
         )
     )
     tanh = st.fixed_dictionaries({"kind": st.just("tanh"), "ascending": branch}, optional={"descending": branch})
+    effect = st.one_of(
+        st.builds(lambda x: {"name": "lag", "time_constant": x}, st.floats(0, 1e30)),
+        st.builds(lambda x, y: {"name": "resonance", "frequency": x, "damping": y}, sizes, st.floats(0, 10, exclude_min=True)),
+        st.builds(lambda x: {"name": "creep", "time_constants": [x, x], "weights": [x, 0]}, sizes),
+        st.builds(lambda x: {"name": "creep", "shape": "logarithmic", "per_decade": x}, weights),
+        st.builds(lambda x: {"name": "slew_limit", "rate": x}, sizes),
+        st.builds(lambda x, y: {"name": "thermal", "source": "self_heating", "time_constant": x, "heating": y}, sizes, weights),
+        st.builds(lambda x, y: {"name": "sensor_nonlinearity", "coefficients": [x, y], "scale": 1}, numbers, numbers),
+    )
     ends = draw(st.lists(numbers, min_size=2, max_size=2, unique=True))
     printable = st.text(st.characters(codec="utf-8").filter(str.isprintable), max_size=40)
     lines = st.text(st.one_of(st.just("\n"), st.characters(codec="utf-8").filter(str.isprintable)), max_size=99)
@@ -854,7 +895,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
             "pi": draw(st.sampled_from([listed, {"density": density}])),
             "memoryless": draw(st.one_of(dead_zone, tanh, st.lists(st.one_of(dead_zone, tanh), max_size=3))),
             "output_offset": draw(numbers),
-            "effects": [],
+            "effects": draw(st.lists(effect, max_size=3, unique_by=lambda e: e["name"])),
         },
         "emit": {
             "operator": draw(st.sampled_from(["inverse", "forward", "both"])),
@@ -892,6 +933,31 @@ def test_dump_text() -> None:
         "      weights: [-1.1, -1.1, 4.8, -1.1, -1.1]\n"
         "emit:\n  # default\n  operator: inverse\n  drive_lsb: 0.005\n  output_lsb: 0.001\n"
     )
+
+
+def test_dump_effects_in_full() -> None:
+    text = eff("[{name: slew_limit, rate: 5}, {name: noncongruent, coefficients: [[0.1, 0]]}, {name: resonance, frequency: 9, damping: 1}, {name: resonance, frequency: 8, damping: 2}]")
+    dumped = dump_parameters(parse_parameters(text))
+    assert dumped.endswith(
+        "  effects:\n    - name: slew_limit\n      rate: 5.0\n      falling_rate: 5.0\n"
+        "    - name: noncongruent\n      shape: play_functions\n      coefficients: [[0.1, 0.0]]\n"
+        "    - name: resonance\n      frequency: 9.0\n      damping: 1.0\n"
+        "    - name: resonance\n      frequency: 8.0\n      damping: 2.0\n"
+    )
+    assert parse_parameters(dumped) == parse_parameters(text)
+    assert '"effects":[{"falling_rate":5.0,"name":"slew_limit","rate":5.0},' in canonical_json(parse_parameters(text))
+    short = eff("[{name: creep, time_constants: [1], weights: [1]}]")
+    long = eff("[{name: creep, shape: exponential, weights: [1.0], time_constants: [1e0]}]")
+    assert parameters_sha256(parse_parameters(short)) == parameters_sha256(parse_parameters(long))
+
+
+def test_effects_as_objects() -> None:
+    parameters = parse_parameters(eff("[{name: creep, time_constants: [1], weights: [1]}, {name: slew_limit, rate: 5}]"))
+    data = {"hystgen": 1, "name": "a", "input_range": [0, 1]}
+    again = make_parameters(
+        {**data, "model": {"pi": {"thresholds": [0, 1], "weights": [1, 1]}, "effects": parameters.model.effects}}
+    )
+    assert again == parameters
 
 
 def test_dump_least_and_wrapping() -> None:
@@ -1007,7 +1073,7 @@ def test_schema_refuses_what_it_can_see() -> None:
         "thresholds_order", "weights_length", "weights_zero", "state_length", "state_one", "density_n_float",
         "density_unreachable", "density_formula", "density_negative", "density_singular", "density_pole",
         "density_not_finite", "density_zero", "density_huge", "table_order", "table_length", "density_state_length",
-        "tanh_sign", "tanh_too_flat",
+        "tanh_sign", "tanh_too_flat", "effect_lengths", "effect_no_plays", "effect_twice", "effect_spectrum", "effect_user",
     }  # fmt: skip
     passed = set()
     for parameter in REFUSED:

@@ -58,8 +58,8 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
     A record whose times lie behind those before it keeps them (session time), unless a rest would not fit between; any
     other starts one median step after the record before and its rest. In rests and in gaps of more than `GAP` steps the
     drive holds, until one step before the next record. The values of `history` are visited before the first record,
-    each on a straight move of `VISIT` seconds from the one before, and held for its rest. Raises ValueError for records
-    of no samples.
+    each on a straight move of `VISIT` seconds from the one before, and the last is held for its rest. Raises ValueError
+    for records of no samples.
     """
     if not runs or any(len(run.t) == 0 for run in runs):
         raise ValueError("a session has records, and each of them samples")

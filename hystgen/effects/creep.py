@@ -66,8 +66,9 @@ class ExponentialCreep(_Creep):
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
         """One weight a time constant."""
         if len(self.weights) != len(self.time_constants):
-            what = f"{len(self.weights)} for {len(self.time_constants)} in time_constants"
-            yield ("weights",), f"has {what}; give as many as time_constants"
+            count = f"{len(self.weights)} value{'' if len(self.weights) == 1 else 's'}"
+            what = f"has {count} for {len(self.time_constants)} in time_constants"
+            yield ("weights",), f"{what}; give as many as time_constants"
 
     def filtered(self, h: Array, run: Run) -> Array:
         """The play sum with its creep."""

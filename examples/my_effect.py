@@ -1,0 +1,48 @@
+"""An effect of one's own: the offset of a heated neighbour that follows a duty cycle.
+
+    hystgen simulate stage_x.yaml drive.csv -o predicted.csv --effects my_effect.py
+
+with, in stage_x.yaml,
+
+    model:
+      effects:
+        - {name: user:neighbour, amplitude: 0.05, period: 120.0}
+
+A class is an effect: a name `user:..`, a place in the chain, the method of that place, and a field for each key of the
+parameter file. `candidates`, which may be left out, tells a fit what to try.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.effects import About, Candidate, Effect, Place, Run
+
+
+class Neighbour(Effect):
+    """Offset `amplitude (1 - cos(2 pi t/period))/2` over session time."""
+
+    name: Literal["user:neighbour"] = Field(description="name of the effect")
+    amplitude: float = Field(description="largest offset, output units", allow_inf_nan=False)
+    period: Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(description="period of the duty cycle, s")
+
+    place: ClassVar[Place] = Place.ADDED
+    compensation: ClassVar[str] = "subtract it from the reference"
+
+    def added(self, run: Run) -> np.ndarray:
+        """The offset at every sample."""
+        return 0.5 * self.amplitude * (1.0 - np.cos(2.0 * np.pi * run.t / self.period))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Amplitude in hundredths of the output range, period from a tenth of the session to ten sessions."""
+        unit, last = 0.01 * about.output_range, np.log10(about.session)
+
+        def build(x: np.ndarray) -> Neighbour:
+            return cls(name="user:neighbour", amplitude=unit * float(x[0]), period=float(10.0 ** x[1]))
+
+        low, high, start = np.array([-20.0, last - 1.0]), np.array([20.0, last + 1.0]), np.array([0.1, last])
+        return [Candidate("user:neighbour", low, high, start, build, none=np.array([0.0, last]))]
