@@ -3,7 +3,8 @@
     python benchmarks/effects.py [--check]
 
 The drive sweeps its whole range at 5 Hz, sampled at 10 kHz, so that half of the plays are always moving. Medians of
-nine runs after compilation. With `--check` the exit code is 1 where one takes 50 ms or more.
+nine runs after compilation. With `--check` the exit code is 1 where one takes 50 ms or more, or 150 ms where plays relax
+with an exponent, which takes many steps of controlled error a sample.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from hystgen import effects
 from hystgen.effects import Chain, Effect, Run
 from hystgen.models import PI, Cascade
 
-SAMPLES, PLAYS, LIMIT = 60_000, 16, 50.0
+SAMPLES, PLAYS = 60_000, 16
+LIMIT, LIMIT_WITH_EXPONENT = 50.0, 150.0
 
 CASES: tuple[dict[str, Any], ...] = (
     {"name": "creep", "time_constants": (0.1, 1.0), "weights": (0.02, 0.01)},
@@ -73,13 +75,14 @@ def main() -> int:
     run = Run(t, v, {"temperature": 20.0 + t})
     thresholds = np.linspace(0.0, 40.0, PLAYS + 1).tolist()
     cascade = Cascade(PI(thresholds, [0.5] + [0.05] * PLAYS), (), 0.0, (0.0, 100.0))
-    rows = [("none", milliseconds(Chain(cascade, []), run))]
+    rows = [("none", milliseconds(Chain(cascade, []), run), LIMIT)]
     for case in CASES:
         word = " ".join(str(case[key]) for key in ("shape", "source", "exponent") if key in case)
-        rows.append((f"{case['name']} {word}".strip(), milliseconds(Chain(cascade, [effect(case)]), run)))
-    for name, spent in rows:
+        limit = LIMIT_WITH_EXPONENT if "exponent" in case else LIMIT
+        rows.append((f"{case['name']} {word}".strip(), milliseconds(Chain(cascade, [effect(case)]), run), limit))
+    for name, spent, _ in rows:
         print(f"{name:38} {spent:6.1f} ms")
-    return int(arguments.check and max(spent for _, spent in rows) >= LIMIT)
+    return int(arguments.check and any(spent >= limit for _, spent, limit in rows))
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
     """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
 
     The linear case is exact. Else steps that are exact for the equation straightened about `e` (exponential
-    Rosenbrock-Euler), as long as the curvature allows, that do not pass the equilibrium.
+    Rosenbrock-Euler), as long as the curvature allows.
     """
     if exponent == 1.0:
         final = e + (speed - e / tau) * duration * mean_decay(duration / tau)
@@ -92,17 +92,14 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if not fall < 1e200:
             return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
-        balance = -1.0
-        if speed > 0.0 and abs(change) > 0.1 * speed:
-            balance = scale * (speed * tau / scale) ** (1.0 / exponent)
-            little = balance * SLIGHT ** (1.0 / exponent)
-            if e < little:  # nothing but the speed counts
-                taken = (little - e) / speed
-                if taken >= left:
-                    return e + speed * left, 0.0
-                e = little
-                left -= taken
-                continue
+        if fall < 0.5 * SLIGHT * speed:  # nothing but the speed counts
+            little = scale * (SLIGHT * speed * tau / scale) ** (1.0 / exponent)
+            taken = (little - e) / speed
+            if taken >= left:
+                return e + speed * left, 0.0
+            e = little
+            left -= taken
+            continue
         if not e > 0.0:
             return 0.0, left if speed < 0.0 else 0.0
         slope = exponent * fall / e
@@ -111,8 +108,6 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         final = e + change * step * mean_decay(part)
         if speed == 0.0:
             final = max(final, 0.0)
-        elif balance >= 0.0:
-            final = min(final, balance) if change > 0.0 else max(final, balance)
         bend = slope / e
         if abs(final - e) > 0.1 * e:
             end = max(final, 0.1 * e)
