@@ -3,8 +3,8 @@
     python benchmarks/effects.py [--check]
 
 The drive sweeps its whole range at 5 Hz, sampled at 10 kHz, so that half of the plays are always moving. Medians of
-nine runs after compilation. With `--check` the exit code is 1 where one takes 50 ms or more, 150 ms where plays relax
-with an exponent, which takes many steps of controlled error a sample.
+nine runs after compilation. With `--check` the exit code is 1 where one takes 50 ms or more, or 150 ms where plays
+relax with an exponent, which takes steps of controlled error.
 """
 
 from __future__ import annotations

@@ -397,7 +397,7 @@ def test_creep_forgets_its_start_as_its_transients_do() -> None:
 def test_resonance_against_scipy(frequency: float, damping: float) -> None:
     t, h = drive()
     w = 2 * np.pi * frequency
-    system = ([0.0, 0.0, w * w], [1.0, 2 * damping * w, w * w])
+    system = ([w * w], [1.0, 2 * damping * w, w * w])
     expected = h[0] + signal.lsim(system, h - h[0], t)[1]
     found = make("resonance", frequency=frequency, damping=damping).filtered(h, Run(t, h))
     assert np.max(np.abs(found - expected)) < 1e-8

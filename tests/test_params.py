@@ -594,6 +594,8 @@ REFUSED = [
 ACCEPTED = {
     "contract": CONTRACT,
     "least": H + M,
+    "effects": eff("[{name: creep, time_constants: [1], weights: [0]}, {name: saturation, shape: hard, level: 2}, {name: drift, rate: -1e-3}]"),
+    "effect_shapes": eff("[{name: creep, shape: logarithmic, per_decade: 0.1}, {name: thermal, source: logged}, {name: lag, time_constant: 0}]"),
     "only_p0": pi("thresholds: [0], weights: [1]"),
     "p0_zero": pi("thresholds: [0, 1], weights: [0, 1]"),
     "bom": "\ufeff" + H + M,
