@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
+from hystgen.effects import chain
 from hystgen.effects.base import Candidate, Effect, Run
 from hystgen.identification import faults, pi, prepared, thresholds
 from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh
@@ -104,6 +106,7 @@ def prepare(
             notes.append(faults.told(course.name, wrong, faults.NOT_COMPARED))
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
+    to_fit, held = _in_session(to_fit, held)
     if not held:
         to_fit, held = _ends(to_fit)
         notes.append(f"no record was given as held out: the last {100 * SET_ASIDE:g} % of each is set aside")
@@ -127,6 +130,20 @@ def _item(course: Course, record: Record, rest: float) -> Item:
     y[: course.first] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
     return Item(course.name, run, y, course.history, course.output_range)
+
+
+def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[Item]]:
+    """The items with the session around them, where their times tell that they are of one."""
+    items = sorted([*to_fit, *held], key=lambda item: float(item.run.t[0]))
+    apart = all(a.run.t[-1] < b.run.t[0] for a, b in itertools.pairwise(items))
+    if len(items) < 2 or not apart:
+        return to_fit, held
+    whole = chain.join([replace(item.run, rest=0.0) for item in items])
+    parts = {id(item): part for item, part in zip(items, whole.parts, strict=True)}
+    first, second = (
+        [replace(item, session=whole.run, part=parts[id(item)]) for item in group] for group in (to_fit, held)
+    )
+    return first, second
 
 
 def _ends(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:

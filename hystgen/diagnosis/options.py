@@ -27,7 +27,7 @@ class Option:
 
     label: str
     structure: Structure
-    start: Array
+    starts: tuple[Array, ...]
     name: str
     front: bool = False
 
@@ -68,7 +68,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
         ]
         for label, front in fronts:
             start = np.concatenate([front.straight, now.shape[len(front_shape) :]])
-            found.append(Option(label, replace(structure, front=front), start, "asymmetry", True))
+            found.append(Option(label, replace(structure, front=front), (start,), "asymmetry", True))
     kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
     kinds += [(f"user:{kind.__name__}", kind) for kind in user]
     for name, kind in kinds:
@@ -76,8 +76,8 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
             continue
         for candidate in kind.candidates(known):
             part = Part(name, candidate)
-            start = np.concatenate([now.shape, candidate.start])
-            found.append(Option(candidate.label, replace(structure, parts=(*structure.parts, part)), start, name))
+            starts = tuple(np.concatenate([now.shape, one]) for one in (candidate.start, *candidate.others))
+            found.append(Option(candidate.label, replace(structure, parts=(*structure.parts, part)), starts, name))
     return found
 
 

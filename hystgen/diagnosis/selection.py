@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 SCREENED = 12_000
 """Samples compared while the many shapes are told apart."""
 
-SCREENING_STEPS = 4
+FIRST_STEPS, SCREENING_STEPS = 2, 4
+"""Steps of a search from each start, and in all from the best one, while the shapes are told apart."""
 
 KEPT, ALSO = 5, 2
 """Shapes that are followed up after the screening: the best on held-out records, and others that fit best."""
@@ -149,7 +150,9 @@ def _screened(
     tried: list[tuple[float, Option, Fitted]] = []
     for option in found:
         tick()
-        fitted = fits.fit(option.structure, thin, option.start, now.weights, SCREENING_STEPS)
+        begun = [fits.fit(option.structure, thin, start, now.weights, FIRST_STEPS) for start in option.starts]
+        best = min(begun, key=lambda each: each.rms)
+        fitted = fits.fit(option.structure, thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
         if math.isfinite(fitted.rms):
             tried.append((fits.rms(fitted.errors(held)), option, fitted))
     kept: list[tuple[Option, Fitted]] = []

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Item:
-    """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown."""
+    """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
+
+    `session`: all records on one time axis, where they are of one session, and `part` what of it is this record.
+    """
 
     name: str
     run: Run
     y: Array
     history: tuple[float, ...] | None
     output_range: float
+    session: Run | None = None
+    part: slice = field(default_factory=lambda: slice(None))
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -110,6 +115,7 @@ class Actuator:
     thresholds: Array
     stages: tuple[Stage, ...]
     effects: tuple[Effect, ...]
+    gains: dict[tuple[int, int], tuple[Array, Array]] = field(default_factory=dict, compare=False, repr=False)
 
     def at(self, place: Place) -> list[Effect]:
         """The effects at one place of the chain, in its order."""
@@ -130,26 +136,35 @@ class Actuator:
         start = reduction.start_states(w, course.history, self.thresholds)
         memory = self.at(Place.PLAYS)
         plays = operators.plays(w, self.thresholds, start)
-        if memory:
-            plays = memory[0].plays(w, run, self.thresholds, start)
+        for k, effect in enumerate(memory):
+            plays = effect.bent(plays, self.thresholds) if k else effect.plays(w, run, self.thresholds, start)
         rows = plays if p is None else (p @ plays)[None, :]
         constant = np.zeros(len(w))
         linear = self.at(Place.LINEAR)
         for effect in linear:
             if effect.order == 0:
                 rows = effect.filtered(rows, run)
+        whole = item.session or run
         for effect in self.at(Place.GAIN):
-            gain = effect.gain(run)
-            rows, constant = rows * gain, constant * gain + effect.offset(run)
+            if (id(effect), id(whole)) not in self.gains:
+                self.gains[id(effect), id(whole)] = effect.gain(whole), effect.offset(whole)
+            gain, offset = (values[item.part] for values in self.gains[id(effect), id(whole)])
+            rows, constant = rows * gain, constant * gain + offset
         for effect in linear:
             if effect.order > 0:
                 rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
         return rows, constant
 
-    def mapped(self, h: Array, item: Item) -> Array:
-        """The output map and what comes after it."""
-        for effect in self.at(Place.OUTPUT):
-            h = effect.mapped(h, item.run)
+    def mapped(self, h: Array, level: float, item: Item) -> Array:
+        """The output behind its maps, a limit in front of the offset and a sensor behind it; the offset is `level`."""
+        maps = self.at(Place.OUTPUT)
+        for effect in maps:
+            if effect.order == 0:
+                h = effect.mapped(h, item.run)
+        h = h + level
+        for effect in maps:
+            if effect.order > 0:
+                h = effect.mapped(h, item.run)
         return h
 
     def added(self, item: Item) -> Array:
@@ -180,7 +195,7 @@ class Actuator:
         h = rows[0] + constant
         if self.bends:
             level = float(np.nanmean(item.y - h))
-            h = self.mapped(h + level, item)
+            h = self.mapped(h, level, item)
         e = item.y - h - self.added(item)
         known = np.isfinite(e)
         free = (self.nuisances(item) if free is None else free)[:, known].T
@@ -211,9 +226,9 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         target = item.y - constant
         if here.bends:
             level = float(np.nanmean(item.y - h))
-            bent = here.mapped(h + level, item)
+            bent = here.mapped(h, level, item)
             step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
-            slope = (here.mapped(h + level + step, item) - bent) / step
+            slope = (here.mapped(h + step, level, item) - bent) / step
             target = item.y - bent + slope * (p @ rows)
             h = bent
         added = here.added(item)
@@ -223,7 +238,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
             row, const = other.columns(item, p)
             moved = row[0] + const
             if other.bends:
-                moved = other.mapped(moved + level, item)
+                moved = other.mapped(moved, level, item)
             differences[j] = (moved + other.added(item) - h - added) / DIFFERENCE
         free = here.nuisances(item)
         table = np.concatenate([free, rows * slope, differences, target[None, :]])[:, known].T

@@ -34,7 +34,8 @@ class _Ageing(Effect):
             )
 
         start = np.array([0.1, -0.7])
-        return Candidate(label, np.array([-5.0, -3.0]), np.array([5.0, 1.0]), start, build, np.array([0.0, -0.7]))
+        none, others = np.array([0.0, -0.7]), (np.array([0.1, -2.0]), np.array([0.1, 0.5]))
+        return Candidate(label, np.array([-5.0, -3.0]), np.array([5.0, 1.0]), start, build, none, others)
 
 
 class LogarithmicAgeing(_Ageing):

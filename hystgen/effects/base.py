@@ -73,7 +73,8 @@ class About:
 class Candidate:
     """One shape of an effect to try in a fit: free numbers within bounds, and the effect that they make.
 
-    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens.
+    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens;
+    `others`: further starts, where the error may have several minima.
     """
 
     label: str
@@ -82,6 +83,7 @@ class Candidate:
     start: Array
     build: Callable[[Array], Effect]
     none: Array | None = None
+    others: tuple[Array, ...] = ()
 
 
 class Effect(BaseModel):

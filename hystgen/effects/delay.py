@@ -34,7 +34,8 @@ class Delay(Effect):
         low, high, start, value = from_zero(0.1 * about.sample_time, 0.1 * about.duration, about.sample_time)
         return [
             Candidate(
-                "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), none=np.zeros(1)
+                "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), np.zeros(1),
+                (low + 0.5 * (high - low),),
             )
         ]
 

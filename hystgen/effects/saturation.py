@@ -10,6 +10,9 @@ from pydantic import Field
 from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
 from hystgen.param_models import Positive
 
+LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
+"""Starts within the output: a limit beyond what was measured does nothing, and neither does a small change of it."""
+
 
 class _Saturation(Effect):
     name: Literal["saturation"] = Field(description="name of the effect")
@@ -25,7 +28,7 @@ class _Saturation(Effect):
             shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
             return cls(name="saturation", shape=shape, level=about.output_range * float(10.0 ** x[0]))  # type: ignore[call-arg]
 
-        return Candidate(label, np.array([-1.0]), np.array([high]), np.array([0.3]), build, none=np.array([high]))
+        return Candidate(label, np.array([-1.0]), np.array([high]), np.array([0.3]), build, np.array([high]), LEVELS)
 
 
 class TanhSaturation(_Saturation):
