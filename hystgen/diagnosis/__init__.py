@@ -132,7 +132,9 @@ def diagnose(
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
-        content = _content(model.parameters, ready, noise, found, as_given)
+        everything = [*ready.to_fit, *ready.held]
+        odd = leftovers.scales(everything, [first[0].columns(item, first[1])[0][0] for item in everything])
+        content = _content(model.parameters, ready, noise, found, as_given, odd)
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
     return Diagnosis(content, _extended(model.parameters, found.fitted, ready), tuple(notes))
 
@@ -142,12 +144,17 @@ STEPS = 120
 
 
 def _content(
-    parameters: Parameters, ready: believed.Prepared, noise: Floor, found: Outcome, as_given: Sequence[float]
+    parameters: Parameters,
+    ready: believed.Prepared,
+    noise: Floor,
+    found: Outcome,
+    as_given: Sequence[float],
+    odd: list[dict[str, Any]],
 ) -> dict[str, Any]:
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
     refitted, last = ([structure.rms(errors) for errors in each] for each in (before, after))
-    left = leftovers.disturbances([*ready.to_fit, *ready.held], [*after[0], *after[1]])
+    left = [*odd, *leftovers.disturbances([*ready.to_fit, *ready.held], [*after[0], *after[1]])]
     share, goes_with = leftovers.structure(ready.held, after[1])
     ratio = last[1] / noise.rms if noise.rms else float("inf")
     if ratio > FAR_ABOVE or (share > STRUCTURE and ratio > ABOVE_FLOOR):
@@ -180,7 +187,7 @@ def _content(
             "after": {"fit": last[0], "holdout": last[1]},
         },
         "effects": effects,
-        "unexplained": left,
+        "unexplained": [*left, *ready.repaired],
         "where": where.places([*ready.to_fit, *ready.held], [*before[0], *before[1]], noise.rms),
         "not_separable": rivals,
         "advice": [ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals],

@@ -6,10 +6,12 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.diagnosis import leftovers
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import chain
 from hystgen.effects.base import Candidate, Effect, Run
@@ -77,11 +79,15 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
 
 @dataclass(frozen=True)
 class Prepared:
-    """Records to fit and held-out ones, what was done to them, and the drive range of the former."""
+    """Records to fit and held-out ones, what was done to them, and the drive range of the former.
+
+    `repaired`: isolated samples that were left out or bridged, as `diagnosis.json` lists them.
+    """
 
     to_fit: list[Item]
     held: list[Item]
     notes: list[str]
+    repaired: list[dict[str, Any]]
     drive: tuple[float, float]
     thresholds: Array
 
@@ -98,12 +104,20 @@ def prepare(
         holdout = list(records)[2::3]
         records = [record for k, record in enumerate(records) if k % 3 != 2]
         notes.append("no record was given as held out: " + ", ".join(record.name for record in holdout) + " set aside")
-    fit_courses, held_courses = ([_course(record, history, notes) for record in group] for group in (records, holdout))
+    fit_courses, held_courses = (
+        [prepared.bridged(pi.course(record, history, 0), 0) for record in group] for group in (records, holdout)
+    )
+    repaired = _without_rails(fit_courses) + _without_rails(held_courses)
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0, 0)
-    for course in (*fit_courses, *held_courses):
-        wrong = course.first + np.flatnonzero(np.isnan(course.y[course.first :]))
-        if len(wrong):
-            notes.append(faults.told(course.name, wrong, faults.NOT_COMPARED))
+    for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
+        for channel, wrong, what in (
+            ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),
+            ("y", _outliers(course, record), faults.NOT_COMPARED),
+        ):
+            if len(wrong):
+                notes.append(faults.told(course.name, wrong, what))
+                place = {"record": course.name, "channel": channel, "first": float(record.t[wrong[0]])}
+                repaired.append({"kind": "isolated_samples", **place, "count": len(wrong)})
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
@@ -114,15 +128,7 @@ def prepare(
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
     places = np.array(thresholds.dense(reach, samples).thresholds)
-    return Prepared(to_fit, held, notes, drive, places)
-
-
-def _course(record: Record, history: tuple[float, ...] | None, notes: list[str]) -> Course:
-    course = prepared.bridged(pi.course(record, history, 0), 0)
-    spikes = np.flatnonzero(course.v != record.v)
-    if len(spikes):
-        notes.append(faults.told(course.name, spikes, faults.BRIDGED))
-    return course
+    return Prepared(to_fit, held, notes, repaired, drive, places)
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:
@@ -130,6 +136,27 @@ def _item(course: Course, record: Record, rest: float) -> Item:
     y[: course.first] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
     return Item(course.name, run, y, course.history, course.output_range)
+
+
+def _without_rails(courses: list[Course]) -> list[dict[str, Any]]:
+    """Leave out the samples at which the converter stood at its end; what was left out."""
+    told = []
+    for k, course in enumerate(courses):
+        for name, level in leftovers.rails(course.y, course.v):
+            at = course.y == level
+            courses[k] = replace(courses[k], y=np.where(at, np.nan, courses[k].y))
+            what = {"kind": "saturated", "record": course.name, "end": name, "level": level}
+            told.append({**what, "count": int(np.count_nonzero(at))})
+    return told
+
+
+def _outliers(course: Course, record: Record) -> NDArray[np.intp]:
+    """Compared samples whose output was left out as isolated: in runs shorter than those at a rail."""
+    assert record.y is not None
+    missing = np.isnan(course.y)
+    missing[: course.first] = False
+    levels = [level for _, level in leftovers.rails(np.asarray(record.y), course.v)]
+    return np.flatnonzero(missing & ~np.isin(record.y, levels))
 
 
 def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[Item]]:

@@ -31,17 +31,37 @@ HELD = 4
 RAIL = 12
 """Fewest samples at the very end of the output's range that count as saturated."""
 
+MULTIPLE = 3.0
+"""An output so many times what the believed model predicts is in other units, or another channel."""
+
 WORTH = 0.1
 """Least share of the residual's variance for a variable that is told to go with it."""
 
 
 def disturbances(items: Sequence[Item], errors: Sequence[Array]) -> list[dict[str, Any]]:
-    """Lines, jumps, isolated samples, held samples and rails in the records."""
+    """Lines and held samples in the records."""
     told: list[dict[str, Any]] = []
     for item, error in zip(items, errors, strict=True):
         told += _lines(item, error)
         told += _held(item)
-        told += _rail(item)
+    return told
+
+
+def scales(items: Sequence[Item], predicted: Sequence[Array]) -> list[dict[str, Any]]:
+    """Records whose output is a multiple of what the believed model predicts: wrong units, or swapped channels."""
+    factors = []
+    for item, y in zip(items, predicted, strict=True):
+        known = item.known
+        x = y[known] - np.mean(y[known])
+        power = float(x @ x)
+        factors.append(float(x @ item.y[known]) / power if power > 0.0 else 1.0)
+    usual = float(np.median(factors))
+    told: list[dict[str, Any]] = []
+    if not 1.0 / MULTIPLE < usual < MULTIPLE:
+        told.append({"kind": "scale", "record": "all", "factor": usual})
+    for item, factor in zip(items, factors, strict=True):
+        if not 1.0 / MULTIPLE < factor / usual < MULTIPLE:
+            told.append({"kind": "scale", "record": item.name, "factor": factor})
     return told
 
 
@@ -96,21 +116,18 @@ def _held(item: Item) -> list[dict[str, Any]]:
     return [{"kind": "held_samples", "record": item.name, "count": len(runs), "first": float(item.run.t[runs[0][0]])}]
 
 
-def _rail(item: Item) -> list[dict[str, Any]]:
-    """Many samples exactly at the largest or least output."""
-    known = item.y[np.isfinite(item.y)]
-    told = []
-    for end, name in ((float(known.max()), "largest"), (float(known.min()), "least")):
-        at = item.y == end
+def rails(y: Array, v: Array) -> list[tuple[str, float]]:
+    """Ends of the output, with their level, at which many samples in a row are equal while the drive moves on."""
+    known = y[np.isfinite(y)]
+    found = []
+    for name, end in (("largest", float(known.max())), ("least", float(known.min()))):
+        at = y == end
         edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(np.int8)))
-        longest = max((b - a for a, b in zip(edges[::2], edges[1::2], strict=True)), default=0)
-        grain = np.unique(known)
-        steps = np.diff(grain)
-        inner = float(np.median(steps)) if len(steps) else 0.0
-        standing = longest >= RAIL and float(np.ptp(item.run.v[at])) > 0.01 * float(np.ptp(item.run.v))
-        if standing and inner > 0.0:
-            told.append({"kind": "saturated", "record": item.name, "end": name, "level": end, "count": int(at.sum())})
-    return told
+        longest = max(zip(edges[::2], edges[1::2], strict=True), key=lambda run: int(run[1] - run[0]))
+        moved = float(np.ptp(v[longest[0] : longest[1]]))
+        if longest[1] - longest[0] >= RAIL and moved > 0.01 * float(np.ptp(v)):
+            found.append((name, end))
+    return found
 
 
 def structure(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, Mapping[str, float]]:
