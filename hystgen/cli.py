@@ -416,8 +416,11 @@ def diagnose(
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
     """
     from hystgen import diagnosis
+    from hystgen.report import drawing
 
     model = _load(params)
+    _shown(params, drawing.require)
+    _keep([Path(output) / name for name in ("diagnosis.json", "report.html", "params.yaml")], (params, *data, *holdout))
     visited = _numbers(history)
     how = _reading(**reading)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,7 @@ class TestBlindPlants:
             assert content["noise_floor"] == pytest.approx(label["noise"]["rms"], rel=0.45)
 
     def test_the_command(self, tmp_path: Path, run: Call) -> None:
-        (case, label), *_ = made(tmp_path, "single", 1)
+        (case, _), *_ = made(tmp_path, "single", 1)
         told = json.loads((case / "session.json").read_text())
         words = ["diagnose", case / "params.yaml", *(case / name for name in told["fit"]), "-o", tmp_path / "out"]
         words += [word for name in told["holdout"] for word in ("--holdout", case / name)]
@@ -86,16 +87,20 @@ class TestBlindPlants:
         code, out, err = run(*words)
         assert code == 0, err
         content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
-        assert out.splitlines()[1:] == [str(tmp_path / "out" / name) for name in ("diagnosis.json", "params.yaml")]
+        names = ("diagnosis.json", "report.html", "params.yaml")
+        assert out.splitlines()[1:] == [str(tmp_path / "out" / name) for name in names]
         again = hystgen.load(tmp_path / "out" / "params.yaml")
         names = [effect["name"] for effect in content["effects"]]
         assert [effect.name for effect in again.parameters.model.effects] == [
             name for name in names if name not in ("asymmetry", "saturation")
         ]
-        first = (tmp_path / "out" / "diagnosis.json").read_bytes()
+        shown = (tmp_path / "out" / "report.html").read_text()
+        assert shown.count("<img src=\"data:image/svg+xml;base64,") == 3
+        assert "http" not in re.sub(r"base64,[^\"]*", "", shown)
+        assert all(name in shown for name in names)
+        first = [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())]
         assert run(*words)[0] == 0
-        assert (tmp_path / "out" / "diagnosis.json").read_bytes() == first
-        del label
+        assert [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())] == first
 
 
 @pytest.mark.data

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from hystgen.identification import stage_content, threads
 from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
 from hystgen.identification.thresholds import rounded
-from hystgen.records import Record, read_records, write_atomically
+from hystgen.records import Record, read_records
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -45,12 +45,29 @@ FAR_ABOVE = 1.6
 
 
 @dataclass(frozen=True)
+class Signals:
+    """A record with the errors of the refitted model and of the one with the effects; NaN where not compared."""
+
+    name: str
+    held_out: bool
+    t: Array
+    v: Array
+    y: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True)
 class Diagnosis:
-    """What was found: `content` as `diagnosis.json` has it, `parameters` with the effects added."""
+    """What was found: `content` as `diagnosis.json` has it, `parameters` with the effects added.
+
+    `notes`: what was done to the records, one sentence each; `signals`: the records with their errors.
+    """
 
     content: dict[str, Any]
     parameters: Parameters
     notes: tuple[str, ...]
+    signals: tuple[Signals, ...] = field(compare=False)
 
     @property
     def verdict(self) -> str:
@@ -73,18 +90,17 @@ class Diagnosis:
         return json.dumps(self.content, indent=2, allow_nan=False) + "\n"
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write `diagnosis.json` and `params.yaml` into a folder; the paths."""
-        from hystgen.params import dump_parameters
+        """Write `diagnosis.json`, `report.html` and `params.yaml` into a folder, all or nothing; the paths.
 
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        texts = {
-            "diagnosis.json": self.to_json(),
-            "params.yaml": dump_parameters(self.parameters, header=f"Diagnosed by hystgen. {self.sentence()}"),
-        }
-        for name, text in texts.items():
-            write_atomically(target / name, text)
-        return [target / name for name in texts]
+        Raises PlotError without matplotlib.
+        """
+        from hystgen.emission import files
+        from hystgen.params import dump_parameters
+        from hystgen.report import diagnosis as report
+
+        text = dump_parameters(self.parameters, header=f"Diagnosed by hystgen. {self.sentence()}")
+        made = {"diagnosis.json": self.to_json(), "report.html": report.html(self, text), "params.yaml": text}
+        return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made.items()})
 
 
 def diagnose(
@@ -136,7 +152,15 @@ def diagnose(
         odd = leftovers.scales(everything, [first[0].columns(item, first[1])[0][0] for item in everything])
         content = _content(model.parameters, ready, noise, found, as_given, odd)
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
-    return Diagnosis(content, _extended(model.parameters, found.fitted, ready), tuple(notes))
+    return Diagnosis(content, _extended(model.parameters, found.fitted, ready), tuple(notes), _signals(ready, found))
+
+
+def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
+    made = []
+    for held_out, group in ((False, ready.to_fit), (True, ready.held)):
+        for item, before, after in zip(group, found.refitted.errors(group), found.fitted.errors(group), strict=True):
+            made.append(Signals(item.name, held_out, item.run.t, item.run.v, item.y, before, after))
+    return tuple(made)
 
 
 STEPS = 120

@@ -34,6 +34,9 @@ RAIL = 12
 MULTIPLE = 3.0
 """An output so many times what the believed model predicts is in other units, or another channel."""
 
+MOVES = 0.3
+"""Only records whose drive moves over this share of the widest one's range tell of their scale."""
+
 WORTH = 0.1
 """Least share of the residual's variance for a variable that is told to go with it."""
 
@@ -49,8 +52,10 @@ def disturbances(items: Sequence[Item], errors: Sequence[Array]) -> list[dict[st
 
 def scales(items: Sequence[Item], predicted: Sequence[Array]) -> list[dict[str, Any]]:
     """Records whose output is a multiple of what the believed model predicts: wrong units, or swapped channels."""
-    factors = []
-    for item, y in zip(items, predicted, strict=True):
+    factors: list[float] = []
+    widest = max(float(np.ptp(item.run.v)) for item in items)
+    wide = [(item, y) for item, y in zip(items, predicted, strict=True) if np.ptp(item.run.v) > MOVES * widest]
+    for item, y in wide:
         known = item.known
         x = y[known] - np.mean(y[known])
         power = float(x @ x)
@@ -59,7 +64,7 @@ def scales(items: Sequence[Item], predicted: Sequence[Array]) -> list[dict[str, 
     told: list[dict[str, Any]] = []
     if not 1.0 / MULTIPLE < usual < MULTIPLE:
         told.append({"kind": "scale", "record": "all", "factor": usual})
-    for item, factor in zip(items, factors, strict=True):
+    for (item, _), factor in zip(wide, factors, strict=True):
         if not 1.0 / MULTIPLE < factor / usual < MULTIPLE:
             told.append({"kind": "scale", "record": item.name, "factor": factor})
     return told

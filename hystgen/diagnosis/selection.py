@@ -108,18 +108,20 @@ def select(
     rankings: list[tuple[Tried, ...]] = []
     gap = fits.rms(now.errors(held))
     for _ in range(ROUNDS):
-        if fits.rms(now.errors(held)) <= AT_FLOOR * noise:
+        before = fits.rms(now.errors(held))
+        if before <= AT_FLOOR * noise:
             break
         tried = _followed_up(now, _screened(now, thin, thin_held, options(now, known, user), tick), to_fit, held, tick)
         if not tried:
             break
         rankings.append(tuple(tried))
         best = _simplest(tried)
+        # what the effect leaves free in a record must not count as its merit
         errors = now.errors(held, best.fitted)
-        before = fits.rms(errors)
+        equal = fits.rms(errors)
         p_value = difference(errors, best.errors)
-        removed = math.sqrt(max(before**2 - best.held_out**2, 0.0))
-        if p_value > SURE or removed < ABOVE_NOISE * max(noise, best.held_out) or before - best.held_out < SHARE * gap:
+        removed = math.sqrt(max(equal**2 - best.held_out**2, 0.0))
+        if p_value > SURE or removed < ABOVE_NOISE * max(noise, best.held_out) or equal - best.held_out < SHARE * gap:
             break
         margin = ALIKE * best.held_out
         rivals = [t.name for t in tried if t.name != best.name and t.held_out <= best.held_out + margin]
