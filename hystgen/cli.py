@@ -406,26 +406,31 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
 @click.argument("data", nargs=-1, required=True, type=click.Path())
 @click.option("-o", "output", required=True, type=click.Path(file_okay=False), help="folder for what is found")
 @click.option("--holdout", multiple=True, type=click.Path(), help="record that judges and takes no part in the fits")
+@effects_option
 @record_options
 def diagnose(
-    params: str, data: tuple[str, ...], output: str, holdout: tuple[str, ...], history: str | None, rest: float,
-    **reading: Any,
+    params: str, data: tuple[str, ...], output: str, holdout: tuple[str, ...], effects: tuple[str, ...],
+    history: str | None, rest: float, **reading: Any,
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
     """
     from hystgen import diagnosis
+    from hystgen.effects import load_user_effects
     from hystgen.report import drawing
 
-    model = _load(params)
+    model = _load(params, effects)
     _shown(params, drawing.require)
     _keep([Path(output) / name for name in ("diagnosis.json", "report.html", "params.yaml")], (params, *data, *holdout))
     visited = _numbers(history)
     how = _reading(**reading)
 
     def run() -> None:
-        found = diagnosis.diagnose(model, list(data), holdout=list(holdout), history=visited, rest=rest, **how)
+        own = [kind for path in effects for kind in load_user_effects(path)]
+        found = diagnosis.diagnose(
+            model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
+        )
         for note in found.notes:
             click.echo(f"warning: {note}", err=True)
         click.echo(found.sentence())

@@ -152,7 +152,8 @@ def diagnose(
         odd = leftovers.scales(everything, [first[0].columns(item, first[1])[0][0] for item in everything])
         content = _content(model.parameters, ready, noise, found, as_given, odd)
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
-    return Diagnosis(content, _extended(model.parameters, found.fitted, ready), tuple(notes), _signals(ready, found))
+    extended = _extended(model.parameters, found.fitted, ready, effects)
+    return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
@@ -255,7 +256,9 @@ def _entry(effect: Effect) -> dict[str, Any]:
     return {key: value for key, value in effect.model_dump(exclude_defaults=True).items() if key != "name"}
 
 
-def _extended(parameters: Parameters, fitted: Fitted, ready: believed.Prepared) -> Parameters:
+def _extended(
+    parameters: Parameters, fitted: Fitted, ready: believed.Prepared, user: Sequence[type[Effect]]
+) -> Parameters:
     """The parameter file with the model refitted and the effects added."""
     from hystgen.params import make_parameters
 
@@ -278,7 +281,7 @@ def _extended(parameters: Parameters, fitted: Fitted, ready: believed.Prepared) 
             "effects": [{"name": effect.name, **_entry(effect)} for effect in actuator.effects],
         },
     }
-    return make_parameters(content)
+    return make_parameters(content, user_effects=user)
 
 
 def _offset(fitted: Fitted, item: Item) -> float:

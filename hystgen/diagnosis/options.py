@@ -70,7 +70,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
             start = np.concatenate([front.straight, now.shape[len(front_shape) :]])
             found.append(Option(label, replace(structure, front=front), (start,), "asymmetry", True))
     kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
-    kinds += [(f"user:{kind.__name__}", kind) for kind in user]
+    kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
     for name, kind in kinds:
         if (name in there and not kind.repeatable) or not known.columns.issuperset(kind.columns):
             continue
