@@ -59,13 +59,13 @@ PLACES = [
     ),
     # a play that follows has been held by a corner
     (
-        r"    return left < depth && corner\[left\]\.end == k \? &corner\[left\] : &corner\[left - 1\];",
+        r"    return left == 0 \|\| \(left < depth && corner\[left\]\.end == k\) \? &corner\[left\] : "
+        r"&corner\[left - 1\];",
         1,
         r"""    GRANTED(depth <= PLAYS);
-    if (left < depth && corner[left].end == k) {
+    if (left == 0 || (left < depth && corner[left].end == k)) {
         return &corner[left];
     }
-    GRANTED(left > 0);
     return &corner[left - 1];""",
     ),
     # bisection is looked at for each number of corners on its own

@@ -72,14 +72,14 @@ def loose_clamp(text: str) -> str:
 
 def beyond_the_range(text: str) -> str:
     """A drive goes out that is more than what was solved and clamped."""
-    found = text.replace("self->stepped = true;\n    return v;", "self->stepped = true;\n    return 1.01f * v;")
+    found = text.replace("    return v;\n}", "    return 2.0f * v;\n}")
     assert found != text
     return found
 
 
 def out_of_bounds(text: str) -> str:
     """Corners two slots beyond the one that is free."""
-    found = text.replace("&corner[m->here.depth]", "&corner[m->here.depth + 2]")
+    found = text.replace("plain_write_corner(t, &corner[depth]", "plain_write_corner(t, &corner[depth + 2]")
     assert found != text
     return found
 
