@@ -139,7 +139,8 @@ def identify(
         for item in compared
         if item.used < SHORTEST
     ]
-    told += [text for each in errors if (text := remarks.about_start(each, float(fitted.solution.thresholds[-1])))]
+    if not loading_curve:  # all of one depends on the start
+        told += [text for each in errors if (text := remarks.about_start(each, float(fitted.solution.thresholds[-1])))]
     told += remarks.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
     with threads.alone():
         sure = uncertainty.intervals(fitted, compared, errors, held_errors)

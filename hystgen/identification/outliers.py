@@ -22,6 +22,10 @@ FEWEST = 8
 SAME = 1e-6
 """Relative spread below which units are alike for every purpose: written digits and solvers differ by less."""
 
+MATTERS, MATTERS_ERROR = 0.05, 0.2
+"""An outlier differs from the median by at least this share of it, an error by at least that much more: units of a
+tight fleet score high for differences that nobody would act on."""
+
 LEAST_ERROR = 1e-6
 """Held-out errors below this, in %, are rounding of the written digits."""
 
@@ -75,8 +79,10 @@ def find(units: Mapping[str, Mapping[str, object]]) -> dict[str, str] | None:
         values = {name: value for name, figures in units.items() if (value := judged.value(figures)) is not None}
         if len(values) < FEWEST:
             continue
+        middle = float(np.median(list(values.values())))
+        matters = math.log1p(MATTERS_ERROR) if judged.error else MATTERS * abs(middle)
         for name, score in zip(values, modified_scores(list(values.values())), strict=True):
-            if (score if judged.error else abs(score)) > BEYOND:
+            if (score if judged.error else abs(score)) > BEYOND and abs(values[name] - middle) > matters:
                 number = float(units[name][judged.column])  # type: ignore[arg-type]
                 found.setdefault(name, []).append(f"{judged.words} {number:.4g} (z {score:+.1f})")
     return {name: "; ".join(words) for name, words in found.items()}
