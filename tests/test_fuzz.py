@@ -78,8 +78,9 @@ def beyond_the_range(text: str) -> str:
 
 
 def out_of_bounds(text: str) -> str:
-    """Corners two slots beyond the one that is free."""
-    found = text.replace("plain_write_corner(t, &corner[depth]", "plain_write_corner(t, &corner[depth + 2]")
+    """Corners are written behind the end of the list."""
+    slot = "plain_write_corner(t, &corner[depth"
+    found = text.replace(f"{slot}]", f"{slot} + PLAIN_N_PLAYS + 1u]")
     assert found != text
     return found
 
