@@ -72,7 +72,7 @@ def loose_clamp(text: str) -> str:
 
 def beyond_the_range(text: str) -> str:
     """A drive goes out that is more than what was solved and clamped."""
-    found = text.replace("    return v;\n}", "    return 2.0f * v;\n}")
+    found = text.replace("    return v;\n}", "    return 1.01f * v;\n}")
     assert found != text
     return found
 
