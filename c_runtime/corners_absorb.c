@@ -114,7 +114,7 @@ static unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, un
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+   the blocks that are passed whole, by bisection, then the plays of one block. */
 static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
                                   unsigned int k, hystgen_reach_t w, hystgen_place_t *p)
 {
@@ -122,16 +122,15 @@ static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corne
     const hystgen_sum_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
     unsigned int left = depth;
-    unsigned int probe = left;
     while (low < left) {
-        const hystgen_corner_t *c = &corner[probe - 1];
+        const unsigned int middle = (low + left) / 2;
+        const hystgen_corner_t *c = &corner[middle];
         if (x >= hystgen_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
-            left = probe - 1;
+            left = middle;
             k = c->end;
         } else {
-            low = probe;
+            low = middle + 1;
         }
-        probe = (low + left + 1) / 2;
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];

@@ -26,7 +26,8 @@ static unsigned int hystgen_level_not_reached(const hystgen_sum_t *step, unsigne
     return k;
 }
 
-/* As hystgen_find_by_input, for a move to an output. */
+/* As hystgen_find_by_input, for a move to an output. The last corner is looked at first, since mostly it is not passed;
+   whole numbers lead to the same place in any order. */
 static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
                                    unsigned int k, hystgen_sum_t output, hystgen_place_t *p)
 {

@@ -1,12 +1,14 @@
 #include "hystgen_runtime.h"
 
-/* A rising move to `output` that leaves `left` of `depth` corners, after which k plays follow: fills in the place where
-   it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
+/* A rising move to `output` from where the first k plays follow and `depth` corners, `start` of them of the start, hold
+   the others: fills in the place where it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
    that follow are those that will. */
 HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                unsigned int start, unsigned int depth, unsigned int k,
                                                 hystgen_real_t output, hystgen_place_t *p)
 {
+    unsigned int end;
+    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, output, true);
     hystgen_real_t w;
     hystgen_real_t first;
     hystgen_real_t level;
@@ -53,7 +55,7 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
     if (w > next) {
         return next;
     }
-    if (left < depth && corner[left].end == k) {
+    if (k == end) { /* the last one taken along was held by a corner that was left */
         first = hystgen_activation(t, &corner[left], k - 1, true);
     }
     if (w < first && k > 1) {
@@ -66,9 +68,11 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
 
 /* The same for a falling move. */
 HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                unsigned int start, unsigned int depth, unsigned int k,
                                                 hystgen_real_t output, hystgen_place_t *p)
 {
+    unsigned int end;
+    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, -output, false);
     hystgen_real_t w;
     hystgen_real_t first;
     hystgen_real_t level;
@@ -115,7 +119,7 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const
     if (w < next) {
         return next;
     }
-    if (left < depth && corner[left].end == k) {
+    if (k == end) { /* the last one taken along was held by a corner that was left */
         first = hystgen_activation(t, &corner[left], k - 1, false);
     }
     if (w > first && k > 1) {
@@ -160,14 +164,12 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
                                                  hystgen_corner_t *corner, hystgen_real_t output)
 {
     unsigned int depth;
-    unsigned int left;
     unsigned int k;
     bool rising;
     hystgen_real_t w;
     if (!hystgen_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    left = hystgen_corners_find(t, corner, m->start, depth, &k, rising ? output : -output, rising);
-    return rising ? hystgen_corners_rise(t, corner, depth, left, k, output, &m->there)
-                  : hystgen_corners_fall(t, corner, depth, left, k, output, &m->there);
+    return rising ? hystgen_corners_rise(t, corner, m->start, depth, k, output, &m->there)
+                  : hystgen_corners_fall(t, corner, m->start, depth, k, output, &m->there);
 }

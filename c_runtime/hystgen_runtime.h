@@ -35,6 +35,7 @@ typedef hystgen_real_t hystgen_sum_t;
 #endif
 #define HYSTGEN_API
 #define HYSTGEN_NOINLINE
+#define HYSTGEN_INLINE
 
 #include "hystgen_state.h"
 #ifdef HYSTGEN_FIXED
@@ -62,12 +63,10 @@ hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_r
 bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                            hystgen_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
                            hystgen_real_t *w);
-unsigned int hystgen_corners_find(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
-                                  unsigned int depth, unsigned int *k, hystgen_real_t x, bool rising);
-hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
-                                    unsigned int left, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
-hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
-                                    unsigned int left, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
+hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
+                                    unsigned int depth, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
+hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
+                                    unsigned int depth, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
 #endif
 
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);

@@ -202,16 +202,14 @@ def opposite(side: int, rising: int) -> bool:
 def corners_left(
     t: PlayTables, s: State, low: int, depth: int, rising: int, x: Any, held: Reals, steps: Reals
 ) -> int:
-    """Corners from `low` on that a move to x leaves of `depth`, from the last one by bisection."""
+    """Corners from `low` on that are left of `depth` after a move to x, by bisection."""
     left = depth
-    probe = left
     while low < left:
-        c = probe - 1
+        c = (low + left) // 2
         if reached(x, held[c] + multiple(t, s, c, rising) * steps[s.end[c] - 1], rising):
             left = c
         else:
-            low = probe
-        probe = (low + left + 1) // 2
+            low = c + 1
     return left
 
 

@@ -53,7 +53,7 @@ PLACES = [
     (r"(    p->k = \(uint_least16_t\)k;)", 2, r"    GRANTED(k <= PLAYS + 1);\n\1"),
     # a block ends beyond the play it begins with
     (
-        r"(        const NAME_corner_t \*c = &corner\[(?:probe|left) - 1\];\n)",
+        r"(        const NAME_corner_t \*c = &corner\[(?:probe - 1|left - 1|middle)\];\n)",
         4,
         r"\1        GRANTED(c->end >= 2 && c->end <= PLAYS + 1);\n",
     ),

@@ -105,10 +105,10 @@ def prepare(
         records = [record for k, record in enumerate(records) if k % 3 != 2]
         notes.append("no record was given as held out: " + ", ".join(record.name for record in holdout) + " set aside")
     fit_courses, held_courses = (
-        [prepared.bridged(pi.course(record, history, 0), 0) for record in group] for group in (records, holdout)
+        [prepared.bridged(pi.course(record, history, 0)) for record in group] for group in (records, holdout)
     )
     repaired = _without_rails(fit_courses) + _without_rails(held_courses)
-    prepared.mask_outliers(fit_courses, held_courses, None, 0.0, 0)
+    prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
         for channel, wrong, what in (
             ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),

@@ -91,10 +91,10 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
 def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:
     """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside.
 
-    A search through the corner list compares once with the last corner, then bisects the others; that through a block
-    compares once or twice, then bisects: at most 3 + 2 b comparisons in all, b the bits of n; corners of a start list
-    are bisected apart, but own a play each, so that no block is searched then. A drive that was limited or committed
-    is searched for when it is taken to memory, the answer once more.
+    A search through the corner list bisects it, in fixed point after a look at the last corner; that through a block
+    bisects it too, in fixed point after one or two looks: at most 3 + 2 b comparisons in all, b the bits of n. Corners
+    of a start list are bisected apart, but own a play each, so that no block is searched then. A drive that was limited
+    or committed is searched for when it is taken to memory, the answer once more.
     """
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)

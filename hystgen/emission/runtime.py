@@ -84,6 +84,7 @@ FAMILIES = {
 
 
 NOINLINE = "#if defined(__GNUC__)\n__attribute__((noinline))\n#endif\n"
+INLINE = "#if defined(__GNUC__)\n__attribute__((always_inline))\n#endif\n"
 
 
 def data_folder(name: str) -> Path:
@@ -169,7 +170,7 @@ def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
-    text = text.replace("HYSTGEN_NOINLINE ", NOINLINE)
+    text = text.replace("HYSTGEN_NOINLINE ", NOINLINE).replace("HYSTGEN_INLINE ", INLINE)
     text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
     text = text.replace("HYSTGEN_SUM_MAX", family.sum_max)
     return _named(text, prefix, family)

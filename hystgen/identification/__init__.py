@@ -111,7 +111,7 @@ def identify(
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
     with threads.alone(), Progress(passes * samples, progress, "fitting") as bar:
-        prepared.mask_outliers(courses, held, how.wanted, p0_floor, skip)
+        prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         if held:
             tried = [_try(courses, held, kind, how, bar) for kind in kinds]
             chosen = _choose(tried)
@@ -122,13 +122,13 @@ def identify(
             rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how, bar)
             if reason:
                 told.append(reason)
-            fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, skip, bar.tick)
-    masks = used.of_records(fit_records, compared, False, skip)
+            fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, bar.tick)
+    masks = used.of_records(fit_records, compared, False)
     if held:
-        masks += used.of_records(held_records, done.held, True, skip)
+        masks += used.of_records(held_records, done.held, True)
     told += [text for each in masks for text in each.told()]
     errors = [_compare(item, fitted) for item in compared]
-    own = pi.row("fit" if held or not rows else "all", "written", errors, [skip] * len(compared))
+    own = pi.row("fit" if held or not rows else "all", "written", errors)
     rows.append(own)
     drive = (min(item.drive_range[0] for item in compared), max(item.drive_range[1] for item in compared))
     if held:
@@ -164,7 +164,7 @@ def check_options(
     """What is asked of a fit, and the history, from options of `identify`. Raises ValueError for wrong ones."""
     if model not in MODELS:
         raise ValueError(f"model {model!r} is none of {', '.join(MODELS)}")
-    how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor, skip)
+    how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
     before = None if history is None else visited(history)
     if loading_curve:
         if before:
@@ -186,7 +186,6 @@ class _How:
     wanted: int | tuple[float, ...] | None
     breaks: int | tuple[float, ...] | None
     floor: float
-    skip: int
 
 
 @dataclass(frozen=True)
@@ -205,16 +204,12 @@ class _Tried:
 
 
 def _try(
-    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress, begins: Sequence[int] = ()
+    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress
 ) -> _Tried:
-    """Fit one kind to courses and compare it with others, which begin at `begins` (by default where all do)."""
-    fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, how.skip, bar.tick)
+    """Fit one kind to courses and compare it with others."""
+    fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
     largest = float(fitted.solution.thresholds[-1])
-    starts = list(begins) or [how.skip] * len(held)
-    settled = [
-        replace(item, first=pi.resettled(fitted.inner(item), largest, start).first)
-        for item, start in zip(held, starts, strict=True)
-    ]
+    settled = [replace(item, first=pi.resettled(fitted.inner(item), largest).first) for item in held]
     for item in settled:
         if item.used < SHORTEST:
             raise IdentificationError(
@@ -222,7 +217,7 @@ def _try(
                 f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
             )
     errors = [_compare(item, fitted) for item in settled]
-    return _Tried(fitted, compared, settled, errors, pi.row("held out", "written", errors, starts))
+    return _Tried(fitted, compared, settled, errors, pi.row("held out", "written", errors))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
@@ -280,23 +275,21 @@ def _trial(
         return [], kinds[0], [], ""
     short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
     instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
-    fronts, splits = [], []
+    fronts, ends = [], []
     for item in courses:
         split = round(len(item.v) * (1.0 - HELD_OUT))
-        front = pi.resettled(replace(item, last=split), math.inf, how.skip)
+        front = pi.resettled(replace(item, last=split), math.inf)
         if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
             return [], kinds[0], [], f"{item.name}: {short}{instead}"
         fronts.append(front)
-        splits.append(split)
+        ends.append(replace(item, begin=max(split, item.begin)))
     try:
-        tried = [_try(fronts, courses, kind, how, bar, splits) for kind in kinds]
+        tried = [_try(fronts, ends, kind, how, bar) for kind in kinds]
     except IdentificationError as failure:
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)
     best = tried[chosen]
-    own = pi.row(
-        "fit", "trial", [_compare(item, best.fitted) for item in best.compared], [how.skip] * len(best.compared)
-    )
+    own = pi.row("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     return [*rows, own, replace(best.held_out, model="trial")], kinds[chosen], best.errors, ""
 

@@ -63,7 +63,6 @@ def solve(
     wanted: int | tuple[float, ...] | None,
     breaks: int | tuple[float, ...] | None,
     floor: float,
-    skip: int,
     tick: Tick = None,
 ) -> tuple[Fitted, list[Course]]:
     """Fit a model of one kind; also the courses, their drive as measured, over the samples that were compared.
@@ -71,7 +70,7 @@ def solve(
     Of several fronts of a kind the one with the fewest shape numbers is taken that predicts blocks of the records left
     out of the fit about as well as any. Raises IdentificationError.
     """
-    plain, compared = pi.solve(courses, wanted, floor, skip, tick)
+    plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
         return Fitted(Straight(), np.empty(0), plain), compared
     # What a play sum alone would choose is bent by the front that it lacks: the shape is sought over a dense list
@@ -88,15 +87,15 @@ def solve(
             best = error, front, shaped.shape
     assert best is not None
     _, front, shape = best
-    fitted = _solve_behind(courses, front, shape, wanted, floor, skip, tick)
+    fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved, and the shape is to be the best one for them
     r = fitted.solution.thresholds
     shape = joint.refine(compared, front, shape, r, tick).shape
-    fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, skip, tick)
+    fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, tick)
     if wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
     largest = float(fitted.solution.thresholds[-1])
-    firsts = [pi.resettled(fitted.inner(item), largest, skip).first for item in courses]
+    firsts = [pi.resettled(fitted.inner(item), largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
 
 
@@ -106,11 +105,10 @@ def _solve_behind(
     shape: Array,
     wanted: int | tuple[float, ...] | None,
     floor: float,
-    skip: int,
     tick: Tick,
 ) -> Fitted:
     stages = front.stages(shape)
-    solution, _ = pi.solve([joint.through_front(item, stages) for item in courses], wanted, floor, skip, tick)
+    solution, _ = pi.solve([joint.through_front(item, stages) for item in courses], wanted, floor, tick)
     return Fitted(front, shape, solution)
 
 

@@ -67,20 +67,19 @@ def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Cour
     if np.ptp(y[skip:]) == 0.0:
         raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
     first = 0 if history is not None else reduction.settled(v, math.inf)
-    return Course(record.name, v, y, history, max(first, skip), len(v), float(np.ptp(y[skip:])))
+    return Course(record.name, v, y, history, max(first, skip), len(v), float(np.ptp(y[skip:])), skip)
 
 
-def resettled(item: Course, largest: float, begin: int) -> Course:
-    """The course from sample `begin` on, no more of its start ignored than a largest threshold makes necessary."""
+def resettled(item: Course, largest: float) -> Course:
+    """The course with no more of its start ignored than a largest threshold makes necessary."""
     first = 0 if item.history is not None else reduction.settled(item.v[: item.last], largest)
-    return replace(item, first=max(first, begin))
+    return replace(item, first=max(first, item.begin))
 
 
 def solve(
     courses: Sequence[Course],
     wanted: int | tuple[float, ...] | None,
     floor: float,
-    skip: int,
     tick: Callable[[int], None] | None = None,
 ) -> tuple[Solution, list[Course]]:
     """Choose thresholds (unless given as a list), fit the weights; also the courses as they were compared.
@@ -97,7 +96,7 @@ def solve(
     else:
         lists = thresholds.candidates(reach, sum(item.used for item in courses), wanted)
     top = max(candidate.thresholds[-1] for candidate in lists)
-    compared = [resettled(item, top, skip) for item in courses]
+    compared = [resettled(item, top) for item in courses]
     samples = sum(item.used for item in compared)
     fewest = min(candidate.n for candidate in lists) + 2
     if samples < fewest:
@@ -136,8 +135,8 @@ def compare(item: Course, r: Array, p: Array) -> Errors:
     return Errors(item, offset, error - offset)
 
 
-def row(part: str, model: str, errors: Sequence[Errors], begins: Sequence[int]) -> Row:
-    """The table's row; `begins`: where each course would begin if nothing were ignored."""
+def row(part: str, model: str, errors: Sequence[Errors]) -> Row:
+    """The table's row."""
     joined = np.concatenate([e.error for e in errors])
     joined = joined[np.isfinite(joined)]
     return Row(
@@ -145,7 +144,7 @@ def row(part: str, model: str, errors: Sequence[Errors], begins: Sequence[int]) 
         model,
         tuple(e.course.name for e in errors),
         len(joined),
-        sum(e.course.first - begin for e, begin in zip(errors, begins, strict=True)),
+        sum(e.course.first - e.course.begin for e in errors),
         float(np.sqrt(np.mean(joined**2))),
         float(np.max(np.abs(joined))),
         max(e.course.output_range for e in errors),

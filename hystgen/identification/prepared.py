@@ -43,26 +43,26 @@ def courses(
             f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
-    return [bridged(item, max(skip - item.origin[1], 0)) for item in made], told
+    return [bridged(item) for item in made], told
 
 
-def bridged(item: Course, begin: int) -> Course:
-    """The course, from sample `begin` on, with straight lines in place of isolated spikes of its drive."""
+def bridged(item: Course) -> Course:
+    """The course with straight lines in place of isolated spikes of its drive."""
     spikes = faults.drive_spikes(item.v, item.y)
     if not spikes.any():
         return item
     # a spike is no extreme of the drive: the start memory is known at another sample than it looked
-    return pi.resettled(replace(item, v=faults.bridged(item.v, spikes)), math.inf, begin)
+    return pi.resettled(replace(item, v=faults.bridged(item.v, spikes)), math.inf)
 
 
 def mask_outliers(
-    to_fit: list[Course], held: list[Course], wanted: int | tuple[float, ...] | None, floor: float, skip: int
+    to_fit: list[Course], held: list[Course], wanted: int | tuple[float, ...] | None, floor: float
 ) -> None:
     """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
 
     Those at the start too: how much of it is compared is known only in the end.
     """
-    solution, _ = pi.solve(to_fit, wanted, floor, skip)
+    solution, _ = pi.solve(to_fit, wanted, floor)
     for group in (to_fit, held):
         for k, item in enumerate(group):
             error = pi.compare(replace(item, first=0), solution.thresholds, solution.weights).error

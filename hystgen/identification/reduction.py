@@ -34,7 +34,8 @@ class Course:
     The drive before `first` runs through the plays all the same, as it does where `y` is NaN: such a sample is not
     compared. `history` are drive values visited before the record;
     None when it is not known. `output_range`: peak-to-peak output of the whole record, which percentages refer to.
-    `origin`: which record it is a part of, counted from 0, and at which of its samples it begins.
+    `begin`: where comparing may begin, its start memory aside. `origin`: which record it is a part of, counted from 0,
+    and at which of its samples it begins.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Course:
     first: int
     last: int
     output_range: float
+    begin: int = 0
     origin: tuple[int, int] = (0, 0)
 
     @property

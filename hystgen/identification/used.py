@@ -55,23 +55,22 @@ class Used:
         ]
 
 
-def of_records(records: Sequence[Record], courses: Sequence[Course], held_out: bool, skip: int) -> tuple[Used, ...]:
+def of_records(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
     """What became of the samples of `records`, given the courses that were compared in the end."""
     return tuple(
-        _of_record(record, [item for item in courses if item.origin[0] == number], held_out, skip)
+        _of_record(record, [item for item in courses if item.origin[0] == number], held_out)
         for number, record in enumerate(records)
     )
 
 
-def _of_record(record: Record, courses: Sequence[Course], held_out: bool, skip: int) -> Used:
+def _of_record(record: Record, courses: Sequence[Course], held_out: bool) -> Used:
     parts = tuple((item.origin[1], item.origin[1] + len(item.v)) for item in courses)
     skipped, ignored, outliers, bridged = [], [], [], []
     outside = np.ones(len(record), dtype=bool)
     for item, (start, stop) in zip(courses, parts, strict=True):
         outside[start:stop] = False
-        asked = min(skip, item.first)
-        skipped.append(np.arange(start, start + asked))
-        ignored.append(np.arange(start + asked, start + item.first))
+        skipped.append(np.arange(start, start + item.begin))
+        ignored.append(np.arange(start + item.begin, start + item.first))
         outliers.append(start + item.first + np.flatnonzero(np.isnan(item.y[item.first :])))
         bridged.append(start + np.flatnonzero(item.v != record.v[start:stop]))
     gaps = [piece.first for piece in faults.between_gaps(record)[1:]]

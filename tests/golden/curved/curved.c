@@ -213,7 +213,7 @@ static unsigned int curved_threshold_not_reached(const curved_play_t *step, unsi
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+   the blocks that are passed whole, by bisection, then the plays of one block. */
 static void curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner, unsigned int depth,
                                   unsigned int k, curved_reach_t w, curved_place_t *p)
 {
@@ -221,16 +221,15 @@ static void curved_find_by_input(const curved_tables_t *t, const curved_corner_t
     const curved_sum_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
     unsigned int left = depth;
-    unsigned int probe = left;
     while (low < left) {
-        const curved_corner_t *c = &corner[probe - 1];
+        const unsigned int middle = (low + left) / 2;
+        const curved_corner_t *c = &corner[middle];
         if (x >= curved_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
-            left = probe - 1;
+            left = middle;
             k = c->end;
         } else {
-            low = probe;
+            low = middle + 1;
         }
-        probe = (low + left + 1) / 2;
     }
     if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
         const curved_corner_t *c = &corner[left - 1];
@@ -359,7 +358,8 @@ static unsigned int curved_level_not_reached(const curved_sum_t *step, unsigned 
     return k;
 }
 
-/* As curved_find_by_input, for a move to an output. */
+/* As curved_find_by_input, for a move to an output. The last corner is looked at first, since mostly it is not passed;
+   whole numbers lead to the same place in any order. */
 static void curved_find_by_output(const curved_tables_t *t, const curved_corner_t *corner, unsigned int depth,
                                    unsigned int k, curved_sum_t output, curved_place_t *p)
 {

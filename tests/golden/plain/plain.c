@@ -189,7 +189,7 @@ static unsigned int plain_threshold_not_reached(const plain_real_t *step, unsign
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+   the blocks that are passed whole, by bisection, then the plays of one block. */
 static void plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner, unsigned int depth,
                                   unsigned int k, plain_real_t w, plain_place_t *p)
 {
@@ -197,16 +197,15 @@ static void plain_find_by_input(const plain_tables_t *t, const plain_corner_t *c
     const plain_real_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
     unsigned int left = depth;
-    unsigned int probe = left;
     while (low < left) {
-        const plain_corner_t *c = &corner[probe - 1];
+        const unsigned int middle = (low + left) / 2;
+        const plain_corner_t *c = &corner[middle];
         if (x >= plain_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
-            left = probe - 1;
+            left = middle;
             k = c->end;
         } else {
-            low = probe;
+            low = middle + 1;
         }
-        probe = (low + left + 1) / 2;
     }
     if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
         const plain_corner_t *c = &corner[left - 1];
@@ -309,57 +308,59 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
     m->there.k = 0;
 }
 
-/* First of the start levels k .. high-1 that a way x has not reached, or high; mostly it is the first. */
+/* First of the start levels k .. high-1 that a way x has not reached, or high. */
 static unsigned int plain_level_not_reached(const plain_real_t *level, unsigned int k, unsigned int high,
                                               plain_real_t x)
 {
-    if (k < high && x >= level[k]) {
-        ++k;
-        while (k < high) {
-            const unsigned int middle = (k + high) / 2;
-            if (x >= level[middle]) {
-                k = middle + 1;
-            } else {
-                high = middle;
-            }
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (x >= level[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
         }
     }
     return k;
 }
 
 /* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
-   follow then, of which the first ones are known to. x as a rising move sees it. First the blocks that are passed
-   whole, from the last one left by bisection, those of the start but the lowest likewise, then the plays of one. */
-static unsigned int plain_corners_find(const plain_tables_t *t, const plain_corner_t *corner,
-                                              unsigned int start, unsigned int depth, unsigned int *k,
-                                              plain_real_t x, bool rising)
+   follow then, of which the first ones are known to; *end is the first play beyond what was left, if any was. x as a
+   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest likewise,
+   then the plays of one. A copy for each direction, which asks for it nowhere. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int plain_corners_find(const plain_tables_t *t,
+                                                               const plain_corner_t *corner, unsigned int start,
+                                                               unsigned int depth, unsigned int *k, unsigned int *end,
+                                                               plain_real_t x, bool rising)
 {
     unsigned int low = start;
     unsigned int left = depth;
-    unsigned int probe = depth;
     while (low < left) {
-        if (x >= corner[probe - 1].pass[rising]) {
-            left = probe - 1;
+        const unsigned int middle = (low + left) / 2;
+        if (x >= corner[middle].pass[rising]) {
+            left = middle;
         } else {
-            low = probe;
+            low = middle + 1;
         }
-        probe = (low + left + 1) / 2;
     }
     if (start > 1 && left > 1 && left <= start) {
         low = 1;
-        probe = left;
         while (low < left) {
-            const plain_corner_t *c = &corner[probe - 1];
+            const unsigned int middle = (low + left) / 2;
+            const plain_corner_t *c = &corner[middle];
             if (x >= t->start_level[c->end - 1] - c->pass[!rising]) {
-                left = probe - 1;
+                left = middle;
             } else {
-                low = probe;
+                low = middle + 1;
             }
-            probe = (low + left + 1) / 2;
         }
     }
+    *end = 0;
     if (left < depth) {
         *k = corner[left].end;
+        *end = *k;
     }
     if (left > 0) {
         const plain_corner_t *c = &corner[left - 1];
@@ -367,7 +368,8 @@ static unsigned int plain_corners_find(const plain_tables_t *t, const plain_corn
             const unsigned int high = left == 1 ? c->end : c->end - 1u;
             *k = plain_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
             if (*k == c->end) { /* the last one too */
-                --left;
+                left = 0;
+                *end = *k;
             }
         } else if (c->side != (rising ? -1 : 1)) {
             *k = plain_level_not_reached(t->start_level, *k, c->end - 1u, plain_half(x + c->pass[!rising]));
@@ -376,13 +378,15 @@ static unsigned int plain_corners_find(const plain_tables_t *t, const plain_corn
     return left;
 }
 
-/* A rising move to `output` that leaves `left` of `depth` corners, after which k plays follow: fills in the place where
-   it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
+/* A rising move to `output` from where the first k plays follow and `depth` corners, `start` of them of the start, hold
+   the others: fills in the place where it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
    that follow are those that will. */
 static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corner_t *corner,
-                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                unsigned int start, unsigned int depth, unsigned int k,
                                                 plain_real_t output, plain_place_t *p)
 {
+    unsigned int end;
+    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, output, true);
     plain_real_t w;
     plain_real_t first;
     plain_real_t level;
@@ -429,7 +433,7 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
     if (w > next) {
         return next;
     }
-    if (left < depth && corner[left].end == k) {
+    if (k == end) { /* the last one taken along was held by a corner that was left */
         first = plain_activation(t, &corner[left], k - 1, true);
     }
     if (w < first && k > 1) {
@@ -442,9 +446,11 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
 
 /* The same for a falling move. */
 static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corner_t *corner,
-                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                unsigned int start, unsigned int depth, unsigned int k,
                                                 plain_real_t output, plain_place_t *p)
 {
+    unsigned int end;
+    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, -output, false);
     plain_real_t w;
     plain_real_t first;
     plain_real_t level;
@@ -491,7 +497,7 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corn
     if (w < next) {
         return next;
     }
-    if (left < depth && corner[left].end == k) {
+    if (k == end) { /* the last one taken along was held by a corner that was left */
         first = plain_activation(t, &corner[left], k - 1, false);
     }
     if (w > first && k > 1) {
@@ -619,6 +625,13 @@ static void plain_inverse_take(plain_inverse_t *self, plain_real_t w)
     self->memory.w = w;
 }
 
+/* Before a move: what is asked for, and the status it has. */
+static void plain_inverse_ask(plain_inverse_t *self, plain_real_t u, unsigned int bits)
+{
+    self->reference = u;
+    self->bits = bits;
+}
+
 /* Returns drive v and leaves it pending, unless the memory is there already. */
 static plain_real_t plain_inverse_send(plain_inverse_t *self, plain_real_t v)
 {
@@ -629,29 +642,17 @@ static plain_real_t plain_inverse_send(plain_inverse_t *self, plain_real_t v)
 }
 
 /* A drive that is not what solving gave, or that is no move. */
-static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t u, plain_real_t v)
+static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 {
     const plain_real_t inside = plain_clamp_drive(v);
-    self->bits = inside < v || inside > v ? PLAIN_STATUS_OUTPUT_CLAMPED : 0;
-    self->status |= self->bits;
-    self->reference = u;
+    if (inside < v || inside > v) {
+        self->bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
+        self->status |= PLAIN_STATUS_OUTPUT_CLAMPED;
+    }
     self->repeat = true;
     self->fast = false;
     self->edge[0] = self->edge[1];
     return plain_inverse_send(self, inside);
-}
-
-/* After a step with a reference that had to be limited. */
-static void plain_inverse_mark(plain_inverse_t *self, plain_real_t asked)
-{
-    if (self->fast && (asked < PLAIN_OUTPUT_MIN) == self->falling) {
-        self->edge[self->falling] = asked;
-    } else if (self->fast) { /* what is asked for lies behind */
-        plain_inverse_leave_fast(self);
-    }
-    self->reference = asked;
-    self->bits |= PLAIN_STATUS_INPUT_CLAMPED;
-    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
 }
 
 /* A move to u once what begins it is known: k plays follow, `depth` corners hold the others. From where it ends samples
@@ -665,132 +666,116 @@ static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth,
 {
     const plain_place_t *p = &self->memory.there;
     const plain_real_t output = u;
-    const unsigned int left = plain_corners_find(&plain_tables, self->corner, self->memory.start, depth, &k,
-        rising ? output : -output, rising);
     plain_real_t v;
     plain_real_t edge;
     if (rising) {
-        v = plain_corners_rise(&plain_tables, self->corner, depth, left, k, output, &self->memory.there);
+        v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
         if (!(v > self->memory.w)) {
-            return plain_inverse_stay(self, u, v);
+            return plain_inverse_stay(self, v);
         }
         edge = p->next_output;
         if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
             if (v > PLAIN_DRIVE_MAX) {
-                return plain_inverse_stay(self, u, v);
+                return plain_inverse_stay(self, v);
             }
             edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
         }
         if (edge > PLAIN_OUTPUT_MAX) {
             edge = PLAIN_OUTPUT_MAX;
         }
-        self->edge[0] = u;
+        self->edge[0] = self->reference;
         self->edge[1] = edge - 2.2984315e-05f;
         self->gain = plain_reciprocal[p->k];
         self->falling = false;
         self->fast = true;
         self->pending = v;
-        self->reference = u;
-        self->bits = 0;
         return v;
     }
-    v = plain_corners_fall(&plain_tables, self->corner, depth, left, k, output, &self->memory.there);
+    v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
     if (!(v < self->memory.w)) {
-        return plain_inverse_stay(self, u, v);
+        return plain_inverse_stay(self, v);
     }
     edge = p->next_output;
     if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
         if (v < PLAIN_DRIVE_MIN) {
-            return plain_inverse_stay(self, u, v);
+            return plain_inverse_stay(self, v);
         }
         edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
     }
     if (edge < PLAIN_OUTPUT_MIN) {
         edge = PLAIN_OUTPUT_MIN;
     }
-    self->edge[1] = u;
+    self->edge[1] = self->reference;
     self->edge[0] = edge + 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = true;
     self->fast = true;
     self->pending = v;
-    self->reference = u;
-    self->bits = 0;
     return v;
 }
 
-/* The same for a reference that has to be limited. */
-#if defined(__GNUC__)
-__attribute__((noinline))
-#endif
+/* The same where the reference u lies beyond the range that way. */
 static plain_real_t plain_inverse_limited(plain_inverse_t *self, unsigned int depth, unsigned int k,
     bool rising, plain_real_t u)
 {
-    const plain_real_t v = plain_inverse_far(self, depth, k, rising,
-        u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX);
-    plain_inverse_mark(self, u);
-    return v;
+    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    return plain_inverse_far(self, depth, k, rising, rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
 }
 
-/* A rising move that takes no more plays along, and is fast from u on. */
-static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t u,
-    plain_real_t v)
+/* A rising move that takes no more plays along, and is fast from there on. */
+static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t v)
 {
     const plain_place_t *p = &self->memory.here;
     plain_real_t edge;
     if (!(v > self->memory.w && v < p->next)) {
-        return plain_inverse_stay(self, u, v);
+        return plain_inverse_stay(self, v);
     }
     plain_copy_place(&self->memory.there, p);
     edge = p->next_output;
     if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
         if (v > PLAIN_DRIVE_MAX) {
-            return plain_inverse_stay(self, u, v);
+            return plain_inverse_stay(self, v);
         }
         edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
     }
     if (edge > PLAIN_OUTPUT_MAX) {
         edge = PLAIN_OUTPUT_MAX;
     }
-    self->edge[0] = u;
+    self->edge[0] = self->reference;
     self->edge[1] = edge - 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = false;
     self->fast = true;
     self->pending = v;
-    self->reference = u;
-    self->bits = 0;
     return v;
 }
 
-/* A falling move that takes no more plays along, and is fast from u on. */
-static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t u,
-    plain_real_t v)
+/* A falling move that takes no more plays along, and is fast from there on. */
+static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t v)
 {
     const plain_place_t *p = &self->memory.here;
     plain_real_t edge;
     if (!(v < self->memory.w && v > p->next)) {
-        return plain_inverse_stay(self, u, v);
+        return plain_inverse_stay(self, v);
     }
     plain_copy_place(&self->memory.there, p);
     edge = p->next_output;
     if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
         if (v < PLAIN_DRIVE_MIN) {
-            return plain_inverse_stay(self, u, v);
+            return plain_inverse_stay(self, v);
         }
         edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
     }
     if (edge < PLAIN_OUTPUT_MIN) {
         edge = PLAIN_OUTPUT_MIN;
     }
-    self->edge[1] = u;
+    self->edge[1] = self->reference;
     self->edge[0] = edge + 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = true;
     self->fast = true;
     self->pending = v;
-    self->reference = u;
-    self->bits = 0;
     return v;
 }
 
@@ -823,13 +808,15 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
         self->status |= self->bits;
         return plain_inverse_send(self, self->answer);
     }
+    plain_inverse_ask(self, asked, asked < u || asked > u ? PLAIN_STATUS_INPUT_CLAMPED : 0);
+    self->status |= self->bits;
     if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
-        return asked < u || asked > u ? plain_inverse_limited(self, depth, k, rising, asked)
-                                      : plain_inverse_far(self, depth, k, rising, u);
+        v = plain_inverse_far(self, depth, k, rising, u);
+    } else {
+        v = rising ? plain_inverse_up(self, v) : plain_inverse_down(self, v);
     }
-    v = rising ? plain_inverse_up(self, u, v) : plain_inverse_down(self, u, v);
-    if (asked < u || asked > u) {
-        plain_inverse_mark(self, asked);
+    if (self->fast && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
+        plain_inverse_leave_fast(self);
     }
     return v;
 }
@@ -883,6 +870,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     p->next = r;
                     p->next_output = z - y;
                     p->k = (uint_least16_t)k;
+                    plain_inverse_ask(self, u, 0);
                     edge = p->next_output;
                     if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
                         edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
@@ -890,19 +878,18 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     if (edge > PLAIN_OUTPUT_MAX) {
                         edge = PLAIN_OUTPUT_MAX;
                     }
-                    self->edge[0] = u;
+                    self->edge[0] = self->reference;
                     self->edge[1] = edge - 2.2984315e-05f;
                     self->gain = plain_reciprocal[p->k];
                     self->falling = false;
                     self->fast = true;
                     self->pending = v;
-                    self->reference = u;
-                    self->bits = 0;
                     return v;
 
                 }
             }
             plain_inverse_take(self, self->pending);
+            plain_inverse_ask(self, u, 0);
             return plain_inverse_far(self, m->here.depth, k, true, u);
         }
 
@@ -932,6 +919,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                 }
                 return plain_inverse_limited(self, depth, 1, false, u);
             }
+            plain_inverse_ask(self, u, 0);
             return plain_inverse_far(self, depth, 1, false, u);
         }
 } else {
@@ -967,6 +955,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     p->next = r;
                     p->next_output = y - z;
                     p->k = (uint_least16_t)k;
+                    plain_inverse_ask(self, u, 0);
                     edge = p->next_output;
                     if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
                         edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
@@ -974,19 +963,18 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     if (edge < PLAIN_OUTPUT_MIN) {
                         edge = PLAIN_OUTPUT_MIN;
                     }
-                    self->edge[1] = u;
+                    self->edge[1] = self->reference;
                     self->edge[0] = edge + 2.2984315e-05f;
                     self->gain = plain_reciprocal[p->k];
                     self->falling = true;
                     self->fast = true;
                     self->pending = v;
-                    self->reference = u;
-                    self->bits = 0;
                     return v;
 
                 }
             }
             plain_inverse_take(self, self->pending);
+            plain_inverse_ask(self, u, 0);
             return plain_inverse_far(self, m->here.depth, k, false, u);
         }
 
@@ -1016,6 +1004,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                 }
                 return plain_inverse_limited(self, depth, 1, true, u);
             }
+            plain_inverse_ask(self, u, 0);
             return plain_inverse_far(self, depth, 1, true, u);
         }
 }

@@ -465,7 +465,7 @@ static unsigned int two_branches_threshold_not_reached(const two_branches_real_t
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, from the last one left by bisection, then the plays of one block. */
+   the blocks that are passed whole, by bisection, then the plays of one block. */
 static void two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner, unsigned int depth,
                                   unsigned int k, two_branches_real_t w, two_branches_place_t *p)
 {
@@ -473,16 +473,15 @@ static void two_branches_find_by_input(const two_branches_tables_t *t, const two
     const two_branches_real_t x = rising ? w : -w; /* everything as a rising move sees it */
     unsigned int low = 0;
     unsigned int left = depth;
-    unsigned int probe = left;
     while (low < left) {
-        const two_branches_corner_t *c = &corner[probe - 1];
+        const unsigned int middle = (low + left) / 2;
+        const two_branches_corner_t *c = &corner[middle];
         if (x >= two_branches_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
-            left = probe - 1;
+            left = middle;
             k = c->end;
         } else {
-            low = probe;
+            low = middle + 1;
         }
-        probe = (low + left + 1) / 2;
     }
     if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
         const two_branches_corner_t *c = &corner[left - 1];
@@ -585,57 +584,59 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
     m->there.k = 0;
 }
 
-/* First of the start levels k .. high-1 that a way x has not reached, or high; mostly it is the first. */
+/* First of the start levels k .. high-1 that a way x has not reached, or high. */
 static unsigned int two_branches_level_not_reached(const two_branches_real_t *level, unsigned int k, unsigned int high,
                                               two_branches_real_t x)
 {
-    if (k < high && x >= level[k]) {
-        ++k;
-        while (k < high) {
-            const unsigned int middle = (k + high) / 2;
-            if (x >= level[middle]) {
-                k = middle + 1;
-            } else {
-                high = middle;
-            }
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (x >= level[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
         }
     }
     return k;
 }
 
 /* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
-   follow then, of which the first ones are known to. x as a rising move sees it. First the blocks that are passed
-   whole, from the last one left by bisection, those of the start but the lowest likewise, then the plays of one. */
-static unsigned int two_branches_corners_find(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                              unsigned int start, unsigned int depth, unsigned int *k,
-                                              two_branches_real_t x, bool rising)
+   follow then, of which the first ones are known to; *end is the first play beyond what was left, if any was. x as a
+   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest likewise,
+   then the plays of one. A copy for each direction, which asks for it nowhere. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int two_branches_corners_find(const two_branches_tables_t *t,
+                                                               const two_branches_corner_t *corner, unsigned int start,
+                                                               unsigned int depth, unsigned int *k, unsigned int *end,
+                                                               two_branches_real_t x, bool rising)
 {
     unsigned int low = start;
     unsigned int left = depth;
-    unsigned int probe = depth;
     while (low < left) {
-        if (x >= corner[probe - 1].pass[rising]) {
-            left = probe - 1;
+        const unsigned int middle = (low + left) / 2;
+        if (x >= corner[middle].pass[rising]) {
+            left = middle;
         } else {
-            low = probe;
+            low = middle + 1;
         }
-        probe = (low + left + 1) / 2;
     }
     if (start > 1 && left > 1 && left <= start) {
         low = 1;
-        probe = left;
         while (low < left) {
-            const two_branches_corner_t *c = &corner[probe - 1];
+            const unsigned int middle = (low + left) / 2;
+            const two_branches_corner_t *c = &corner[middle];
             if (x >= t->start_level[c->end - 1] - c->pass[!rising]) {
-                left = probe - 1;
+                left = middle;
             } else {
-                low = probe;
+                low = middle + 1;
             }
-            probe = (low + left + 1) / 2;
         }
     }
+    *end = 0;
     if (left < depth) {
         *k = corner[left].end;
+        *end = *k;
     }
     if (left > 0) {
         const two_branches_corner_t *c = &corner[left - 1];
@@ -643,7 +644,8 @@ static unsigned int two_branches_corners_find(const two_branches_tables_t *t, co
             const unsigned int high = left == 1 ? c->end : c->end - 1u;
             *k = two_branches_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
             if (*k == c->end) { /* the last one too */
-                --left;
+                left = 0;
+                *end = *k;
             }
         } else if (c->side != (rising ? -1 : 1)) {
             *k = two_branches_level_not_reached(t->start_level, *k, c->end - 1u, two_branches_half(x + c->pass[!rising]));
@@ -652,13 +654,15 @@ static unsigned int two_branches_corners_find(const two_branches_tables_t *t, co
     return left;
 }
 
-/* A rising move to `output` that leaves `left` of `depth` corners, after which k plays follow: fills in the place where
-   it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
+/* A rising move to `output` from where the first k plays follow and `depth` corners, `start` of them of the start, hold
+   the others: fills in the place where it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
    that follow are those that will. */
 static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                unsigned int start, unsigned int depth, unsigned int k,
                                                 two_branches_real_t output, two_branches_place_t *p)
 {
+    unsigned int end;
+    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, output, true);
     two_branches_real_t w;
     two_branches_real_t first;
     two_branches_real_t level;
@@ -705,7 +709,7 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
     if (w > next) {
         return next;
     }
-    if (left < depth && corner[left].end == k) {
+    if (k == end) { /* the last one taken along was held by a corner that was left */
         first = two_branches_activation(t, &corner[left], k - 1, true);
     }
     if (w < first && k > 1) {
@@ -718,9 +722,11 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
 
 /* The same for a falling move. */
 static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                unsigned int depth, unsigned int left, unsigned int k,
+                                                unsigned int start, unsigned int depth, unsigned int k,
                                                 two_branches_real_t output, two_branches_place_t *p)
 {
+    unsigned int end;
+    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, -output, false);
     two_branches_real_t w;
     two_branches_real_t first;
     two_branches_real_t level;
@@ -767,7 +773,7 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
     if (w < next) {
         return next;
     }
-    if (left < depth && corner[left].end == k) {
+    if (k == end) { /* the last one taken along was held by a corner that was left */
         first = two_branches_activation(t, &corner[left], k - 1, false);
     }
     if (w > first && k > 1) {
@@ -812,16 +818,14 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
                                                  two_branches_corner_t *corner, two_branches_real_t output)
 {
     unsigned int depth;
-    unsigned int left;
     unsigned int k;
     bool rising;
     two_branches_real_t w;
     if (!two_branches_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    left = two_branches_corners_find(t, corner, m->start, depth, &k, rising ? output : -output, rising);
-    return rising ? two_branches_corners_rise(t, corner, depth, left, k, output, &m->there)
-                  : two_branches_corners_fall(t, corner, depth, left, k, output, &m->there);
+    return rising ? two_branches_corners_rise(t, corner, m->start, depth, k, output, &m->there)
+                  : two_branches_corners_fall(t, corner, m->start, depth, k, output, &m->there);
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
