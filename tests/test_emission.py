@@ -82,8 +82,8 @@ int main(void)
 
 
 @pytest.mark.parametrize("engine", ["corners", "loop"])
-@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
-@pytest.mark.parametrize("name", ["plain", "listed", "two_branches"])
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+@pytest.mark.parametrize("name", FILES)
 def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_path: Path) -> None:
     """No access outside an object and no undefined behaviour over the verification records."""
     gcc = next((c for c in required_compilers() if c.name == "gcc"), None)

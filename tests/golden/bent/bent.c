@@ -298,18 +298,15 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v)
     return v;
 }
 
-bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
+/* A sample in which the plays are looked at, once they have seen the drive before. */
+static bent_real_t bent_inverse_look(bent_inverse_t *self, bent_real_t u)
 {
     bent_real_t w;
-    bent_real_t v;
     bent_real_t asked;
-    bent_real_t inside;
     unsigned int bits = 0;
+    bent_real_t v;
+    bent_real_t inside;
     bool limited = false;
-    if (self->has_pending) { /* what was sent last is what the actuator has seen */
-        bent_inverse_see(self, self->pending);
-        self->has_pending = false;
-    }
     asked = u;
     if (!(u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX)) {
         if (!bent_finite(u)) {
@@ -337,6 +334,15 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
     self->bits = bits;
     self->status |= bits;
     return bent_inverse_answer(self, inside);
+}
+
+bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
+{
+    if (self->has_pending) { /* what was sent last is what the actuator has seen */
+        bent_inverse_see(self, self->pending);
+        self->has_pending = false;
+    }
+    return bent_inverse_look(self, u);
 }
 
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied)

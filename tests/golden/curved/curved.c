@@ -663,18 +663,18 @@ static curved_real_t curved_inverse_answer(curved_inverse_t *self, curved_real_t
     return v;
 }
 
-curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
+/* A sample in which the plays are looked at, once they have seen the drive before. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static curved_real_t curved_inverse_look(curved_inverse_t *self, curved_real_t u)
 {
     curved_reach_t w;
-    curved_reach_t v;
     curved_real_t asked;
-    curved_real_t inside;
     unsigned int bits = 0;
+    curved_reach_t v;
+    curved_real_t inside;
     bool limited = false;
-    if (self->has_pending) { /* what was sent last is what the actuator has seen */
-        curved_inverse_see(self, self->pending);
-        self->has_pending = false;
-    }
     asked = u;
     if (u < CURVED_OUTPUT_MIN) {
         u = CURVED_OUTPUT_MIN;
@@ -698,6 +698,15 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
     self->bits = bits;
     self->status |= bits;
     return curved_inverse_answer(self, inside);
+}
+
+curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
+{
+    if (self->has_pending) { /* what was sent last is what the actuator has seen */
+        curved_inverse_see(self, self->pending);
+        self->has_pending = false;
+    }
+    return curved_inverse_look(self, u);
 }
 
 void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied)

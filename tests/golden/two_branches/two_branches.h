@@ -950,18 +950,38 @@ static two_branches_real_t two_branches_inverse_choose(const two_branches_invers
     return two_branches_inverse_fits(self, v, !up) ? v : self->applied;
 }
 
-two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u)
+/* Answers with the drive for w on the branch of its own move, and with the status it has. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static two_branches_real_t two_branches_inverse_deliver(two_branches_inverse_t *self, two_branches_real_t u,
+    two_branches_real_t w)
+{
+    two_branches_real_t v;
+    two_branches_real_t inside;
+    bool limited = false;
+    v = two_branches_inverse_choose(self, u, w, &limited);
+    self->level = u;
+    if (limited) {
+        self->bits |= TWO_BRANCHES_STATUS_DOMAIN;
+    }
+    inside = two_branches_clamp_drive(v);
+    if (inside < v || inside > v) {
+        self->bits |= TWO_BRANCHES_STATUS_OUTPUT_CLAMPED;
+    }
+    self->status |= self->bits;
+    return two_branches_inverse_answer(self, inside);
+}
+
+/* A sample in which the plays are looked at, once they have seen the drive before. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static two_branches_real_t two_branches_inverse_look(two_branches_inverse_t *self, two_branches_real_t u)
 {
     two_branches_real_t w;
-    two_branches_real_t v;
     two_branches_real_t asked;
-    two_branches_real_t inside;
     unsigned int bits = 0;
-    bool limited = false;
-    if (self->has_pending) { /* what was sent last is what the actuator has seen */
-        two_branches_inverse_see(self, self->pending);
-        self->has_pending = false;
-    }
     asked = u;
     if (!(u >= TWO_BRANCHES_OUTPUT_MIN && u <= TWO_BRANCHES_OUTPUT_MAX)) {
         if (!two_branches_finite(u)) {
@@ -978,18 +998,17 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
     self->reference = asked;
     self->repeat = true;
     w = two_branches_corners_solve(&two_branches_tables, &self->memory, self->corner, u - 0.0f);
-    v = two_branches_inverse_choose(self, u, w, &limited);
-    self->level = u;
-    if (limited) {
-        bits |= TWO_BRANCHES_STATUS_DOMAIN;
-    }
-    inside = two_branches_clamp_drive(v);
-    if (inside < v || inside > v) {
-        bits |= TWO_BRANCHES_STATUS_OUTPUT_CLAMPED;
-    }
     self->bits = bits;
-    self->status |= bits;
-    return two_branches_inverse_answer(self, inside);
+    return two_branches_inverse_deliver(self, u, w);
+}
+
+two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u)
+{
+    if (self->has_pending) { /* what was sent last is what the actuator has seen */
+        two_branches_inverse_see(self, self->pending);
+        self->has_pending = false;
+    }
+    return two_branches_inverse_look(self, u);
 }
 
 void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real_t applied)
