@@ -56,6 +56,7 @@ EVERY = [
     make("thermal", gain_per_degree=0.01, offset_per_degree=0.02, reference=21.0),
     make("thermal", source="self_heating", gain_per_degree=0.01, time_constant=2.0, heating=0.2),
     make("drift", rate=0.5),
+    make("drift", shape="curved", rate=0.5, change=-0.1),
     make("ageing", loss=0.1, travel=20.0),
     make("ageing", shape="exponential", loss=0.1, travel=20.0),
     make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
@@ -130,7 +131,9 @@ NOTHING = [
     make("thermal"),
     make("thermal", source="self_heating", gain_per_degree=0.1, time_constant=1.0, heating=0.0),
     make("drift", rate=0.0),
+    make("drift", shape="curved", rate=0.0, change=0.0),
     make("ageing", loss=0.0, travel=1.0),
+    make("ageing", loss=0.0, travel=5e-324),
     make("ageing", shape="exponential", loss=0.0, travel=1.0),
     make("sensor_nonlinearity", coefficients=(0.0, 0.0), scale=1.0),
     make("noncongruent", coefficients=((0.0,), (0.0,), (0.0,))),
@@ -263,7 +266,10 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
             share, positive, times,
         ),
     ),
-    "drift": st.builds(lambda rate: {"rate": rate}, share),
+    "drift": st.one_of(
+        st.builds(lambda rate: {"rate": rate}, share),
+        st.builds(lambda rate, change: {"shape": "curved", "rate": rate, "change": change}, share, share),
+    ),
     "ageing": st.builds(
         lambda s, a, b: {"shape": s, "loss": a, "travel": b},
         st.sampled_from(["logarithmic", "exponential"]), share, positive,
@@ -564,6 +570,14 @@ def test_ageing_against_the_distance_travelled() -> None:
     assert np.allclose(exponential, 1 - 0.05 * (1 - np.exp(-distance / 3.0)), rtol=1e-12)
     still = make("ageing", loss=0.05, travel=3.0).gain(Run(t, np.ones(len(t))))
     assert np.array_equal(still, np.ones(len(t)))
+
+
+def test_curved_drift_is_a_changing_rate() -> None:
+    t, v = drive()
+    y = make("drift", shape="curved", rate=0.4, change=-0.3).added(Run(t, v))
+    summed = integrate.cumulative_simpson(0.4 - 0.3 * t, x=t, initial=0.0)
+    assert y[0] == 0.0
+    assert np.allclose(y, summed, atol=1e-12)
 
 
 def test_logged_temperature() -> None:

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis import leftovers
-from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
+from hystgen.diagnosis.structure import Actuator, Item, Structure, kept
 from hystgen.effects import chain
-from hystgen.effects.base import Candidate, Effect, Run
+from hystgen.effects.base import Effect, Run
 from hystgen.identification import faults, pi, prepared, thresholds
-from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh
+from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh
 from hystgen.identification.reduction import Course
 from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
 from hystgen.records import Record
@@ -27,36 +27,10 @@ SET_ASIDE = 0.3
 """Share of a single record, its end, that is held out where nothing else can be."""
 
 
-@dataclass(frozen=True)
-class Given:
-    """A front that is kept as it was given: cascades of several stages."""
-
-    given: tuple[Stage, ...]
-    name: str = "as given"
-
-    @property
-    def straight(self) -> Array:
-        """No shape numbers."""
-        return np.empty(0)
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """None."""
-        return np.empty(0), np.empty(0)
-
-    def slack(self, shape: Array) -> Array:
-        """Nothing to hold."""
-        return np.empty(0)
-
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The given ones."""
-        return self.given
-
-
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
     """The believed front as a family around it, and the shape that it has in that family."""
     if not stages:
-        return Straight(), np.empty(0)
+        return Kept(), np.empty(0)
     if len(stages) == 1 and isinstance(stages[0], DeadZone):
         kept = stages[0].over(*drive)
         if kept.breaks:
@@ -74,7 +48,7 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
         lift = float(stages[0].forward(middle, False) - stages[0].forward(middle, True))
         scale = high - low
         return Tanh(drive, 2), np.array([*shape, math.log((down_high - down_low) / scale), max(lift / scale, 0.0)])
-    return Given(tuple(stages)), np.empty(0)
+    return Kept(tuple(stages)), np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -189,9 +163,7 @@ def _ends(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
     """The believed model with its weights, thresholds and front free, and where a search starts."""
     front, shape = front_of(cascade.stages, found.drive)
-    none = np.empty(0)
-    parts = tuple(Part(e.name, Candidate("as given", none, none, none, lambda _, e=e: e)) for e in given)  # type: ignore[misc]
-    return Structure(found.thresholds, front, parts), shape
+    return Structure(found.thresholds, front, tuple(map(kept, given))), shape
 
 
 def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:

@@ -11,32 +11,46 @@ from numpy.typing import NDArray
 from hystgen import effects
 from hystgen.diagnosis.structure import Fitted, Item, Part, Structure
 from hystgen.effects.base import About, Effect
-from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh, even_breaks
+from hystgen.identification.fronts import DeadZones, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 
 BREAKS = 4
 """Breaks of the dead-zone sum that an asymmetry is sought with."""
 
+BENT, ASIDE = 0.3, 2.0
+"""Curvature and place of tanh envelopes from which a search starts too: bent one way all over the range."""
+
 PLACES = 201
 
 
 @dataclass(frozen=True)
 class Option:
-    """One way to extend a hypothesis. `front`: it puts a memoryless part in front, which is named once found."""
+    """One way to extend a hypothesis. `front`: it puts a memoryless part in front, which is named once found.
+
+    `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`.
+    """
 
     label: str
-    structure: Structure
-    starts: tuple[Array, ...]
     name: str
+    structure: Structure
+    alone: Structure
+    starts: tuple[Array, ...]
     front: bool = False
+
+    def joined(self, now: Fitted, numbers: Array) -> Array:
+        """The shape of all, where the extension has these numbers and the rest is as it was."""
+        front_shape, _ = now.structure.pieces(now.shape)
+        if self.front:
+            return np.concatenate([numbers, now.shape[len(front_shape) :]])
+        return np.concatenate([now.shape, numbers])
 
 
 def about(items: Sequence[Item], thresholds: Array) -> About:
     """What the records are like, for the shapes that are worth trying."""
     low = min(float(item.run.v.min()) for item in items)
     high = max(float(item.run.v.max()) for item in items)
-    steps = np.concatenate([np.diff(item.run.t) for item in items])
+    finest = min(float(np.median(np.diff(item.run.t))) for item in items)
     rates = [float(np.max(np.abs(np.diff(item.run.v) / np.diff(item.run.t)))) for item in items]
     columns = set(items[0].run.extra)
     for item in items:
@@ -45,7 +59,7 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
     return About(
         (low, high),
         max(item.output_range for item in items),
-        float(np.median(steps)),
+        finest,
         max(float(np.ptp(item.run.t)) for item in items),
         end - begin,
         max(rates),
@@ -57,18 +71,19 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
 
 def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> list[Option]:
     """Every extension of a hypothesis by one effect."""
-    structure = now.structure
+    structure, held = now.structure, now.structure.held(now.shape)
     there = [part.name for part in structure.parts]
     found = []
-    front_shape, _ = structure.pieces(now.shape)
-    if isinstance(structure.front, Straight):
-        fronts: list[tuple[str, Front]] = [
-            ("front of dead zones", DeadZones(known.drive, even_breaks(known.drive, BREAKS))),
-            ("front of one tanh", Tanh(known.drive)),
+    if not held.front.stages(np.empty(0)):
+        tanh, dead_zones = Tanh(known.drive), DeadZones(known.drive, even_breaks(known.drive, BREAKS))
+        bent = [np.array([BENT, side]) for side in (-ASIDE, ASIDE)]
+        fronts: list[tuple[str, Front, tuple[Array, ...]]] = [
+            ("front of dead zones", dead_zones, (dead_zones.straight,)),
+            ("front of one tanh", tanh, (tanh.straight, *bent)),
         ]
-        for label, front in fronts:
-            start = np.concatenate([front.straight, now.shape[len(front_shape) :]])
-            found.append(Option(label, replace(structure, front=front), (start,), "asymmetry", True))
+        for label, front, starts in fronts:
+            pair = replace(structure, front=front), replace(held, front=front)
+            found.append(Option(label, "asymmetry", *pair, starts, True))
     kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
     kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
     for name, kind in kinds:
@@ -76,8 +91,8 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
             continue
         for candidate in kind.candidates(known):
             part = Part(name, candidate)
-            starts = tuple(np.concatenate([now.shape, one]) for one in (candidate.start, *candidate.others))
-            found.append(Option(candidate.label, replace(structure, parts=(*structure.parts, part)), starts, name))
+            pair = replace(structure, parts=(*structure.parts, part)), replace(held, parts=(*held.parts, part))
+            found.append(Option(candidate.label, name, *pair, (candidate.start, *candidate.others)))
     return found
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_name, options
 from hystgen.diagnosis.structure import Fitted, Item, Structure
-from hystgen.effects.base import Effect
-from hystgen.identification.fronts import Straight
+from hystgen.effects.base import About, Effect
+from hystgen.identification.fronts import Kept
 from hystgen.identification.uncertainty import correlation_time
 
 Array = NDArray[np.float64]
@@ -27,6 +27,9 @@ FIRST_STEPS, SCREENING_STEPS = 2, 4
 KEPT, ALSO = 5, 2
 """Shapes that are followed up after the screening: the best on held-out records, and others that fit best."""
 
+JOINT_STEPS, HOPEFUL = 5, 1.3
+"""Steps of a joint search after which those further behind the best on held-out records go on no more."""
+
 SHAPES = 2
 """Of one effect no more than so many."""
 
@@ -38,14 +41,20 @@ SHARE = 0.05
 ABOVE_NOISE = 0.6
 """The part that it removes has an rms of at least so many times what is left, or the noise if that is more."""
 
-SURE = 1e-3
-"""Largest p-value of the difference in held-out error."""
+SURE, REPEATED = 1e-3, 0.05
+"""Largest p-value of the difference in held-out error; or of that where the fitted records show it with the first."""
 
 ALIKE = 0.05
 """Effects whose held-out rms lies within this share of the best one's cannot be told apart from it."""
 
+UNSURE, DIFFERENT = 0.25, 0.01
+"""Nor can those within this share, unless chance explains the difference with a lower probability than that."""
+
 SIMPLER = 0.02
 """A shape with fewer numbers is taken for one whose held-out rms is better by less than this share."""
+
+EXCHANGE = 0.03
+"""Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
 
 AT_FLOOR = 1.05
 """A held-out error within this factor of the noise leaves nothing to explain."""
@@ -89,6 +98,28 @@ class Outcome:
     rankings: tuple[tuple[Tried, ...], ...]
 
 
+@dataclass(frozen=True)
+class _Records:
+    """What the search is over: the records, thinned ones to tell shapes apart, and what they are like."""
+
+    to_fit: Sequence[Item]
+    held: Sequence[Item]
+    thin: Sequence[Item]
+    thin_held: Sequence[Item]
+    known: About
+    user: Sequence[type[Effect]]
+    noise: float
+    tick: Callable[[], None]
+
+    def extensions(self, now: Fitted) -> list[Tried]:
+        """One effect more, the best shapes of all, the best one first."""
+        return _followed_up(now, _screened(now, self, options(now, self.known, self.user)), self)
+
+    def left(self, fitted: Fitted) -> float:
+        """rms error on held-out records."""
+        return fits.rms(fitted.errors(self.held))
+
+
 def select(
     to_fit: Sequence[Item],
     held: Sequence[Item],
@@ -101,36 +132,65 @@ def select(
     """Refit the believed structure, then add effects as long as one qualifies."""
     refitted = now = fits.fit(base, to_fit, start, _first_weights(base, to_fit, start))
     every = max(1, sum(int(np.count_nonzero(item.known)) for item in to_fit) // SCREENED)
-    thin = [item.thinned(every) for item in to_fit]
-    thin_held = [item.thinned(every) for item in held]
-    known = about(to_fit, base.thresholds)
+    records = _Records(
+        to_fit,
+        held,
+        [item.thinned(every) for item in to_fit],
+        [item.thinned(every) for item in held],
+        about(to_fit, base.thresholds),
+        user,
+        noise,
+        tick,
+    )
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
-    gap = fits.rms(now.errors(held))
+    gap = records.left(now)
     for _ in range(ROUNDS):
-        before = fits.rms(now.errors(held))
+        before = records.left(now)
         if before <= AT_FLOOR * noise:
             break
-        tried = _followed_up(now, _screened(now, thin, thin_held, options(now, known, user), tick), to_fit, held, tick)
+        tried = records.extensions(now)
         if not tried:
             break
         rankings.append(tuple(tried))
-        best = _simplest(tried)
-        # what the effect leaves free in a record must not count as its merit
-        errors = now.errors(held, best.fitted)
-        equal = fits.rms(errors)
-        p_value = difference(errors, best.errors)
-        removed = math.sqrt(max(equal**2 - best.held_out**2, 0.0))
-        if p_value > SURE or removed < ABOVE_NOISE * max(noise, best.held_out) or equal - best.held_out < SHARE * gap:
+        best = _simplest(tried, records.held)
+        merit = _merit(now, best, records)
+        if merit is None or merit.equal - best.held_out < SHARE * gap:
             break
-        margin = ALIKE * best.held_out
-        rivals = [t.name for t in tried if t.name != best.name and t.held_out <= best.held_out + margin]
-        found.append(
-            Found(best.name, best.option.label, before, best.held_out, p_value, tuple(dict.fromkeys(rivals)))
-        )
+        found.append(_found(best, tried, before, merit))
         now = best.fitted
-        now, found = _without_needless(now, found, to_fit, held, noise)
+        now, found = _without_needless(now, found, records)
+        now, found = _exchanged(now, found, records)
     return Outcome(refitted, now, tuple(found), tuple(rankings))
+
+
+@dataclass(frozen=True)
+class _Merit:
+    """What an effect is good for: the error without it on equal terms, and how sure the difference is."""
+
+    equal: float
+    p_value: float
+
+
+def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
+    """None where chance explains the difference, or what is removed is too little to be told from the noise."""
+    # what the effect leaves free in a record must not count as its merit
+    errors = now.errors(records.held, best.fitted)
+    equal = fits.rms(errors)
+    removed = math.sqrt(max(equal**2 - best.held_out**2, 0.0))
+    if removed < ABOVE_NOISE * max(records.noise, best.held_out):
+        return None
+    p_value = difference(errors, best.errors)
+    if p_value > REPEATED:
+        return None
+    fitted = now.errors(records.to_fit, best.fitted)
+    sure = p_value <= SURE or difference(fitted, best.fitted.errors(records.to_fit)) <= SURE
+    return _Merit(equal, p_value) if sure else None
+
+
+def _found(best: Tried, tried: Sequence[Tried], before: float, merit: _Merit) -> Found:
+    rivals = dict.fromkeys(t.name for t in tried if t.name != best.name and _alike(t, best))
+    return Found(best.name, best.option.label, before, best.held_out, merit.p_value, tuple(rivals))
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
@@ -141,22 +201,25 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
     return weights.non_negative(system, np.arange(len(ones)))
 
 
-def _screened(
-    now: Fitted,
-    thin: Sequence[Item],
-    held: Sequence[Item],
-    found: Sequence[Option],
-    tick: Callable[[], None],
-) -> list[tuple[Option, Fitted]]:
-    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not."""
+def _alike(other: Tried, best: Tried) -> bool:
+    """Whether the records leave open which of two effects it is."""
+    worse = other.held_out / best.held_out - 1.0 if best.held_out > 0.0 else math.inf
+    return worse <= ALIKE or (worse <= UNSURE and difference(other.errors, best.errors) > DIFFERENT)
+
+
+def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[tuple[Option, Fitted]]:
+    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
+
+    What was found before keeps its numbers; it is fitted jointly with those that are followed up.
+    """
     tried: list[tuple[float, Option, Fitted]] = []
     for option in found:
-        tick()
-        begun = [fits.fit(option.structure, thin, start, now.weights, FIRST_STEPS) for start in option.starts]
+        records.tick()
+        begun = [fits.fit(option.alone, records.thin, start, now.weights, FIRST_STEPS) for start in option.starts]
         best = min(begun, key=lambda each: each.rms)
-        fitted = fits.fit(option.structure, thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
+        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
         if math.isfinite(fitted.rms):
-            tried.append((fits.rms(fitted.errors(held)), option, fitted))
+            tried.append((fits.rms(fitted.errors(records.thin_held)), option, fitted))
     kept: list[tuple[Option, Fitted]] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one[0]), sorted(tried, key=lambda one: one[2].rms)
     for order, most in ((by_held_out, KEPT), (by_fit, KEPT + ALSO)):
@@ -168,54 +231,82 @@ def _screened(
     return kept
 
 
-def _followed_up(
-    now: Fitted,
-    kept: Sequence[tuple[Option, Fitted]],
-    to_fit: Sequence[Item],
-    held: Sequence[Item],
-    tick: Callable[[], None],
-) -> list[Tried]:
+def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _Records) -> list[Tried]:
     """The options fitted to everything and run over the held-out records, the best one first."""
-    tried = []
+    begun = []
     for option, screened in kept:
-        tick()
-        fitted = fits.fit(option.structure, to_fit, screened.shape, screened.weights)
+        records.tick()
+        shape = option.joined(now, screened.shape)
+        fitted = fits.fit(option.structure, records.to_fit, shape, screened.weights, JOINT_STEPS)
+        begun.append((records.left(fitted), option, fitted))
+    hopeful = HOPEFUL * min((left for left, _, _ in begun), default=0.0)
+    tried = []
+    for left, option, fitted in begun:
+        if left <= hopeful:
+            fitted = fits.fit(option.structure, records.to_fit, fitted.shape, fitted.weights)
         if fitted.rms >= now.rms:
             continue
-        errors = fitted.errors(held)
+        errors = fitted.errors(records.held)
         name = option.name
         if option.front:
-            drive = about(to_fit, now.structure.thresholds).drive
-            name = front_name(fitted.structure.front, fitted.structure.pieces(fitted.shape)[0], drive)
+            shape, _ = fitted.structure.pieces(fitted.shape)
+            name = front_name(fitted.structure.front, shape, records.known.drive)
         tried.append(Tried(option, fitted, name, fits.rms(errors), errors))
     return sorted(tried, key=lambda each: each.held_out)
 
 
-def _simplest(tried: Sequence[Tried]) -> Tried:
-    """The best, or one of fewer numbers that is about as good."""
-    near = [each for each in tried if each.held_out <= (1.0 + SIMPLER) * tried[0].held_out]
-    return min(near, key=lambda each: (each.numbers, each.held_out))
+def _simplest(tried: Sequence[Tried], held: Sequence[Item]) -> Tried:
+    """The best, or one of fewer numbers that is about as good where both leave the same free in every record."""
+    best = tried[0]
+    enough = (1.0 + SIMPLER) * best.held_out
+    near = [each for each in tried if fits.rms(each.fitted.errors(held, best.fitted)) <= enough]
+    return min(near or [best], key=lambda each: (each.numbers, each.held_out))
 
 
-def _without_needless(
-    now: Fitted, found: list[Found], to_fit: Sequence[Item], held: Sequence[Item], noise: float
-) -> tuple[Fitted, list[Found]]:
+def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
     """Drop effects accepted earlier that those accepted later have made needless."""
     for k in range(len(found) - 1):
-        name = found[k].name
-        smaller = _less(now, name)
-        if smaller is None:
+        fitted = _without(now, found[k].name, records)
+        if fitted is None:
             continue
-        structure, start = smaller
-        fitted = fits.fit(structure, to_fit, start, now.weights)
-        with_it, without = fits.rms(now.errors(held)), fits.rms(fitted.errors(held))
-        if math.sqrt(max(without**2 - with_it**2, 0.0)) < 0.5 * ABOVE_NOISE * noise:
-            rest = [each for each in found if each.name != name]
-            # each step of the gap is between two models that there are
-            rest = [replace(each, before=found[k].before) if each is rest[k] else each for each in rest]
-            rest[-1] = replace(rest[-1], after=without)
-            return _without_needless(fitted, rest, to_fit, held, noise)
+        with_it, without = records.left(now), records.left(fitted)
+        if math.sqrt(max(without**2 - with_it**2, 0.0)) < 0.5 * ABOVE_NOISE * records.noise:
+            return _without_needless(fitted, _rest(found, k, without), records)
     return now, found
+
+
+def _exchanged(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
+    """Put another effect or shape in the place of one accepted earlier, where those accepted later make it the better.
+
+    The first of two has been chosen while the second was missing, and may have taken part of its place.
+    """
+    for k in range(len(found) - 1):
+        fitted = _without(now, found[k].name, records)
+        tried = [] if fitted is None else records.extensions(fitted)
+        if fitted is None or not tried:
+            continue
+        best = _simplest(tried, records.held)
+        if best.held_out > (1.0 - EXCHANGE) * records.left(now):
+            continue
+        without = records.left(fitted)
+        merit = _merit(fitted, best, records)
+        if merit is not None:
+            rest = [*_rest(found, k, without), _found(best, tried, without, merit)]
+            return _exchanged(*_without_needless(best.fitted, rest, records), records)
+    return now, found
+
+
+def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
+    """What was found but the k-th; each step of the gap is between two models that there are."""
+    rest = [*found[:k], replace(found[k + 1], before=found[k].before), *found[k + 2 :]]
+    rest[-1] = replace(rest[-1], after=without)
+    return rest
+
+
+def _without(now: Fitted, name: str, records: _Records) -> Fitted | None:
+    """The hypothesis less one effect, fitted anew."""
+    smaller = _less(now, name)
+    return None if smaller is None else fits.fit(smaller[0], records.to_fit, smaller[1], now.weights)
 
 
 def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
@@ -226,7 +317,7 @@ def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
         kept = tuple(part for part, _ in parts)
         return replace(now.structure, parts=kept), np.concatenate([front_shape, *(x for _, x in parts)])
     if name in ("asymmetry", "saturation") and len(front_shape):
-        return replace(now.structure, front=Straight()), np.concatenate([np.empty(0), *numbers])
+        return replace(now.structure, front=Kept()), np.concatenate([np.empty(0), *numbers])
     return None
 
 

@@ -17,11 +17,15 @@ from hystgen import operators
 from hystgen.effects.base import Candidate, Effect, Place, Run
 from hystgen.identification import joint, reduction, weights
 from hystgen.identification.constrained import root_mean_square
-from hystgen.identification.fronts import Front
+from hystgen.identification.fronts import Front, Kept
 from hystgen.identification.joint import DIFFERENCE, Shaped
 from hystgen.models import Stage
 
 Array = NDArray[np.float64]
+
+
+REMEMBERED, MOST_BYTES = 3, 2**28
+"""Movements of the plays that are remembered for a record, and the size of one that is."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,7 @@ class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
     `session`: all records on one time axis, where they are of one session, and `part` what of it is this record.
+    `moved`: how the plays moved lately, by what moved them, since most numbers of a search do not change it.
     """
 
     name: str
@@ -38,6 +43,7 @@ class Item:
     output_range: float
     session: Run | None = None
     part: slice = field(default_factory=lambda: slice(None))
+    moved: dict[object, Array] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -59,6 +65,12 @@ class Part:
 
     name: str
     candidate: Candidate
+
+
+def kept(effect: Effect) -> Part:
+    """An effect that stays as it is."""
+    none = np.empty(0)
+    return Part(effect.name, Candidate("as it is", none, none, none, lambda _: effect))
 
 
 @dataclass(frozen=True)
@@ -100,6 +112,12 @@ class Structure:
         """The effects, in the order of the parts."""
         return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
 
+    def held(self, shape: Array) -> Structure:
+        """The same without numbers to find: what they make, kept as it is."""
+        front_shape, _ = self.pieces(shape)
+        front = Kept(self.front.stages(front_shape), self.front.name)
+        return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
+
     def actuator(self, shape: Array) -> Actuator:
         """What the numbers make."""
         return Actuator(self.thresholds, self.front.stages(self.pieces(shape)[0]), tuple(self.effects(shape)))
@@ -127,19 +145,9 @@ class Actuator:
         With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once.
         """
         run = item.run
-        a = run.v
-        for effect in self.at(Place.DRIVE):
-            a = effect.drive(a, run)
-        course = reduction.Course(item.name, a, a, item.history, 0, len(a), 0.0)
-        course = joint.through_front(course, self.stages)
-        w = course.v
-        start = reduction.start_states(w, course.history, self.thresholds)
-        memory = self.at(Place.PLAYS)
-        plays = operators.plays(w, self.thresholds, start)
-        for k, effect in enumerate(memory):
-            plays = effect.bent(plays, self.thresholds) if k else effect.plays(w, run, self.thresholds, start)
+        plays = self._plays(item)
         rows = plays if p is None else (p @ plays)[None, :]
-        constant = np.zeros(len(w))
+        constant = np.zeros(plays.shape[1])
         linear = self.at(Place.LINEAR)
         for effect in linear:
             if effect.order == 0:
@@ -154,6 +162,29 @@ class Actuator:
             if effect.order > 0:
                 rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
         return rows, constant
+
+    def _plays(self, item: Item) -> Array:
+        """(n + 1, N) plays along the record; those of the last few hypotheses are remembered."""
+        before, memory = tuple(self.at(Place.DRIVE)), tuple(self.at(Place.PLAYS))
+        key = (self.thresholds.tobytes(), before, self.stages, memory)
+        if key in item.moved:
+            item.moved[key] = plays = item.moved.pop(key)  # the latest one comes last
+            return plays
+        a = item.run.v
+        for effect in before:
+            a = effect.drive(a, item.run)
+        course = reduction.Course(item.name, a, a, item.history, 0, len(a), 0.0)
+        course = joint.through_front(course, self.stages)
+        w = course.v
+        start = reduction.start_states(w, course.history, self.thresholds)
+        plays = operators.plays(w, self.thresholds, start)
+        for k, effect in enumerate(memory):
+            plays = effect.bent(plays, self.thresholds) if k else effect.plays(w, item.run, self.thresholds, start)
+        while len(item.moved) >= REMEMBERED:
+            del item.moved[next(iter(item.moved))]
+        if plays.nbytes <= MOST_BYTES:
+            item.moved[key] = plays
+        return plays
 
     def mapped(self, h: Array, level: float, item: Item) -> Array:
         """The output behind its maps, a limit in front of the offset and a sensor behind it; the offset is `level`."""

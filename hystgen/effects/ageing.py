@@ -50,7 +50,9 @@ class LogarithmicAgeing(_Ageing):
 
     def gain(self, run: Run) -> Array:
         """The falling gain."""
-        return np.asarray(1.0 - self.loss * np.log10(1.0 + self.travelled(run) / self.travel))
+        with np.errstate(over="ignore"):
+            travels = np.minimum(self.travelled(run) / self.travel, 1e300)
+        return np.asarray(1.0 - self.loss * np.log10(1.0 + travels))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

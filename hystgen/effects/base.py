@@ -56,6 +56,7 @@ class About:
     drive: tuple[float, float]
     output_range: float
     sample_time: float
+    """of the most finely sampled record, s"""
     duration: float
     """of the longest record, s"""
     session: float

@@ -32,10 +32,10 @@ class Delay(Effect):
     def candidates(cls, about: About) -> list[Candidate]:
         """The time, from none to a tenth of the longest record."""
         low, high, start, value = from_zero(0.1 * about.sample_time, 0.1 * about.duration, about.sample_time)
+        far = tuple(low + share * (high - low) for share in (0.3, 0.5, 0.7))
         return [
             Candidate(
-                "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), np.zeros(1),
-                (low + 0.5 * (high - low),),
+                "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), np.zeros(1), far
             )
         ]
 

@@ -77,7 +77,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
     """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
 
     The linear case is exact. Else steps that are exact for the equation straightened about `e` (exponential
-    Rosenbrock-Euler), as long as the curvature allows.
+    Rosenbrock-Euler), with the leading term of the curvature, as long as what is left out allows.
     """
     if exponent == 1.0:
         final = e + (speed - e / tau) * duration * mean_decay(duration / tau)
@@ -109,10 +109,14 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if speed == 0.0:
             final = max(final, 0.0)
         bend = slope / e
-        if abs(final - e) > 0.1 * e:
+        if abs(final - e) > 0.1 * e or part > 0.5 or exponent < 1.0:
             end = max(final, 0.1 * e)
             bend = max(bend, exponent * scale / tau * (end / scale) ** exponent / end / end)
-        wrong = step * step * step * bend * abs(exponent - 1.0) * change * change / 12.0
+            wrong = step * step * step * bend * abs(exponent - 1.0) * change * change / 12.0
+        else:  # the curvature about e adds its leading term
+            more = step * step * step * bend * (1.0 - exponent) * change * change / 6.0
+            final += more
+            wrong = abs(more) * (0.25 * abs(exponent - 2.0) * abs(change) * step / e + part)
         if wrong > CLOSE * scale and (final > 0.0 or e > CLOSE * scale):
             step *= max(0.2, 0.9 * (CLOSE * scale / wrong) ** (1.0 / 3.0))
             continue

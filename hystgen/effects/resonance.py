@@ -71,18 +71,21 @@ class Resonance(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Frequency from two periods a record to the sampling rate, damping 0.3 % to 1; three starts over log f."""
+        """Frequency from two periods a record to the sampling rate, damping 0.3 % to 1; starts all over log f."""
         low, high = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
 
         def build(x: Array) -> Resonance:
             return cls(name="resonance", frequency=float(10.0 ** x[0]), damping=float(10.0 ** x[1]))
 
+        def start(place: float) -> Array:
+            return np.array([high - max(high - low, 0.0) * place, -1.3])
+
         return [
             Candidate(
-                f"resonance, {name}", np.array([low, -2.5]), np.array([high, 0.0]),
-                np.array([high - max(high - low, 0.0) * place, -1.3]), build,
+                f"resonance, {name}", np.array([low, -2.5]), np.array([high, 0.0]), start(first), build,
+                others=tuple(map(start, others)),
             )
-            for name, place in (("high", 0.2), ("middle", 0.4), ("low", 0.6))
+            for name, first, *others in (("high", 0.12, 0.2, 0.28), ("middle", 0.36, 0.44, 0.52), ("low", 0.6, 0.7, 0.8))
         ]  # fmt: skip
 
 

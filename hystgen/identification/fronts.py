@@ -56,9 +56,10 @@ class Front(Protocol):
 
 
 @dataclass(frozen=True)
-class Straight:
-    """No memoryless part: a plain play sum."""
+class Kept:
+    """A memoryless part that stays as it is; by default none, which makes a plain play sum."""
 
+    given: tuple[Stage, ...] = ()
     name: str = "pi"
 
     @property
@@ -76,8 +77,8 @@ class Straight:
         return np.empty(0)
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """No stage."""
-        return ()
+        """The stages as they are."""
+        return self.given
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hystgen import operators
 from hystgen.identification import constrained, faults, joint, pi, reduction, thresholds, weights
-from hystgen.identification.fronts import DeadZones, Front, Straight, Tanh, even_breaks
+from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
 from hystgen.models import Stage
@@ -72,7 +72,7 @@ def solve(
     """
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
-        return Fitted(Straight(), np.empty(0), plain), compared
+        return Fitted(Kept(), np.empty(0), plain), compared
     # What a play sum alone would choose is bent by the front that it lacks: the shape is sought over a dense list
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
