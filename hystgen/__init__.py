@@ -33,6 +33,7 @@ _PLACES = {
     "identify": "api",
     "identify_batch": "api",
     "load": "api",
+    "plan": "api",
     "report_fit": "api",
     "schema": "params",
     "verify": "api",
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from hystgen.api import identify as identify
     from hystgen.api import identify_batch as identify_batch
     from hystgen.api import load as load
+    from hystgen.api import plan as plan
     from hystgen.api import report_fit as report_fit
     from hystgen.api import verify as verify
     from hystgen.models import PI as PI

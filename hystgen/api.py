@@ -286,6 +286,13 @@ def diagnose(source: Model | str | os.PathLike[str], records: Any, **options: An
     return diagnosis.diagnose(source, records, **options)
 
 
+def plan(source: Model | str | os.PathLike[str], **options: Any) -> Any:
+    """Drive records to measure for a diagnosis; see `hystgen.diagnosis.plan.plan`."""
+    from hystgen.diagnosis import plan as drives
+
+    return drives.plan(source, **options)
+
+
 def identify(records: Any, **options: Any) -> Any:
     """Fit a model to measured records; see `hystgen.identification.identify`."""
     from hystgen import identification
@@ -330,6 +337,7 @@ __all__ = [
     "identify",
     "identify_batch",
     "load",
+    "plan",
     "report_fit",
     "verify",
 ]

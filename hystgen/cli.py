@@ -38,7 +38,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     """Run `action` and turn what it may raise into a message and an exit code."""
     from hystgen.models import NotInvertibleError
     from hystgen.params import ParameterError
-    from hystgen.problems import RecordError, UnsupportedEffectsError
+    from hystgen.problems import PlanError, RecordError, UnsupportedEffectsError
     from hystgen.tables import FormatError
 
     try:
@@ -48,7 +48,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
         for warning in caught:
             click.echo(f"warning: {warning.message}", err=True)
         return result
-    except (ParameterError, RecordError) as error:
+    except (ParameterError, PlanError, RecordError) as error:
         raise _Failed(str(error), 2) from None
     except NotInvertibleError as error:
         raise _Failed("\n".join(f"{path}: error: no inverse: {reason}" for reason in error.reasons), 1) from None
@@ -166,6 +166,25 @@ def verify(
             _shown(file, partial(write_atomically, file, text()))
     if not report.ok:
         raise _Failed("verification failed", 1)
+
+
+def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | None, sample_time: float | None) -> None:
+    """Write the drive records that a diagnosis needs; prints the files and the command to run on the measured ones."""
+    from hystgen.diagnosis.plan import plan
+    from hystgen.report import drawing
+
+    def run() -> None:
+        drawing.require()
+        planned = plan(params, effects=effects, max_rate=max_rate, sample_time=sample_time)
+        _keep([Path(output) / name for name in planned.names], [params, *effects])
+        for sentence in planned.defaults:
+            click.echo(sentence, err=True)
+        click.echo(planned.sentence(), err=True)
+        for path in planned.write(output):
+            click.echo(str(path))
+        click.echo(f"then run: {planned.command(output)}", err=True)
+
+    _shown(params, run)
 
 
 def _keep(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
@@ -403,19 +422,41 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
 
 @main.command()
 @params_argument
-@click.argument("data", nargs=-1, required=True, type=click.Path())
-@click.option("-o", "output", required=True, type=click.Path(file_okay=False), help="folder for what is found")
+@click.argument("data", nargs=-1, type=click.Path())
+@click.option("-o", "output", type=click.Path(file_okay=False), help="folder for what is found, or planned")
 @click.option("--holdout", multiple=True, type=click.Path(), help="record that judges and takes no part in the fits")
+@click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
+@click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
 @effects_option
 @record_options
 def diagnose(
-    params: str, data: tuple[str, ...], output: str, holdout: tuple[str, ...], effects: tuple[str, ...],
-    history: str | None, rest: float, **reading: Any,
+    params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
+    plan: bool, max_rate: float | None, history: str | None, rest: float, **reading: Any,
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
+
+    Example: hystgen diagnose --plan stage_x.yaml --max-rate 5000 -o plan/
     """
+    if output is None:
+        what = "the drives, as in -o plan/" if plan else "what is found, as in -o diagnosis/"
+        raise click.UsageError(f"Missing option '-o': give a folder for {what}")
+    if plan:
+        unused = {"DATA": data, "--holdout": holdout, "--history": history, "--rest": rest}
+        unused |= {f"--{option}": reading[option] for option in ("columns", "delimiter")}
+        given = [option for option, value in unused.items() if value]
+        if given:
+            raise click.UsageError(
+                f"--plan comes before anything is measured: leave out {', '.join(given)}, or leave out --plan to "
+                "diagnose records"
+            )
+        _plan(params, output, effects, max_rate, reading["sample_time"])
+        return
+    if not data:
+        raise click.UsageError("Missing argument 'DATA...'; --plan writes drive records to measure")
+    if max_rate is not None:
+        raise click.UsageError("--max-rate is for drives; give --plan with it")
     from hystgen import diagnosis
     from hystgen.effects import load_user_effects
     from hystgen.report import drawing

@@ -91,6 +91,14 @@ class RecordError(ValueError):
         super().__init__("\n".join(self.problems))
 
 
+class PlanError(ValueError):
+    """A plan that cannot be made, with every reason in `problems`; `str()` gives a line a problem."""
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = list(problems)
+        super().__init__("\n".join(f"error: {problem}" for problem in self.problems))
+
+
 class EffectsError(ValueError):
     """An effect that cannot be used, or not with these records."""
 

@@ -1,0 +1,124 @@
+"""The page of a plan: which drives to record, what each is for, in which order, and what to run afterwards."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+from hystgen import __version__
+from hystgen.diagnosis.plan import EDGE, MEASURED, lasting
+from hystgen.report import drawing
+from hystgen.report.drawing import label
+from hystgen.report.html import Figure, Listing, Section, Table, Text, page
+
+if TYPE_CHECKING:
+    from hystgen.diagnosis.plan import Plan
+
+WIDE, NARROW = (9.0, 5), (4.2, 3)
+"""Width in inches and panels side by side."""
+
+FIT, JUDGE = drawing.MEASURED, drawing.MODEL
+
+
+def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
+    """The page for drives in `folder`. Raises PlotError without matplotlib."""
+    with drawing.styled():
+        wide, narrow = (drawing.content(_drives(plan, *size), "svg") for size in (WIDE, NARROW))
+    figure = Figure("drives", wide, narrow, CAPTION, ALTERNATIVE)
+    home = os.fspath(folder).rstrip("/\\")
+    lead = [
+        Text(f"Drives that tell all effects apart. {plan.sentence()}"),
+        Text(f"When the measured records are in {home}/{MEASURED}, run:", plan.command(folder)),
+    ]
+    sections = [
+        Section("What to do", [Listing(_steps(plan, home))]),
+        Section("The drives", [figure, _table(plan)]),
+        Section("What these records cannot show", [Listing(_limits(plan))]),
+        Section("Provenance", [Text(f"hystgen {__version__}; the same parameter file gives the same drives.")]),
+    ]
+    return page(f"{plan.parameters.name}: drives for a diagnosis", lead, sections)
+
+
+def _unit(plan: Plan) -> str:
+    return f" {plan.parameters.units.input}" if plan.parameters.units.input else ""
+
+
+def _rate(plan: Plan, rate: float) -> str:
+    return f"{rate:.4g}{_unit(plan) or ' 1'}/s"
+
+
+def _steps(plan: Plan, home: str) -> list[str]:
+    unit = _unit(plan)
+    top, bottom = (f"{value:g}{unit}" for value in plan.history)
+    return [
+        *plan.defaults,
+        f"No record goes below {bottom} or above {top}, and none changes faster than {_rate(plan, plan.max_rate)}.",
+        f"Before the first record go to {top}, then to {bottom}. Every record ends with the same two moves, so "
+        f"--history={','.join(map(repr, plan.history))} is true of all.",
+        f"Record them in the order of their numbers. Rest {plan.rest:g} s at {bottom} before each, or longer.",
+        "t is one session clock for all records: keep what the clock really showed, rests included. Drift, heat and "
+        "ageing are seen by it.",
+        f"Store each record as {home}/{MEASURED}/ and its name, with columns t, v and the displacement y; log "
+        "temperature (degC) as a further column, if there is a thermometer.",
+        "Let v be the drive as measured at the time of y. A generator that holds each value until the next is half a "
+        "sample late, and a commanded v would show that as a delay.",
+    ]
+
+
+def _table(plan: Plan) -> Table:
+    rows = [["record", "what it is for", "tells apart", "role", "samples", "every", "starts at", "lasts", "fastest"]]
+    for drive in plan.drives:
+        rows.append(
+            [
+                drive.name,
+                drive.purpose,
+                ", ".join(drive.shows),
+                "held out" if drive.held_out else "fit",
+                str(len(drive.t)),
+                f"{drive.sample_time:.4g} s",
+                f"{drive.t[0]:.1f} s",
+                lasting(float(drive.t[-1] - drive.t[0])),
+                _rate(plan, drive.fastest),
+            ]
+        )
+    return Table(rows, (0, 1, 2, 3))
+
+
+def _limits(plan: Plan) -> list[str]:
+    fast = min(drive.sample_time for drive in plan.drives)
+    said = [
+        f"A slew limit above {_rate(plan, max(drive.fastest for drive in plan.drives))}: no record is faster.",
+        f"A resonance above {1.0 / (EDGE * fast):.3g} Hz, and lags and delays far below {fast:.3g} s: the fast records "
+        "are not sampled more often.",
+        f"Creep with time constants far above {lasting(plan.duration)}, which the session lasts: it looks like drift.",
+    ]
+    if fast > 1.5 * plan.sample_time:
+        said.append(
+            f"What needs the sample time of {plan.sample_time:g} s: at this rate limit a move over the range takes so "
+            f"long that the fast records are sampled every {fast:.3g} s. A larger --max-rate shows more and is quicker."
+        )
+    return said
+
+
+def _drives(plan: Plan, width: float, columns: int) -> Any:
+    rows = -(-len(plan.drives) // columns)
+    drawn = drawing.figure(width, 1.55 * rows + 0.3)
+    grid = drawn.subplots(rows, columns, sharey=True, squeeze=False)
+    for axes, drive in zip(grid.flat, plan.drives, strict=False):
+        chosen = drawing.kept(0, len(drive.t), drive.v)
+        seconds = drive.t[chosen] - drive.t[0]
+        scale, unit = (1e3, "ms") if seconds[-1] < 1.0 else (1.0, "s")
+        axes.plot(scale * seconds, drive.v[chosen], color=JUDGE if drive.held_out else FIT, linewidth=0.8)
+        number, _, name = drive.name.removesuffix(".csv").partition("_")
+        axes.set_title(f"{number} {name.replace('_', ' ')}", fontsize=8.5)
+        axes.set_xlabel(unit, fontsize=8, labelpad=1)
+        axes.tick_params(labelsize=7.5)
+    for axes in list(grid.flat)[len(plan.drives) :]:
+        axes.set_axis_off()
+    drawn.supylabel(label("drive", plan.parameters.units.input), fontsize=9)
+    return drawn
+
+
+CAPTION = "All drives in the order of recording, each on its own time axis; blue: to fit, orange: held out, to judge."
+
+ALTERNATIVE = "A panel for every record: its drive along time, with the names of the records as titles."
