@@ -49,6 +49,9 @@ EDGE = 4
 LONGEST_EDGE = 32
 """Most samples of a full-scale move at the rate limit; a longer one is sampled less often."""
 
+ROUND = 3
+"""Samples over which every drive is averaged: a sharper corner would lie between samples, where no record sees it."""
+
 MOVE = 12
 """Fewest samples of a full-scale move of a triangle."""
 
@@ -128,7 +131,7 @@ class Plan:
         held_out = sum(drive.held_out for drive in self.drives)
         return (
             f"{len(self.drives)} records, {held_out} of them held out, {self.samples} samples; the session takes "
-            f"{lasting(self.duration)}."
+            f"{lasting(self.duration)}, rests included."
         )
 
     def command(self, folder: str | os.PathLike[str]) -> str:
@@ -321,12 +324,17 @@ class Course:
         return (self.codes[-1] - self._grid.low) / (self._grid.high - self._grid.low)
 
     def go(self, place: float, pace: float = 0.0) -> None:
-        """A straight move at `pace` samples a full-scale one, in `EDGE` samples or more, within the rate limit."""
+        """A straight move at `pace` samples a full-scale one, in `EDGE` samples or more, within the rate limit.
+
+        Then the drive stands still, so that with round corners two samples remain at the turning point: it is sampled
+        behind a delay of any fraction of a sample, too.
+        """
         begin, end = self.codes[-1], self._code(place)
         size = abs(end - begin)
         samples = max(EDGE, math.ceil(pace * abs(place - self.place)), -(-size // max(self._step - 1, 1)))
         for k in range(1, samples + 1):
             self.codes.append(begin + (2 * (end - begin) * k + samples) // (2 * samples))
+        self.hold(ROUND)
 
     def hold(self, samples: int) -> None:
         """The drive stands still."""
@@ -341,6 +349,12 @@ class Course:
         codes = [middle + round(size * value) for value in values]
         self.go((codes[0] - self._grid.low) / (self._grid.high - self._grid.low), self.pace)
         self.codes += codes[1:]
+
+    def rounded(self) -> list[int]:
+        """The drive with round corners."""
+        half = ROUND // 2
+        padded = [self.codes[0]] * half + self.codes + [self.codes[-1]] * half
+        return [(2 * sum(padded[k : k + ROUND]) + ROUND) // (2 * ROUND) for k in range(len(self.codes))]
 
     def _code(self, place: float) -> int:
         return self._grid.low + round(place * (self._grid.high - self._grid.low))
@@ -368,7 +382,7 @@ def _written(record: Kind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
     course.go(1.0, pace)
     course.go(0.0, pace)
     course.hold(EDGE)
-    return course.codes
+    return course.rounded()
 
 
 def _triangles(course: Course) -> None:
@@ -386,11 +400,9 @@ def _nested(course: Course, pace: float) -> None:
 
 
 def _slow(course: Course) -> None:
-    course.go(1.0, 100)
-    course.go(0.0, 100)
-    for k in range(1, 5):
-        course.go(1.0 - 0.1 * k, 100)
-        course.go(0.1 * k, 100)
+    for k in range(5):
+        course.go(1.0 - 0.1 * k, 75)
+        course.go(0.1 * k, 75)
 
 
 def _minor(course: Course, pace: float, size: float = 0.25) -> None:
@@ -429,9 +441,9 @@ def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
         course.hold(hold)
 
 
-def _sweep(course: Course, samples: int = 900) -> None:
-    """Frequency rises with the square of time to a sixth of the sampling rate, amplitude falls as the limit demands."""
-    first, last = 1.0 / (16.0 * course.pace), 1.0 / 6.0
+def _sweep(course: Course, samples: int = 1100) -> None:
+    """Frequency rises with the square of time to an eighth of the sampling rate, amplitude falls as the limit demands."""
+    first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
         x = k / samples
@@ -466,7 +478,7 @@ def _staircase(course: Course) -> None:
         (0.35, 0), (0.8, 2), (0.55, 0), (1.0, 0), (0.0, 0), (0.9, 0), (0.45, 4), (0.65, 0), (0.2, 0)
     ):  # fmt: skip
         course.go(level, slower * course.pace)
-        course.hold(60)
+        course.hold(70)
 
 
 def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
@@ -525,11 +537,11 @@ RECORDS = (
     Kind(
         "fast_steps", "Full-scale and smaller steps with resolved edges: a tail is a lag, a shift a delay, a straight "
         "slope a slew limit, ringing a resonance.",
-        ("lag", "delay", "slew_limit", "resonance"), partial(_steps, hold=110, levels=FULL_STEPS), _fast,
+        ("lag", "delay", "slew_limit", "resonance"), partial(_steps, hold=130, levels=FULL_STEPS), _fast,
     ),
     Kind(
         "holds", "Long holds after moves both ways: creep follows the last move, drift does not.",
-        ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(2.5, 700),
+        ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
     ),
     Kind(
         "staircase", "Steps of other sizes and speeds, to judge what the fast records say.",
@@ -549,7 +561,7 @@ RECORDS = (
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
     Kind(
-        "sweep", "A sine from slow to a sixth of the sampling rate: the peak of a resonance, the phase of a lag.",
+        "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
         ("resonance", "lag", "delay"), _sweep, _fast,
     ),
     Kind(

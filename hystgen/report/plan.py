@@ -12,7 +12,7 @@ from hystgen.report.drawing import label
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 if TYPE_CHECKING:
-    from hystgen.diagnosis.plan import Plan
+    from hystgen.diagnosis.plan import Drive, Plan
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
 """Width in inches and panels side by side."""
@@ -32,8 +32,9 @@ def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
     ]
     sections = [
         Section("What to do", [Listing(_steps(plan, home))]),
-        Section("The drives", [figure, _table(plan)]),
-        Section("What these records cannot show", [Listing(_limits(plan))]),
+        Section("The drives", [figure, _times(plan)]),
+        Section("What each is for", [Listing([_purpose(drive) for drive in plan.drives])]),
+        Section("Limits", [Listing([*_kept(plan), *_limits(plan)])]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same parameter file gives the same drives.")]),
     ]
     return page(f"{plan.parameters.name}: drives for a diagnosis", lead, sections)
@@ -51,8 +52,6 @@ def _steps(plan: Plan, home: str) -> list[str]:
     unit = _unit(plan)
     top, bottom = (f"{value:g}{unit}" for value in plan.history)
     return [
-        *plan.defaults,
-        f"No record goes below {bottom} or above {top}, and none changes faster than {_rate(plan, plan.max_rate)}.",
         f"Before the first record go to {top}, then to {bottom}. Every record ends with the same two moves, so "
         f"--history={','.join(map(repr, plan.history))} is true of all.",
         f"Record them in the order of their numbers. Rest {plan.rest:g} s at {bottom} before each, or longer.",
@@ -65,37 +64,47 @@ def _steps(plan: Plan, home: str) -> list[str]:
     ]
 
 
-def _table(plan: Plan) -> Table:
-    rows = [["record", "what it is for", "tells apart", "role", "samples", "every", "starts at", "lasts", "fastest"]]
+def _times(plan: Plan) -> Table:
+    rows = [["record", "role", "starts at", "lasts", "samples", "one every", "fastest"]]
     for drive in plan.drives:
         rows.append(
             [
                 drive.name,
-                drive.purpose,
-                ", ".join(drive.shows),
                 "held out" if drive.held_out else "fit",
-                str(len(drive.t)),
-                f"{drive.sample_time:.4g} s",
                 f"{drive.t[0]:.1f} s",
                 lasting(float(drive.t[-1] - drive.t[0])),
+                str(len(drive.t)),
+                f"{drive.sample_time:.4g} s",
                 _rate(plan, drive.fastest),
             ]
         )
-    return Table(rows, (0, 1, 2, 3))
+    return Table(rows, (0, 1))
+
+
+def _purpose(drive: Drive) -> str:
+    return f"{drive.name}: {drive.purpose} Tells apart: {', '.join(drive.shows)}."
+
+
+def _kept(plan: Plan) -> list[str]:
+    top, bottom = (f"{value:g}{_unit(plan)}" for value in plan.history)
+    return [
+        *plan.defaults,
+        f"No record goes below {bottom} or above {top}, and none changes faster than {_rate(plan, plan.max_rate)}.",
+    ]
 
 
 def _limits(plan: Plan) -> list[str]:
-    fast = min(drive.sample_time for drive in plan.drives)
+    fast, fastest = min(drive.sample_time for drive in plan.drives), max(drive.fastest for drive in plan.drives)
     said = [
-        f"A slew limit above {_rate(plan, max(drive.fastest for drive in plan.drives))}: no record is faster.",
-        f"A resonance above {1.0 / (EDGE * fast):.3g} Hz, and lags and delays far below {fast:.3g} s: the fast records "
-        "are not sampled more often.",
-        f"Creep with time constants far above {lasting(plan.duration)}, which the session lasts: it looks like drift.",
+        f"Cannot be seen: a slew limit above {_rate(plan, fastest)}, since no record is faster.",
+        f"Cannot be seen: a resonance above {1.0 / (EDGE * fast):.3g} Hz, and lags and delays far below {fast:.3g} s, "
+        "since no record is sampled more often.",
+        f"Cannot be told from drift: creep with time constants far above {lasting(plan.duration)}, the whole session.",
     ]
     if fast > 1.5 * plan.sample_time:
         said.append(
-            f"What needs the sample time of {plan.sample_time:g} s: at this rate limit a move over the range takes so "
-            f"long that the fast records are sampled every {fast:.3g} s. A larger --max-rate shows more and is quicker."
+            f"Fast records are sampled every {fast:.3g} s, not every {plan.sample_time:g} s: at this rate limit a move "
+            "over the range takes so long. A larger --max-rate shows more, and sooner."
         )
     return said
 

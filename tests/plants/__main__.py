@@ -19,7 +19,7 @@ def _seeds(text: str) -> range:
 
 
 def main(words: list[str] | None = None) -> int:
-    from . import labels, score
+    from . import labels, score, session
     from .case import KINDS, LARGE, REPORT, SMALL
     from .run import run
 
@@ -32,6 +32,8 @@ def main(words: list[str] | None = None) -> int:
     make.add_argument("-o", dest="folder", required=True, metavar="DIR", help="gets cases/ and labels/")
     make.add_argument("--large", action="store_true", help="about 50000 samples a case, not 13000")
     make.add_argument("--no-rivals", action="store_true", help="do not settle which names are alike (quick)")
+    make.add_argument("--drives", type=Path, metavar="DIR", help="take the drives of its CSV files as they are")
+    make.add_argument("--holdout", action="append", default=[], metavar="FILE", help="of these, one that is held out")
     make.add_argument("--jobs", type=int, default=1)
     ask = commands.add_parser("run", help="have every case diagnosed that has no result yet")
     ask.add_argument("cases", type=Path)
@@ -53,7 +55,8 @@ def main(words: list[str] | None = None) -> int:
         parser.error(f"the tune block ends before {REPORT}")
     first = REPORT if given.block == "report" else 0
     samples = LARGE if given.large else SMALL
-    tasks = [(given.kind, first + seed, samples, not given.no_rivals, given.folder) for seed in given.seeds]
+    drives = session.read_drives(given.drives, given.holdout) if given.drives else []
+    tasks = [(given.kind, first + seed, samples, not given.no_rivals, given.folder, drives) for seed in given.seeds]
     with ProcessPoolExecutor(given.jobs) as pool:
         for number, name in enumerate(pool.map(labels.generate, tasks), 1):
             print(f"{number}/{len(tasks)} {name}", file=sys.stderr, flush=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,14 +108,15 @@ class Believed:
     offset: float
 
 
-def make(kind: str, seed: int, samples: int = SMALL) -> Case:
-    """The case of a kind and seed; `samples` a record, about."""
+def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Given] = ()) -> Case:
+    """The case of a kind and seed; `samples` a record, about; `given`: drives to take as they are."""
     streams = [
         np.random.Generator(np.random.PCG64(s))
         for s in np.random.SeedSequence([KINDS.index(kind), seed, samples]).spawn(6)
     ]
     names, fault = _contents(kind, seed)
-    stage, course, hysteresis, rich, session_time = _set_up(streams[0], kind, names, fault, samples, seed)
+    stage, hysteresis, rich, session_time = _set_up(streams[0], kind, names, fault, samples, seed, given)
+    course = refit.track(stage)
     span_out = stage.bench.span_out
     twin = _seen(stage, Plant(hysteresis))
     remainder = refit.unabsorbed(course, np.concatenate(twin), stage.bench.span)[0]
@@ -190,8 +192,17 @@ def _contents(kind: str, seed: int) -> tuple[list[str], str | None]:
 
 
 def _set_up(
-    rng: np.random.Generator, kind: str, names: list[str], fault: str | None, samples: int, seed: int
-) -> tuple[session.Session, refit.Track, base.Base, bool, bool]:
+    rng: np.random.Generator,
+    kind: str,
+    names: list[str],
+    fault: str | None,
+    samples: int,
+    seed: int,
+    given: Sequence[session.Given],
+) -> tuple[session.Session, base.Base, bool, bool]:
+    if given:
+        stage = session.replayed(rng, between(rng, 2.0, 100.0), given)
+        return stage, _hysteresis(rng, stage.bench), True, True
     kinds = catalogue()
     able = [k for k in bench.KINDS if all(k in kinds[name].benches for name in names)]
     if fault == "hum":
@@ -206,9 +217,13 @@ def _set_up(
     rich = kind != "poor"
     waveforms = session.rich(rng, int(rng.integers(9, 12))) if rich else session.poor(rng)
     stage = session.plan(rng, stand, known, waveforms)
-    hysteresis = base.draw(rng, stand.low, stand.high, stand.span_out, base.KINDS[int(rng.integers(len(base.KINDS)))])
+    hysteresis = _hysteresis(rng, stand)
     session_time = chosen != "dynamic" or bool(rng.uniform() < 0.5)
-    return stage, refit.track(stage), hysteresis, rich, session_time
+    return stage, hysteresis, rich, session_time
+
+
+def _hysteresis(rng: np.random.Generator, stand: bench.Bench) -> base.Base:
+    return base.draw(rng, stand.low, stand.high, stand.span_out, base.KINDS[int(rng.integers(len(base.KINDS)))])
 
 
 def _seen(stage: session.Session, plant: Plant) -> list[Array]:

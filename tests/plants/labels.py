@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,13 @@ import numpy as np
 from . import refit, rivals
 from .case import REPORT, VISIBLE, Case, make
 from .plant import Plant
+from .session import Given
 
 
-def generate(task: tuple[str, int, int, bool, str]) -> str:
-    """Make and write the case of (kind, seed, samples a record, with rivals, folder); returns its name."""
-    kind, seed, samples, with_rivals, folder = task
-    return write(make(kind, seed, samples), Path(folder), with_rivals).name
+def generate(task: tuple[str, int, int, bool, str, Sequence[Given]]) -> str:
+    """Make and write the case of (kind, seed, samples a record, with rivals, folder, drives); returns its name."""
+    kind, seed, samples, with_rivals, folder, given = task
+    return write(make(kind, seed, samples, given), Path(folder), with_rivals).name
 
 
 def write(case: Case, folder: Path, with_rivals: bool = True) -> Path:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +106,49 @@ def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: Wavefor
     room = _room(rng, clock)
     aperture = 2 if rng.uniform() < 0.6 else 4
     return Session(bench, clock, np.concatenate(v), tuple(records), history, rest if known else None, room, aperture)
+
+
+@dataclass(frozen=True)
+class Given:
+    """A drive that somebody else has made: session time [s] and drive [input] of its samples, held out or not."""
+
+    name: str
+    held_out: bool
+    t: Array
+    v: Array
+
+
+def read_drives(folder: Path, held_out: Container[str]) -> list[Given]:
+    """The CSV files of a folder, columns t and v, in the order of their names."""
+    found = []
+    for path in sorted(folder.glob("*.csv")):
+        t, v = np.loadtxt(path, delimiter=",", skiprows=1, usecols=(0, 1), unpack=True)
+        found.append(Given(path.stem, path.name in held_out, t, v))
+    return found
+
+
+def replayed(rng: np.random.Generator, span_out: float, given: Sequence[Given]) -> Session:
+    """Given drives as they are, with rests between them; top and bottom are visited before the first."""
+    low, high = min(float(each.v.min()) for each in given), max(float(each.v.max()) for each in given)
+    steps = [float(np.median(np.diff(each.t))) for each in given]
+    rates = (1.0 / max(steps), 1.0 / min(steps))
+    bench = Bench("mixed", low, high, span_out, rates, round(float(np.median([len(each.t) for each in given]))))
+    rest = min(float(b.t[0] - a.t[-1]) for a, b in itertools.pairwise(given))
+    before = given[0].t[0] - rest - 0.06 * bench.long * np.linspace(2.0, 0.0, 161)
+    t, v = [before], [np.interp(np.arange(161), [0, 80, 160], [low, high, low])]
+    records = []
+    for each, step in zip(given, steps, strict=True):
+        begin = float(t[-1][-1])
+        pause = float(each.t[0]) - step - begin
+        t.append(begin + pause * np.geomspace(1e-4, 1.0, 50))
+        v.append(np.full(50, v[-1][-1]))
+        fine = ((np.arange(FINER) + 0.5) / FINER - 0.5) * step
+        records.append(Planned(each.name, each.held_out, 1.0 / step, sum(map(len, t)), len(each.t)))
+        t.append((each.t[:, None] + fine[None, :]).ravel())
+        v.append(np.interp(t[-1], each.t, each.v))
+    clock = np.concatenate(t)
+    room = _room(rng, clock)
+    return Session(bench, clock, np.concatenate(v), tuple(records), (high, low), rest, room, 2)
 
 
 def rich(rng: np.random.Generator, records: int) -> Waveforms:
