@@ -147,20 +147,23 @@ class Plan:
         words += [f"--history={','.join(map(repr, self.history))}", f"--rest={self.rest!r}"]
         return shlex.join([*words, "-o", (home / "diagnosis").as_posix()])
 
-    def files(self, folder: str | os.PathLike[str]) -> dict[str, str]:
-        """Names and text of the CSV files and of `plan.html`. Raises PlotError without matplotlib."""
+    def tables(self) -> dict[str, str]:
+        """Names and text of the CSV files, columns t and v."""
         from hystgen.records import columns_text, headers
-        from hystgen.report import plan as report
 
         header = headers(("t", "v"), {"t": "s", "v": self.parameters.units.input})
-        made = {drive.name: columns_text(header, (drive.t, drive.v)) for drive in self.drives}
-        return {**made, "plan.html": report.html(self, folder)}
+        return {drive.name: columns_text(header, (drive.t, drive.v)) for drive in self.drives}
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write `files` into a folder, all or nothing; the paths. Raises PlotError without matplotlib, OSError."""
-        from hystgen.emission import files
+        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; the paths.
 
-        return files.write(Path(folder), {name: text.encode("utf-8") for name, text in self.files(folder).items()})
+        Raises PlotError without matplotlib, OSError.
+        """
+        from hystgen.emission import files
+        from hystgen.report import plan as report
+
+        made = {**self.tables(), "plan.html": report.html(self, folder)}
+        return files.write(Path(folder), {name: text.encode("utf-8") for name, text in made.items()})
 
 
 def plan(
@@ -442,7 +445,7 @@ def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
 
 
 def _sweep(course: Course, samples: int = 1100) -> None:
-    """Frequency rises with the square of time to an eighth of the sampling rate, amplitude falls as the limit demands."""
+    """Frequency rises with time squared to an eighth of the sampling rate, amplitude falls as the limit demands."""
     first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):

@@ -10,6 +10,9 @@ refit, rivals             how much a fine play sum swallows; which names the rec
 case, labels              what a seed gives, and its files: `cases/` for the workflow, `labels/` for the score
 run, score                the package's command line on every case; the figures and their limits
 
+`generate --drives PLAN --holdout FILE ..` drives the plants with records that somebody else has made, such as those
+that `hystgen diagnose --plan` writes; `--kind single --seeds 0:13` then hides every effect once.
+
 An effect counts as visible from three times the noise on, by the rms that it alone leaves when a fine play sum and an
 offset a record are refitted to the noise-free records. A name that leaves at most 5 % more on the held-out records
 than the plant's true form is indistinguishable there; for a pair this is settled for each effect alone.
