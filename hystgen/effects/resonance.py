@@ -85,7 +85,9 @@ class Resonance(Effect):
                 f"resonance, {name}", np.array([low, -2.5]), np.array([high, 0.0]), start(first), build,
                 others=tuple(map(start, others)),
             )
-            for name, first, *others in (("high", 0.12, 0.2, 0.28), ("middle", 0.36, 0.44, 0.52), ("low", 0.6, 0.7, 0.8))
+            for name, first, *others in (
+                ("high", 0.12, 0.2, 0.28), ("middle", 0.36, 0.44, 0.52), ("low", 0.6, 0.7, 0.8)
+            )
         ]  # fmt: skip
 
 
