@@ -68,20 +68,29 @@ class PlayFunctions(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The same parabola for all plays, then with a cubic term."""
+        """The same parabola for all plays, then with a cubic term; then that changing evenly with the threshold."""
         plays = len(about.thresholds) - 1
         if plays < 1:
             return []
         # of order one where xi is as large as the drive makes it
         largest = max(1.0, max(map(abs, about.drive)) / about.thresholds[-1])
 
-        def build(x: Array) -> PlayFunctions:
-            terms = tuple((0.1 * x / largest ** np.arange(1, len(x) + 1)).tolist())
-            return cls(name="noncongruent", coefficients=(terms,) * plays)
+        share = np.array(about.thresholds[1:]) / about.thresholds[-1]
 
+        def candidate(label: str, terms: int, *courses: Array) -> Candidate:
+            def build(x: Array) -> PlayFunctions:
+                table = 0.1 * x.reshape(len(courses), terms) / largest ** np.arange(1, terms + 1)
+                rows = np.array(courses).T @ table
+                return cls(name="noncongruent", coefficients=tuple(map(tuple, rows.tolist())))
+
+            n = terms * len(courses)
+            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), np.zeros(n), build, none=np.zeros(n))
+
+        even = np.ones(plays)
         return [
-            Candidate(label, np.full(n, -4.0), np.full(n, 4.0), np.full(n, 0.0), build, none=np.zeros(n))
-            for label, n in (("noncongruent, parabola", 1), ("noncongruent, cubic", 2))
+            candidate("noncongruent, parabola", 1, even),
+            candidate("noncongruent, cubic", 2, even),
+            candidate("noncongruent, cubic over r", 2, 1.0 - share, share),
         ]
 
 
