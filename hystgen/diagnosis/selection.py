@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -291,9 +292,29 @@ def _exchanged(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitt
         without = records.left(fitted)
         merit = _merit(fitted, best, records)
         if merit is not None:
-            rest = [*_rest(found, k, without), _found(best, tried, without, merit)]
-            return _exchanged(*_without_needless(best.fitted, rest, records), records)
+            other = _found(best, tried, without, merit)
+            chain = _in_place(best.fitted, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
+            chain = chain or [*_rest(found, k, without), other]
+            return _exchanged(*_without_needless(best.fitted, chain, records), records)
     return now, found
+
+
+def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: _Records) -> list[Found]:
+    """What was found, with the errors of the models before and after each; empty where one makes it no smaller."""
+    lefts = [records.left(now)]
+    for each in reversed(found[1:]):
+        smaller = _without(now, each.name, records)
+        if smaller is None:
+            return []
+        now = smaller
+        lefts.append(records.left(now))
+    lefts = [gap, *reversed(lefts)]
+    if any(after >= before for before, after in itertools.pairwise(lefts)):
+        return []
+    return [
+        replace(each, before=before, after=after)
+        for each, (before, after) in zip(found, itertools.pairwise(lefts), strict=True)
+    ]
 
 
 def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
