@@ -11,14 +11,26 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import believed, floor, leftovers, selection, structure, where
+from hystgen.diagnosis import (
+    believed,
+    channels,
+    description,
+    floor,
+    intervals,
+    leftovers,
+    periodic,
+    selection,
+    structure,
+    told,
+    where,
+)
 from hystgen.diagnosis.floor import Floor
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
@@ -40,8 +52,11 @@ STRUCTURE = 0.15
 ABOVE_FLOOR = 1.25
 """A residual this much larger than the noise, and with structure, is unexplained."""
 
-FAR_ABOVE = 1.6
-"""One this much larger is, whatever it goes with."""
+FAR_ABOVE = 2.0
+"""One this much larger is, whatever it goes with: noise that is not white exceeds its floor by less."""
+
+ENOUGH = 100
+"""Samples that have to be left of a record when wrong ones are taken out."""
 
 
 @dataclass(frozen=True)
@@ -77,13 +92,23 @@ class Diagnosis:
     def sentence(self) -> str:
         """The verdict in a sentence."""
         gap, unit = self.content["gap"], self.content["unit"]
-        before, after = (f"{gap[key]['holdout']:.4g}{' ' if unit else ''}{unit}" for key in ("refitted", "after"))
+        before, after = (f"{gap[key]['holdout']:.4g}{' ' if unit else ''}{unit or ''}" for key in ("refitted", "after"))
+        seen = self.content["unexplained"]
+        wrong = told.faults(seen)
+        but = f" The data have faults: {wrong}." if wrong else ""
         if self.verdict == "effects_found":
             names = ", ".join(effect["name"] for effect in self.content["effects"])
-            return f"Missing: {names}. The held-out rms error falls from {before} to {after}."
+            return f"Missing: {names}. The held-out rms error falls from {before} to {after}.{but}"
         if self.verdict == "nothing_missing":
-            return f"Nothing is missing: the refitted model leaves {after} rms on held-out records, which is noise."
-        return f"Something is missing that the catalogue does not hold or the records cannot show: {after} rms is left."
+            noise = f"the refitted model leaves {after} rms on held-out records, which is noise"
+            return f"Nothing is missing: {noise}.{but}"
+        disturbing = [each for each in seen if each["kind"] not in (*told.REPAIRED, told.ACTUATOR)]
+        if disturbing:
+            more = f", and {len(disturbing) - 1} more below" if len(disturbing) > 1 else ""
+            first = told.sentence(disturbing[0], unit)
+            return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
+        missing = "Something is missing that the catalogue does not hold or the records cannot show"
+        return f"{missing}: {after} rms is left.{but}"
 
     def to_json(self) -> str:
         """`diagnosis.json`."""
@@ -138,22 +163,51 @@ def diagnose(
     read = read_records([*several, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
     with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
-        ready = believed.prepare(read[: len(several)], read[len(several) :], before, rest)
+        first = believed.as_given(model.cascade, given)
+        usable, odd = channels.checked(read, *first, before)
+        to_fit, to_hold = (
+            [record for record in group if record is not None]
+            for group in (usable[: len(several)], usable[len(several) :])
+        )
+        ready = believed.prepare(to_fit or read[: len(several)], to_hold, before, rest)
+        ready = _without_faults(ready)
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
         found = selection.select(
             ready.to_fit, ready.held, base, start, noise.rms, effects, lambda: bar.tick(1)
         )
-        first = believed.as_given(model.cascade, given)
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
-        everything = [*ready.to_fit, *ready.held]
-        odd = leftovers.scales(everything, [first[0].columns(item, first[1])[0][0] for item in everything])
         content = _content(model.parameters, ready, noise, found, as_given, odd)
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
     extended = _extended(model.parameters, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
+
+
+def _without_faults(ready: believed.Prepared) -> believed.Prepared:
+    """The records without samples that are plainly wrong, unless hardly any would be left."""
+    repaired = leftovers.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
+    number = len(ready.to_fit)
+    items, wrong = leftovers.without_faults([*ready.to_fit, *ready.held], repaired)
+    to_fit, held = items[:number], items[number:]
+    if any(not any(np.count_nonzero(item.known) > ENOUGH for item in group) for group in (to_fit, held)):
+        return ready
+    return replace(ready, to_fit=to_fit, held=held, repaired=_merged([*repaired, *wrong]))
+
+
+def _merged(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """One entry a kind and record: a record whose end is held out was looked at in two parts."""
+    found: dict[tuple[str, ...], dict[str, Any]] = {}
+    for each in entries:
+        key = each["kind"], each["record"], each.get("channel", ""), each.get("end", "")
+        if key in found:
+            for number in ("count", "samples"):
+                if number in each:
+                    found[key][number] += each[number]
+        else:
+            found[key] = dict(each)
+    return list(found.values())
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
@@ -179,18 +233,25 @@ def _content(
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
     refitted, last = ([structure.rms(errors) for errors in each] for each in (before, after))
-    left = [*odd, *leftovers.disturbances([*ready.to_fit, *ready.held], [*after[0], *after[1]])]
-    share, goes_with = leftovers.structure(ready.held, after[1])
-    ratio = last[1] / noise.rms if noise.rms else float("inf")
+    everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
+    periodic_ones, errors = periodic.lines(everything, errors)
+    sticking = _merged(leftovers.stick_slip(everything, errors, noise.rms))
+    left = [each for each in odd if each["kind"] not in told.REPAIRED] + periodic_ones + sticking
+    share, _ = description.structure(ready.held, errors[len(ready.to_fit) :])
+    rest = structure.rms(errors[len(ready.to_fit) :])
+    ratio = rest / noise.rms if noise.rms else float("inf")
     if ratio > FAR_ABOVE or (share > STRUCTURE and ratio > ABOVE_FLOOR):
-        left.append({"kind": "structure", "rms": last[1], "share_by_variable": goes_with})
+        left.append(description.described(everything, errors, noise.rms))
     verdict = "effects_found" if found.found else "unexplained" if left else "nothing_missing"
     effects = []
-    for each in found.found:
+    sure = intervals.intervals(found.fitted, ready.to_fit) if found.found else intervals.Sure({}, ())
+    for k, each in enumerate(found.found):
+        later = sum(other.name == each.name for other in found.found[k + 1 :])
         effects.append(
             {
                 "name": each.name,
-                "parameters": _parameters_of(found.fitted, each.name),
+                "parameters": _parameters_of(found.fitted, each.name, later),
+                "intervals": sure.of(found.fitted, each.name, later),
                 "share_of_gap": (each.before - each.after) / refitted[1] if refitted[1] else 0.0,
                 "holdout_before": each.before,
                 "holdout_after": each.after,
@@ -212,10 +273,13 @@ def _content(
             "after": {"fit": last[0], "holdout": last[1]},
         },
         "effects": effects,
-        "unexplained": [*left, *ready.repaired],
+        "unexplained": [*left, *(each for each in odd if each not in left), *ready.repaired],
         "where": where.places([*ready.to_fit, *ready.held], [*before[0], *before[1]], noise.rms),
         "not_separable": rivals,
-        "advice": [ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals],
+        "advice": [
+            *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
+            *(more for each in left for more in told.advice(each)),
+        ],
         "ranking": [
             [{"name": t.name, "shape": t.option.label, "fit": t.fitted.rms, "holdout": t.held_out} for t in each]
             for each in found.rankings
@@ -243,17 +307,13 @@ def _evidence(each: selection.Found) -> str:
     return f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
 
 
-def _parameters_of(fitted: Fitted, name: str) -> dict[str, Any]:
-    """The entry's keys without the name; for a front its stage."""
-    for part, effect in zip(fitted.structure.parts, fitted.structure.effects(fitted.shape), strict=True):
-        if part.name == name:
-            return _entry(effect)
+def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
+    """The entry's keys without the name, `later` of that name having been found after it; for a front its stage."""
+    k = intervals.place(fitted, name, later)
+    if k is not None:
+        return intervals.entry(fitted.structure.effects(fitted.shape)[k])
     stages = fitted.actuator.stages
     return dict(stage_content(stages[-1])) if stages else {}
-
-
-def _entry(effect: Effect) -> dict[str, Any]:
-    return {key: value for key, value in effect.model_dump(exclude_defaults=True).items() if key != "name"}
 
 
 def _extended(
@@ -278,7 +338,7 @@ def _extended(
             "pi": {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()},
             "memoryless": [stage_content(stage) for stage in actuator.stages],
             "output_offset": offset,
-            "effects": [{"name": effect.name, **_entry(effect)} for effect in actuator.effects],
+            "effects": [{"name": effect.name, **intervals.entry(effect)} for effect in actuator.effects],
         },
     }
     return make_parameters(content, user_effects=user)

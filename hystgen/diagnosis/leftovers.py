@@ -1,12 +1,13 @@
-"""What is left after the named effects: described, not named.
+"""Faults of a recording and disturbances that are none of the actuator, told with place and count, never named.
 
-Disturbances that are none of the actuator (mains hum, glitches, held samples, a saturated converter) are told with
-place and count; anything else by the variables that go with it.
+Samples that are plainly wrong (drop-outs, held samples, a converter at its end) are left out of the comparison;
+hum, position-periodic ripple and stick-slip are seen in what a model leaves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,161 +17,236 @@ from hystgen.diagnosis.structure import Item
 
 Array = NDArray[np.float64]
 
-LINE = 30.0
-"""A spectral line stands so many times above the median of its surroundings, in power."""
-
-LINE_SHARE = 0.03
-"""Least share of the residual's variance in a line that is told."""
-
-EVENT = 10.0
-"""A jump is so many robust standard deviations of the residual's steps."""
-
-HELD = 4
+HELD = 6
 """Fewest equal samples in a row, while the drive moves, that count as held."""
+
+CHANCE = 1e-6
+"""Largest probability of a run of equal samples by chance, in a whole record."""
 
 RAIL = 12
 """Fewest samples at the very end of the output's range that count as saturated."""
 
-MULTIPLE = 3.0
-"""An output so many times what the believed model predicts is in other units, or another channel."""
+SHARP, USUAL = 8.0, 0.98
+"""A drop-out begins and ends with a step of so many times this quantile of the steps."""
 
-MOVES = 0.3
-"""Only records whose drive moves over this share of the widest one's range tell of their scale."""
+LONGEST = 200
+"""Most samples of a drop-out, and of what is masked as one no more than a twentieth of the record."""
 
-WORTH = 0.1
-"""Least share of the residual's variance for a variable that is told to go with it."""
+SHORT = 3
+"""Fewer samples are isolated ones, which the fit leaves out by itself."""
 
+BEYOND = 0.01
+"""Share of the output's range by which a converter's end may be passed in another record."""
 
-def disturbances(items: Sequence[Item], errors: Sequence[Array]) -> list[dict[str, Any]]:
-    """Lines and held samples in the records."""
-    told: list[dict[str, Any]] = []
-    for item, error in zip(items, errors, strict=True):
-        told += _lines(item, error)
-        told += _held(item)
-    return told
+SUDDEN = 4.0
+"""A converter's end is reached in steps of less than so many times what the drive makes."""
 
+GRAINS = 8.0
+"""A coarse output is held where the drive moves it by so many of its steps."""
 
-def scales(items: Sequence[Item], predicted: Sequence[Array]) -> list[dict[str, Any]]:
-    """Records whose output is a multiple of what the believed model predicts: wrong units, or swapped channels."""
-    factors: list[float] = []
-    widest = max(float(np.ptp(item.run.v)) for item in items)
-    wide = [(item, y) for item, y in zip(items, predicted, strict=True) if np.ptp(item.run.v) > MOVES * widest]
-    for item, y in wide:
-        known = item.known
-        x = y[known] - np.mean(y[known])
-        power = float(x @ x)
-        factors.append(float(x @ item.y[known]) / power if power > 0.0 else 1.0)
-    usual = float(np.median(factors))
-    told: list[dict[str, Any]] = []
-    if not 1.0 / MULTIPLE < usual < MULTIPLE:
-        told.append({"kind": "scale", "record": "all", "factor": usual})
-    for (item, _), factor in zip(wide, factors, strict=True):
-        if not 1.0 / MULTIPLE < factor / usual < MULTIPLE:
-            told.append({"kind": "scale", "record": item.name, "factor": factor})
-    return told
+RESOLVED = 7.0
+"""Stick-slip is sought over stretches in which the prediction moves by so many times the noise."""
+
+STANDS, LEAPS = 0.15, 0.05
+"""Least share of the stretches in which the output hardly moves, and in which it moves by far too much."""
+
+GOES_ON = 0.3
+"""Largest correlation of that from one stretch to the next."""
+
+TURN = 5
+"""Fewest jumps of stick-slip."""
 
 
-def _lines(item: Item, error: Array) -> list[dict[str, Any]]:
-    """Narrow lines of the residual that are no multiples of what the drive does."""
-    known = np.isfinite(error)
-    n = len(error)
-    if np.count_nonzero(known) < 256:
-        return []
-    step = float(np.median(np.diff(item.run.t)))
-    e = np.interp(np.arange(n), np.flatnonzero(known), error[known])
-    window = np.hanning(n)
-    power = np.abs(np.fft.rfft((e - e.mean()) * window)) ** 2
-    drive = np.abs(np.fft.rfft((item.run.v - item.run.v.mean()) * window)) ** 2
-    frequency = np.fft.rfftfreq(n, step)
-    total = float(np.sum(power))
-    if total == 0.0:
-        return []
-    found: list[dict[str, Any]] = []
-    for k in np.argsort(power)[::-1][:5]:
-        if k < 8:
-            continue
-        around = np.concatenate([power[max(k - 40, 1) : k - 3], power[k + 4 : k + 40]])
-        share = float(np.sum(power[max(k - 2, 0) : k + 3]) / total)
-        own = float(np.sum(drive[max(k - 2, 0) : k + 3]) / max(float(np.sum(drive)), 1e-300))
-        if len(around) and power[k] > LINE * float(np.median(around)) and share > LINE_SHARE and own < 1e-4:
-            # a harmonic of a periodic drive is none: it has neighbours at its distance
-            fundamental = int(np.argmax(drive[1:])) + 1
-            multiple = k / fundamental
-            if fundamental > 3 and abs(multiple - round(multiple)) < 2.0 / fundamental and multiple < 40:
-                continue
-            if not any(abs(each["frequency"] - frequency[k]) < 4.0 / (n * step) for each in found):
-                found.append(
-                    {"kind": "line", "record": item.name, "frequency": float(f"{frequency[k]:.4g}"), "share": share}
-                )
+def without_faults(
+    items: Sequence[Item], repaired: Sequence[dict[str, Any]]
+) -> tuple[list[Item], list[dict[str, Any]]]:
+    """The items without wrong samples, and what they were; `repaired`: what is known of the records already.
+
+    A level that is a drop-out or the converter's end in one record is the same in all others.
+    """
+    ends = {each["level"] for each in repaired if each["kind"] == "saturated"}
+    dropped = [drop_outs(item.y, item.run.v) for item in items]
+    lost = {level for item, runs in zip(items, dropped, strict=True) for level in _levels(item.y, runs)} - ends
+    kept, told = [], []
+    for item, away in zip(items, dropped, strict=True):
+        y = item.y.copy()
+        levelled = {level: [run for run in _runs(y == level) if run[1] - run[0] > 1] for level in ends | lost}
+        full = sorted(run for level in ends for run in levelled[level])
+        away = sorted({*away, *(run for level in lost for run in levelled[level])})
+        for kind, runs in (("saturated", full), ("drop_outs", away), ("held_samples", None)):
+            if runs is None:
+                runs = held(y, item.run.v)
+            wrong = np.zeros(len(y), dtype=bool)
+            for a, b in runs:
+                wrong[a:b] = True
+            if np.isfinite(y[wrong]).any():
+                told.append(_told(kind, item, y, runs))
+            y[wrong] = np.nan
+        changed = np.isfinite(item.y) & ~np.isfinite(y)
+        known = y[np.isfinite(y)]
+        kept.append(replace(item, y=y, output_range=float(np.ptp(known))) if changed.any() and len(known) else item)
+    return kept, told
+
+
+def not_at_the_end(repaired: Sequence[dict[str, Any]], items: Sequence[Item]) -> list[dict[str, Any]]:
+    """What was repaired, with samples held and not saturated where another record goes beyond their level."""
+    highest, lowest = (f([float(f(item.y[item.known])) for item in items if item.known.any()]) for f in (max, min))
+    span = highest - lowest
+    found = []
+    for each in repaired:
+        if each["kind"] == "saturated":
+            beyond = highest - each["level"] if each["end"] == "largest" else each["level"] - lowest
+            if beyond > BEYOND * span:
+                each = {"kind": "held_samples", "record": each["record"], "count": 1, "samples": each["count"]}
+        found.append(each)
     return found
 
 
-def _held(item: Item) -> list[dict[str, Any]]:
-    """Runs of equal output samples while the drive moves on."""
-    y, v = item.y, item.run.v
-    same = np.append(np.diff(y) == 0.0, False)
-    moved = np.append(np.abs(np.diff(v)) > 0.25 * float(np.median(np.abs(np.diff(v)))), False)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], same & moved, [False]]).astype(np.int8)))
-    runs = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a + 1 >= HELD]
-    step = np.abs(np.diff(y))
-    usual = float(np.nanmedian(step[step > 0.0])) if np.any(step > 0.0) else 0.0
-    grain = float(np.nanmin(step[step > 0.0])) if np.any(step > 0.0) else 0.0
-    # a coarse converter repeats codes without any fault
-    if not runs or grain > 0.1 * usual:
+def _levels(y: Array, runs: Sequence[tuple[int, int]]) -> set[float]:
+    """Levels of runs with one value."""
+    return {float(y[a]) for a, b in runs if b - a >= SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
+
+
+def _told(kind: str, item: Item, y: Array, runs: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    values = np.concatenate([y[a:b] for a, b in runs])
+    samples = int(np.count_nonzero(np.isfinite(values)))
+    found = {"kind": kind, "record": item.name, "first": float(item.run.t[runs[0][0]])}
+    if kind != "held_samples" and np.nanmax(values) == np.nanmin(values):
+        found["level"] = float(np.nanmin(values))
+    return {**found, "count": samples} if kind == "saturated" else {**found, "count": len(runs), "samples": samples}
+
+
+def _slope(y: Array, v: Array) -> float:
+    """Robust sensitivity: the output's spread over the drive's, from quartiles."""
+    spread = float(np.subtract(*np.quantile(v, (0.75, 0.25))))
+    return float(np.subtract(*np.quantile(y, (0.75, 0.25)))) / spread if spread > 0.0 else 0.0
+
+
+def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
+    """Runs [a, b) over which the output leaves at a step, stays away and comes back at a step, as the drive does not.
+
+    `y`: NaN where it is not compared.
+    """
+    known = np.flatnonzero(np.isfinite(y))
+    if len(known) < 100:
         return []
-    return [{"kind": "held_samples", "record": item.name, "count": len(runs), "first": float(item.run.t[runs[0][0]])}]
+    e, w = y[known], v[known]
+    move = _slope(e, w) * np.diff(w)
+    level = e - _slope(e, w) * w
+    step = np.diff(level)
+    size = np.abs(step)
+    edges = np.flatnonzero(size > SHARP * float(np.quantile(size, USUAL))).tolist()
+    most = min(LONGEST, len(known) // 20)
+    found: list[tuple[int, int]] = []
+    end = -1
+    for i, k in enumerate(edges):
+        if k < end:
+            continue
+        j = next((j for j in edges[i + 1 :] if step[j] * step[k] < 0.0), None)
+        if j is None or j - k > most:
+            continue
+        back = abs(level[j + 1] - level[k])
+        inside = (level[k + 1 : j + 1] - np.interp(np.arange(k + 1, j + 1), [k, j + 1], level[[k, j + 1]])) / step[k]
+        follows = max(abs(move[k]), abs(move[j])) > 0.25 * size[k]
+        if j - k >= SHORT and not follows and back < 0.3 * size[k] and np.min(inside) > 0.5:
+            found.append((int(known[k + 1]), int(known[j]) + 1))
+            end = j
+    return found
+
+
+def held(y: Array, v: Array) -> list[tuple[int, int]]:
+    """Runs [a, b) of equal outputs while the drive moves on, longer than noise and a converter's steps make them."""
+    step = np.diff(y)
+    same = step == 0.0
+    runs = [(a, b) for a, b in _runs(same) if b - a + 1 >= HELD]
+    known = np.isfinite(step)
+    sizes = np.abs(step[known & ~same])
+    if not runs or len(sizes) < HELD:
+        return []
+    grain = float(np.min(sizes))
+    noise = float(np.median(np.abs(np.diff(y[np.isfinite(y)], 3)))) / 3.0
+    at = np.isfinite(y)
+    slope = _slope(y[at], v[at])
+    long = np.zeros(len(same), dtype=bool)
+    for a, b in runs:
+        long[a:b] = True
+    usual = known & ~long
+    chance = (np.count_nonzero(same & usual) + 1) / (np.count_nonzero(usual) + 2)
+    found = []
+    for a, b in runs:
+        moved = slope * float(np.ptp(v[a : b + 1]))
+        if noise > grain:
+            wrong = chance ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise
+        else:  # a coarse converter repeats codes without any fault, and then moves on by one of them
+            wrong = moved > GRAINS * grain and b < len(step) and bool(abs(step[b]) > 0.5 * moved)
+        if wrong:
+            found.append((a, b + 1))
+    return found
 
 
 def rails(y: Array, v: Array) -> list[tuple[str, float]]:
-    """Ends of the output, with their level, at which many samples in a row are equal while the drive moves on."""
-    known = y[np.isfinite(y)]
+    """Ends of the output, with their level, at which many samples in a row are equal while the drive moves on.
+
+    An end that is reached and left at a step is none: those are drop-outs.
+    """
+    known = np.isfinite(y)
     found = []
-    for name, end in (("largest", float(known.max())), ("least", float(known.min()))):
-        at = y == end
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(np.int8)))
-        longest = max(zip(edges[::2], edges[1::2], strict=True), key=lambda run: int(run[1] - run[0]))
-        moved = float(np.ptp(v[longest[0] : longest[1]]))
-        if longest[1] - longest[0] >= RAIL and moved > 0.01 * float(np.ptp(v)):
+    for name, end in (("largest", float(np.max(y[known]))), ("least", float(np.min(y[known])))):
+        runs = _runs(y == end)
+        first, last = max(runs, key=lambda run: run[1] - run[0])
+        if last - first < RAIL or float(np.ptp(v[first:last])) <= 0.01 * float(np.ptp(v)):
+            continue
+        step = np.abs(np.diff(y))
+        follows = np.abs(_slope(y[known], v[known]) * np.diff(v)) + float(np.nanmedian(step))
+        edges = [k for a, b in runs if b - a >= SHORT for k in (a - 1, b - 1) if 0 <= k < len(step)]
+        if not edges or np.nanmedian(step[edges] / follows[edges]) < SUDDEN:
             found.append((name, end))
     return found
 
 
-def structure(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, Mapping[str, float]]:
-    """Share of the residual's variance that smooth functions of one variable take away in records that they have not
-    seen: the largest such share, and the share of each variable."""
-    shares: dict[str, float] = {}
-    for name, values in _variables(items).items():
-        shares[name] = _share(values, errors)
-    return max(shares.values(), default=0.0), {k: round(s, 4) for k, s in shares.items() if s > WORTH}
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def _variables(items: Sequence[Item]) -> dict[str, list[Array]]:
-    rates = [np.gradient(item.run.v, item.run.t) for item in items]
-    return {
-        "drive": [item.run.v for item in items],
-        "rate": rates,
-        "displacement": [np.interp(item.run.t, item.run.t[item.known], item.y[item.known]) for item in items],
-        "time": [item.run.t - item.run.t[0] for item in items],
-        "travel": [np.concatenate([[0.0], np.cumsum(np.abs(np.diff(item.run.v)))]) for item in items],
-        "drive and direction": [
-            item.run.v + 1e3 * np.ptp(item.run.v) * (rate > 0.0) for item, rate in zip(items, rates, strict=True)
-        ],
-    }
+def stick_slip(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[dict[str, Any]]:
+    """Stick-slip: the output stands while it should move and then jumps after it, in the direction of the motion."""
+    told = []
+    for item, error in zip(items, errors, strict=True):
+        found = _stick_slip(item, error, noise)
+        if found is not None:
+            told.append({"kind": "stick_slip", "record": item.name, **found})
+    return told
 
 
-def _share(values: Sequence[Array], errors: Sequence[Array]) -> float:
-    """Cross-validated share over halves of the records taken alternately in blocks."""
-    x = np.concatenate([v[np.isfinite(e)] for v, e in zip(values, errors, strict=True)])
-    e = np.concatenate([e[np.isfinite(e)] for e in errors])
-    if len(e) < 200 or np.ptp(x) == 0.0:
-        return 0.0
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 25)))
-    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, len(edges) - 2)
-    fold = (np.arange(len(e)) * 8 // len(e)) % 2
-    left = 0.0
-    for k in (0, 1):
-        train, test = fold != k, fold == k
-        count = np.bincount(place[train], minlength=len(edges))
-        mean = np.bincount(place[train], e[train], minlength=len(edges)) / np.maximum(count, 1)
-        left += float(np.sum((e[test] - mean[place[test]]) ** 2))
-    return max(0.0, 1.0 - left / max(float(np.sum(e**2)), 1e-300))
+def _stick_slip(item: Item, error: Array, noise: float) -> dict[str, Any] | None:
+    """Over stretches in which the prediction moves by a few times the noise: how often the output stands and leaps.
+
+    Noise makes the output stand in one stretch of a hundred. What a lag or ringing misses is smooth: it goes on from
+    one stretch to the next, where a leap makes up for the standing before it.
+    """
+    known = np.isfinite(error) & np.isfinite(item.y)
+    e, y = error[known], item.y[known]
+    predicted = y - e
+    move = np.abs(np.diff(predicted))
+    moving = move > 0.25 * float(np.quantile(move, 0.75)) if len(move) else move > 0.0
+    if np.count_nonzero(moving) < 10 * TURN or noise <= 0.0:
+        return None
+    m = max(1, int(np.ceil(RESOLVED * noise / float(np.median(move[moving])))))
+    edges = np.arange(0, len(e), m)
+    should, does = np.diff(predicted[edges]), np.diff(y[edges])
+    inside = (np.abs(should) > 0.5 * RESOLVED * noise) & (np.abs(should) < 3.0 * RESOLVED * noise)
+    if np.count_nonzero(inside) < 5 * TURN:
+        return None
+    ratio = does[inside] / should[inside]
+    stands, leaps = float(np.mean(ratio < 0.4)), float(np.mean(ratio > 1.6))
+    goes_on = ratio - np.mean(ratio)
+    again = float(goes_on[1:] @ goes_on[:-1]) / max(float(goes_on @ goes_on), 1e-300)
+    if stands < STANDS or leaps < LEAPS or again > GOES_ON:
+        return None
+    step = np.diff(e)
+    at = np.flatnonzero((np.abs(step) > RESOLVED * noise) & (np.sign(step) == np.sign(np.diff(predicted))))
+    if len(at) < TURN:
+        return None
+    first = float(item.run.t[np.flatnonzero(known)[at[0] + 1]])
+    return {"count": len(at), "first": first, "size": float(np.median(np.abs(step[at])))}

@@ -1,0 +1,127 @@
+"""How sure the numbers of the effects are: 95 % intervals from the system that is linear about the fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis import structure
+from hystgen.diagnosis.structure import Fitted, Item
+from hystgen.effects.base import Effect
+from hystgen.identification import stage_content
+from hystgen.identification.uncertainty import correlation_time
+
+Array = NDArray[np.float64]
+
+DRAWS = 400
+
+TAILS = (0.025, 0.975)
+
+SEED = 1
+
+WEAKEST = 1e-9
+"""Directions whose singular value is below this share of the largest tell nothing of the numbers."""
+
+Numbers = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Sure:
+    """Low and high of every number, by the keys of the entries: of the front's stage, and of each part."""
+
+    front: dict[str, Any]
+    parts: tuple[dict[str, Any], ...]
+
+    def of(self, fitted: Fitted, name: str, later: int) -> dict[str, Any]:
+        """Those of an effect that was found, `later` of its name having been found after it."""
+        k = place(fitted, name, later)
+        return self.front if k is None else self.parts[k]
+
+
+def place(fitted: Fitted, name: str, later: int) -> int | None:
+    """Which part an effect is, `later` of its name having been found after it; None for a front."""
+    parts = [k for k, part in enumerate(fitted.structure.parts) if part.name == name]
+    return parts[-1 - later] if later < len(parts) else None
+
+
+def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
+    """95 % intervals of the numbers of the effects and of the front.
+
+    The covariance is `s^2 tau (J^T J)^-1` (Seber and Wild, Nonlinear Regression, 1989, section 2.1), J being that of
+    weights and numbers together on the free-run error, with the weights that are zero held there; `tau`, the
+    correlation time of the residuals in samples, makes of their number the effective one. Numbers of the entries are
+    those of shapes drawn from it and kept within the bounds.
+    """
+    shape, p = fitted.shape, fitted.weights
+    front = len(fitted.structure.front.straight)
+    if not len(shape):
+        return Sure({}, tuple({} for _ in fitted.structure.parts))
+    system = structure.linear(fitted.structure, items, shape, p).system.whole
+    n1 = len(p)
+    active = np.flatnonzero(np.append(p > 0.0, np.ones(len(shape), dtype=bool)))
+    _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
+    inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
+    # only the numbers' part of the covariance is needed
+    root = (right.T * inverse)[np.count_nonzero(active < n1) :]
+    errors = fitted.errors(items)
+    inside = [e[np.isfinite(e)] for e in errors]
+    inside = [e for e in inside if len(e)]
+    samples = sum(map(len, inside))
+    tau = sum(correlation_time(e) * len(e) for e in inside) / max(samples, 1)
+    sigma = fitted.rms * float(np.sqrt(tau * samples / max(samples - len(active), 1)))
+    drawn = np.random.default_rng(SEED).standard_normal((DRAWS, root.shape[1])) @ root.T
+    low, high = fitted.structure.bounds
+    shapes = np.clip(shape + sigma * drawn, low, high)
+    stage: dict[str, Any] = {}
+    if front:
+        made = [_stage(fitted, one) for one in shapes]
+        stage = _spread(made, _stage(fitted, shape))
+    found: list[dict[str, Any]] = []
+    for k, part in enumerate(fitted.structure.parts):
+        if not len(part.candidate.start):
+            found.append({})
+            continue
+        numbers = [fitted.structure.pieces(one)[1][k] for one in shapes]
+        made = [entry(part.candidate.build(each)) for each in numbers]
+        found.append(_spread(made, entry(part.candidate.build(fitted.structure.pieces(shape)[1][k]))))
+    return Sure(stage, tuple(found))
+
+
+def _stage(fitted: Fitted, shape: Array) -> Numbers:
+    stages = fitted.structure.front.stages(fitted.structure.pieces(shape)[0])
+    return dict(stage_content(stages[-1])) if stages else {}
+
+
+def entry(effect: Effect) -> dict[str, Any]:
+    """The keys of an effect as a parameter file has them, without the name."""
+    return {key: value for key, value in effect.model_dump(exclude_defaults=True).items() if key != "name"}
+
+
+def _spread(made: Sequence[Numbers], at: Numbers) -> dict[str, Any]:
+    """`[low, high]` of each key, of a list a list of them; what does not vary and is no number has none."""
+    found: dict[str, Any] = {}
+    for key, value in at.items():
+        values = [each.get(key) for each in made]
+        if isinstance(value, bool | str) or any(v is None for v in values):
+            continue
+        if isinstance(value, int | float):
+            pair = _interval(np.array(values, dtype=np.float64))
+            if pair is not None:
+                found[key] = pair
+        elif isinstance(value, list | tuple) and all(len(v) == len(value) for v in values):  # type: ignore[arg-type]
+            table = np.array(values, dtype=np.float64)
+            pairs = [_interval(column) for column in table.reshape(len(table), -1).T]
+            if table.ndim == 2 and any(pair is not None for pair in pairs):
+                found[key] = [pair if pair is not None else [v, v] for pair, v in zip(pairs, value, strict=True)]
+    return found
+
+
+def _interval(values: Array) -> list[float] | None:
+    if np.ptp(values) == 0.0:
+        return None
+    low, high = np.quantile(values, TAILS)
+    return [float(low), float(high)]

@@ -1,0 +1,275 @@
+"""Lines in what a model leaves: over time (mains hum) and over the position (the pitch of a sensor)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.structure import Item
+
+Array = NDArray[np.float64]
+
+STANDS = 30.0
+"""A line stands so many times above the median of its surroundings, in power."""
+
+SHARE, ALONE = 0.03, 0.3
+"""Least share of a record's residual variance in a line, and where only a few of the records have it."""
+
+PERIODS = 8
+"""Fewest periods in a record for a line to be seen, and fewest pitches in the travel."""
+
+MOST = 4
+
+BINS = 4096
+"""Positions are taken to so many places of the range."""
+
+MAINS = (50.0, 60.0)
+
+
+@dataclass(frozen=True)
+class Line:
+    """What is told of a line, and the errors without it."""
+
+    told: dict[str, Any]
+    errors: list[Array]
+    share: float
+
+
+def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
+    """Lines in the errors of several records, the strongest first, and the errors without them."""
+    left, told = list(errors), []
+    for _ in range(MOST):
+        found = [line for line in (_in_time(items, left), _in_position(items, left)) if line is not None]
+        if not found:
+            break
+        best = max(found, key=lambda line: line.share)
+        told.append(best.told)
+        left = best.errors
+    return told, left
+
+
+def _total(errors: Sequence[Array]) -> float:
+    return float(sum(np.nansum(e**2) for e in errors))
+
+
+def _share(before: Sequence[Array], after: Sequence[Array]) -> float:
+    total = _total(before)
+    return 1.0 - _total(after) / total if total > 0.0 else 0.0
+
+
+# Over time ---------------------------------------------------------------------------------------------------
+
+
+def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
+    """The strongest line that is in most of the records that are long enough for it, or that rules a few."""
+    peaks: list[tuple[float, float, int]] = []
+    for k, (item, error) in enumerate(zip(items, errors, strict=True)):
+        peaks += [(share, frequency, k) for share, frequency in _peaks(item, error)]
+    lengths = [float(np.ptp(item.run.t)) for item in items]
+    rates = [1.0 / float(np.median(np.diff(item.run.t))) for item in items]
+    best: tuple[float, float, list[int]] | None = None
+    for _, frequency, k in peaks:
+        near = [p for p in peaks if abs(p[1] - frequency) < 1.5 / min(lengths[p[2]], lengths[k])]
+        seen = sorted({p[2] for p in near})
+        able = [j for j, n in enumerate(lengths) if n * frequency >= PERIODS and 2.0 * frequency <= rates[j]]
+        strength = sum(p[0] for p in near)
+        common = len(seen) >= max(2, 0.4 * len(able)) or len(able) == len(seen)
+        if (common or min(p[0] for p in near) > ALONE) and (best is None or strength > best[0]):
+            longest = max(near, key=lambda p: lengths[p[2]])  # which tells the frequency best
+            best = strength, longest[1], seen
+    if best is None:
+        return None
+    _, frequency, seen = best
+    frequency = _refined(items, errors, frequency, seen, lengths)
+    after, sizes = [], []
+    for k, (item, error) in enumerate(zip(items, errors, strict=True)):
+        if lengths[k] * frequency < 2.0:
+            after.append(error)
+            continue
+        e, size = _without(error, _phase(item, frequency))
+        after.append(e)
+        # two samples a period do not tell the amplitude
+        if k in seen and (2.2 * frequency < rates[k] or all(2.2 * frequency > rates[j] for j in seen)):
+            sizes.append(size)
+    own = _share([errors[k] for k in seen], [after[k] for k in seen])
+    told = {
+        "kind": "line",
+        "frequency": float(f"{frequency:.4g}"),
+        "amplitude": float(np.median(sizes)),
+        "share": own,
+        "records": [items[k].name for k in seen],
+    }
+    width = 0.5 / max(lengths[k] for k in seen)
+    order = [(f, n) for f in MAINS for n in (1, 2, 3, 5) if abs(frequency - n * f) < max(width, 0.002 * frequency)]
+    if order:
+        mains, n = order[0]
+        told["mains"] = mains if n == 1 else f"{n} x {mains:g} Hz"
+    return Line(told, after, _share(errors, after))
+
+
+def _peaks(item: Item, error: Array) -> list[tuple[float, float]]:
+    """Share and frequency of narrow peaks of one residual that are no multiples of what the drive does."""
+    known = np.isfinite(error)
+    n = len(error)
+    if np.count_nonzero(known) < 256:
+        return []
+    step = float(np.median(np.diff(item.run.t)))
+    e = np.interp(np.arange(n), np.flatnonzero(known), error[known])
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft((e - e.mean()) * window)) ** 2
+    drive = np.abs(np.fft.rfft((item.run.v - item.run.v.mean()) * window)) ** 2
+    total, driven = float(np.sum(power)), float(np.sum(drive))
+    if total == 0.0:
+        return []
+    fundamental = int(np.argmax(drive[1:])) + 1
+    found: list[tuple[float, float]] = []
+    for k in np.argsort(power)[::-1][:5].tolist():
+        if k < PERIODS:
+            continue
+        around = np.concatenate([power[max(k - 40, 1) : k - 3], power[k + 4 : k + 40]])
+        beside = slice(max(k - 2, 0), k + 3)
+        share = float(np.sum(power[beside])) / total
+        if not len(around) or power[k] <= STANDS * float(np.median(around)) or share <= SHARE:
+            continue
+        if float(np.sum(drive[beside])) >= 1e-4 * driven:
+            continue
+        # a harmonic of a periodic drive is none: it has neighbours at its distance
+        multiple = k / fundamental
+        if fundamental > 3 and abs(multiple - round(multiple)) < 2.0 / fundamental and multiple < 40.0:
+            continue
+        if not any(abs(other - k / (n * step)) < 4.0 / (n * step) for _, other in found):
+            found.append((share, k / (n * step)))
+    return found
+
+
+def _refined(
+    items: Sequence[Item], errors: Sequence[Array], frequency: float, seen: Sequence[int], lengths: Sequence[float]
+) -> float:
+    """The frequency at which a sine takes most out of the records."""
+    places = frequency + np.linspace(-1.0, 1.0, 21) / max(lengths[k] for k in seen)
+    for _ in range(2):
+        removed = [
+            sum(
+                float(np.nansum(errors[k] ** 2) - np.nansum(_without(errors[k], _phase(items[k], f))[0] ** 2))
+                for k in seen
+            )
+            for f in places
+        ]
+        best, step = float(places[int(np.argmax(removed))]), float(places[1] - places[0])
+        places = best + np.linspace(-1.0, 1.0, 21) * step
+    return best
+
+
+def _phase(item: Item, frequency: float) -> Array:
+    return np.asarray(2.0 * np.pi * frequency * (item.run.t - item.run.t[0]))
+
+
+def _without(error: Array, phase: Array) -> tuple[Array, float]:
+    """The error without its sine and cosine over a phase, and their amplitude."""
+    known = np.isfinite(error)
+    table = np.column_stack([np.cos(phase[known]), np.sin(phase[known]), np.ones(int(np.count_nonzero(known)))])
+    solution = np.linalg.lstsq(table, error[known], rcond=None)[0]
+    left = error.copy()
+    left[known] -= table[:, :2] @ solution[:2]
+    return left, float(np.hypot(solution[0], solution[1]))
+
+
+# Over the position -------------------------------------------------------------------------------------------
+
+
+def _in_position(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
+    """A ripple with a fixed pitch over the predicted position, of the same phase in all records.
+
+    The measured position would not do: a ripple that is large against its pitch is no sine over itself.
+    """
+    known = [np.isfinite(e) & np.isfinite(item.y) for item, e in zip(items, errors, strict=True)]
+    values = [e[at] for e, at in zip(errors, known, strict=True)]
+    places = [item.y[at] - e for item, e, at in zip(items, values, known, strict=True)]
+    if sum(map(len, values)) < 256:
+        return None
+    low = min(float(y.min()) for y in places if len(y))
+    span = max(float(y.max()) for y in places if len(y)) - low
+    if span == 0.0:
+        return None
+    summed = np.zeros(BINS)
+    for y, e in zip(places, values, strict=True):
+        if len(e):
+            at = np.minimum(((y - low) / span * BINS).astype(int), BINS - 1)
+            summed += np.bincount(at, e - e.mean(), BINS)
+    # four times as long: pitches between whole parts of the range
+    power = np.abs(np.fft.rfft(summed, 4 * BINS)) ** 2
+    power[: 4 * PERIODS] = 0.0
+    power[2 * BINS // 4 :] = 0.0
+    for k in _highest(power, 3):
+        around = np.concatenate([power[max(k - 160, 4 * PERIODS) : k - 12], power[k + 13 : k + 160]])
+        if not len(around) or power[k] <= STANDS * float(np.median(around)):
+            continue
+        pitch = _pitch(places, values, 4.0 * span / k)
+        found = _ripple(items, errors, places, values, pitch)
+        if found is not None:
+            return found
+    return None
+
+
+def _highest(power: Array, most: int) -> list[int]:
+    found: list[int] = []
+    for k in np.argsort(power)[::-1].tolist():
+        if len(found) == most or power[k] == 0.0:
+            break
+        if all(abs(k - other) > 8 for other in found):
+            found.append(k)
+    return found
+
+
+def _pitch(places: Sequence[Array], values: Sequence[Array], pitch: float) -> float:
+    """The pitch that takes most out of the errors."""
+    y, e = np.concatenate(list(places)), np.concatenate([v - v.mean() for v in values if len(v)])
+    span = float(np.ptp(y))
+    candidates = 1.0 / (1.0 / pitch + np.linspace(-0.5, 0.5, 21) / span)
+    return float(max(candidates, key=lambda p: abs(np.exp(2j * np.pi * y / p) @ e)))
+
+
+def _ripple(
+    items: Sequence[Item], errors: Sequence[Array], places: Sequence[Array], values: Sequence[Array], pitch: float
+) -> Line | None:
+    """The ripple, where what the other records say of it holds in most of those that travel over several pitches."""
+    tables = [
+        np.column_stack([np.cos(2.0 * np.pi * y / pitch), np.sin(2.0 * np.pi * y / pitch)]) for y in places
+    ]
+    parts = [k for k, y in enumerate(places) if len(y) > 64 and np.ptp(y) > 3.0 * pitch]
+    pieces = [(tables[k], values[k] - values[k].mean()) for k in parts]
+    if len(pieces) == 1:
+        table, e = pieces[0]
+        half = len(e) // 2
+        pieces = [(table[:half], e[:half]), (table[half:], e[half:])]
+    if not pieces:
+        return None
+    squares = [(x.T @ x, x.T @ e) for x, e in pieces]
+    matrix, right = sum(s[0] for s in squares), sum(s[1] for s in squares)
+    holds = 0
+    for (x, e), (own, own_right) in zip(pieces, squares, strict=True):
+        told = np.linalg.lstsq(matrix - own, right - own_right, rcond=None)[0]
+        holds += bool(np.sum((e - x @ told) ** 2) < (1.0 - SHARE) * np.sum(e**2))
+    solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    if holds < 0.6 * len(pieces):
+        return None
+    after = []
+    for error, table in zip(errors, tables, strict=True):
+        e = error.copy()
+        e[np.isfinite(e)] -= table @ solution
+        after.append(e)
+    share = _share(errors, after)
+    if share < SHARE:
+        return None
+    told = {
+        "kind": "ripple",
+        "pitch": float(f"{pitch:.4g}"),
+        "amplitude": float(np.hypot(solution[0], solution[1])),
+        "share": share,
+        "records": [items[k].name for k in parts],
+    }
+    return Line(told, after, share)

@@ -1,0 +1,305 @@
+"""The pictures of a diagnosis: how the gap shrinks, where it is, and what it goes with, with the noise drawn in."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.description import loop_centre
+from hystgen.diagnosis.floor import still
+from hystgen.report import drawing
+from hystgen.report.drawing import label
+from hystgen.report.fit_figures import binned
+
+if TYPE_CHECKING:
+    from hystgen.diagnosis import Diagnosis, Signals
+
+Array = NDArray[np.float64]
+
+BEFORE, AFTER, FLOOR = "#8a929c", drawing.RESIDUAL, drawing.FAULT
+
+WIDE, NARROW = 9.0, 4.2
+
+SHOWN = 2
+"""Held-out records that are drawn along time."""
+
+FAR = 25.0
+"""A logarithmic axis is used where the largest value is so many times the least."""
+
+HOLD = 16
+
+WINDOWS = 12
+"""Stretches of a record whose rms is drawn over the session."""
+
+
+def steps(found: Diagnosis) -> list[tuple[str, float]]:
+    """The stages of the waterfall, with the held-out rms of each."""
+    content = found.content
+    stages = [("as given", content["gap"]["as_given"]["holdout"]), ("refitted", content["gap"]["refitted"]["holdout"])]
+    return stages + [(f"+ {effect['name']}", effect["holdout_after"]) for effect in content["effects"]]
+
+
+def gap(found: Diagnosis, width: float) -> Any:
+    """What each step takes from the held-out error, down to the noise."""
+    stages, noise = steps(found), float(found.content["noise_floor"])
+    names = [*(name for name, _ in stages), "noise"]
+    values = [*(value for _, value in stages), noise]
+    drawn = drawing.figure(width, 1.0 + 0.44 * len(names))
+    axes = drawn.subplots()
+    positive = [value for value in values if value > 0.0]
+    far = bool(positive) and max(positive) > FAR * min(positive)
+    least = 0.4 * min(positive) if far else 0.0
+    top = max(positive, default=1.0)
+    for place, (value, before) in enumerate(zip(values, [values[0], *values[:-1]], strict=True)):
+        colour = FLOOR if place == len(values) - 1 else (BEFORE, drawing.MODEL)[place] if place < 2 else AFTER
+        axes.barh(place, value - least, left=least, height=0.6, color=colour)
+        if 0 < place < len(values) - 1 and before > value:
+            axes.barh(place, before - value, left=value, height=0.6, facecolor="none", edgecolor=BEFORE,
+                      linestyle=":", linewidth=1.0)  # fmt: skip
+        said = f"{value:.3g}"
+        if 0 < place < len(values) - 1 and before > 0.0:
+            change = 100.0 * (value / before - 1.0)
+            said += f"  ({change:+.0f} %)" if abs(change) >= 0.5 else "  (no change)"
+        end = max(value, before if 0 < place < len(values) - 1 else 0.0)
+        axes.annotate(f" {said}", (end, place), va="center", fontsize=9)
+    axes.axvline(noise, color=FLOOR, linestyle="--", linewidth=1.2)
+    axes.set_yticks(range(len(names)), names)
+    axes.invert_yaxis()
+    room = 1.4 if width == WIDE else 2.0
+    if far:
+        axes.set_xscale("log")
+        axes.set_xlim(least, top * (top / least) ** (0.22 if width == WIDE else 0.6))
+    else:
+        axes.set_xlim(0.0, room * top)
+    axes.set(xlabel=label("rms error, held out", found.content["unit"]))
+    axes.grid(axis="y", visible=False)
+    return drawn
+
+
+def worst(found: Diagnosis) -> list[Signals]:
+    """The held-out records with the largest error of the refitted model, the worst first."""
+    held = [each for each in found.signals if each.held_out and np.isfinite(each.before).any()]
+    return sorted(held, key=lambda each: -_rms(each.before))[:SHOWN]
+
+
+def overlay(found: Diagnosis, width: float) -> Any:
+    """Measured and predicted along time, and the error before and after."""
+    shown, unit = worst(found), found.content["unit"]
+    named = bool(found.content["effects"])
+    drawn = drawing.figure(width, 4.9 * len(shown))
+    rows = drawn.subfigures(len(shown), 1, squeeze=False)
+    for row, each in zip(rows.flat, shown, strict=True):
+        top, bottom = row.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        chosen = drawing.kept(0, len(each.t), each.y, each.before, each.after)
+        t = each.t[chosen] - each.t[0]
+        top.plot(t, each.y[chosen], label="measured", **drawing.LINES["measured"])
+        what = "with the effects" if named else "refitted model"
+        if named:
+            top.plot(t, (each.y - each.before)[chosen], color=BEFORE, linewidth=0.9, label="refitted")
+        top.plot(t, (each.y - each.after)[chosen], label=what, **drawing.LINES["model"])
+        top.set(ylabel=label("displacement", unit))
+        top.set_title(each.name, pad=8 if width == WIDE else 22)
+        drawing.legend_above(top, 3 if width == WIDE else 2)
+        if named:
+            bottom.plot(t, each.before[chosen], color=BEFORE, linewidth=0.8, label="refitted")
+        bottom.plot(t, each.after[chosen], color=AFTER, linewidth=0.8, label=what)
+        _floor(bottom, found)
+        bottom.set(xlabel="time in the record (s)", ylabel=label("error", unit))
+        drawing.legend_above(bottom, 3 if width == WIDE else 2)
+        row.align_ylabels()
+    return drawn
+
+
+def records(found: Diagnosis, width: float) -> Any:
+    """rms of every record before and after."""
+    shown = [each for each in found.signals if np.isfinite(each.before).any()]
+    drawn = drawing.figure(width, 1.3 + 0.34 * len(shown))
+    axes = drawn.subplots()
+    places = np.arange(len(shown), dtype=np.float64)
+    values = [[_rms(getattr(each, key)) for each in shown] for key in ("before", "after")]
+    if found.content["effects"]:
+        axes.plot(values[0], places, "o", color=BEFORE, markersize=6, label="refitted")
+    axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
+    axes.axvline(found.content["noise_floor"], color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
+    axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
+    axes.invert_yaxis()
+    _range(axes, [*values[0], *values[1], found.content["noise_floor"]])
+    axes.set(xlabel=label("rms error", found.content["unit"]))
+    drawing.legend_above(axes, 3)
+    return drawn
+
+
+def against(found: Diagnosis, width: float) -> Any:
+    """Mean and scatter of the error over what it may go with, of all records."""
+    shown = [each for each in found.signals if np.isfinite(each.before).any()]
+    units, unit = found.parameters.units, found.content["unit"]
+    wide = width == WIDE
+    drawn = drawing.figure(width, 7.4 if wide else 14.0)
+    grid = np.ravel(drawn.subplots(3, 2, sharey=True) if wide else drawn.subplots(6, 1, sharey=True))
+    variables: list[tuple[str, Callable[[Signals], Array], bool]] = [
+        (label("drive", units.input), lambda each: each.v, False),
+        (label("drive rate", f"{units.input}/s" if units.input else "1/s"),
+         lambda each: np.asarray(np.gradient(each.v, each.t)), False),
+        (label("displacement", unit), lambda each: each.y, False),
+        (label("loop centre", units.input), lambda each: loop_centre(each.v), False),
+        ("session time (s)", lambda each: each.t, False),
+        ("time since the drive stopped (s)", _since_stop, True),
+    ]  # fmt: skip
+    for axes, (name, of, log) in zip(grid, variables, strict=True):
+        x = np.concatenate([of(each) for each in shown])
+        sides = [("before", BEFORE, "refitted")] if found.content["effects"] else []
+        for key, colour, what in (*sides, ("after", AFTER, _last(found))):
+            e = np.concatenate([getattr(each, key) for each in shown])
+            _binned(axes, x, e, colour, f"{what}, mean \N{PLUS-MINUS SIGN} 1 sd", log)
+        _floor(axes, found)
+        axes.set(xlabel=name)
+    for axes in grid[:: 2 if wide else 1]:
+        axes.set(ylabel=label("error", unit))
+    handles, names = grid[0].get_legend_handles_labels()
+    drawn.legend(handles, names, loc="outside upper right", ncols=3 if wide else 1)
+    return drawn
+
+
+def _binned(axes: Any, x: Array, e: Array, colour: str, what: str, log: bool) -> None:
+    known = np.isfinite(e) & np.isfinite(x)
+    if np.count_nonzero(known) < 64 or np.ptp(x[known]) == 0.0:
+        axes.text(0.5, 0.5, "not in these records", transform=axes.transAxes, ha="center", color=drawing.QUIET)
+        return
+    place = np.log10(x[known]) if log else x[known]
+    low, high = (float(q) for q in np.quantile(place, (0.005, 0.995)))
+    middle, mean, spread = binned(place, e[known], low, high if high > low else low + 1.0)
+    there = np.isfinite(mean)
+    middle, mean, spread = middle[there], mean[there], spread[there]
+    middle = 10.0**middle if log else middle
+    axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.25, linewidth=0)
+    axes.plot(middle, mean, color=colour, linewidth=1.5, label=what)
+    if log:
+        axes.set_xscale("log")
+
+
+def _since_stop(each: Signals) -> Array:
+    """Seconds since the drive came to rest, NaN where it moves."""
+    found = np.full(len(each.t), np.nan)
+    for first, last in still(each.v, max(HOLD, len(each.t) // 200)):
+        found[first + 1 : last] = each.t[first + 1 : last] - each.t[first]
+    return found
+
+
+def time(found: Diagnosis, width: float) -> Any:
+    """rms of the error in stretches of the records along the session."""
+    shown = sorted((s for s in found.signals if np.isfinite(s.before).any()), key=lambda each: float(each.t[0]))
+    one_clock = all(a.t[-1] <= b.t[0] for a, b in itertools.pairwise(shown))
+    drawn = drawing.figure(width, 3.4)
+    axes = drawn.subplots()
+    start, values = 0.0, []
+    for number, each in enumerate(shown):
+        t = each.t if one_clock else each.t - each.t[0] + start
+        start = float(t[-1]) + 0.02 * float(np.ptp(t))
+        edges = np.linspace(0, len(t), WINDOWS + 1).astype(int)
+        for key, colour, what in (("before", BEFORE, "refitted"), ("after", AFTER, _last(found))):
+            if key == "before" and not found.content["effects"]:
+                continue
+            e = getattr(each, key)
+            parts = [(0.5 * (t[a] + t[b - 1]), _rms(e[a:b])) for a, b in itertools.pairwise(edges) if b > a]
+            parts = [(place, rms) for place, rms in parts if np.isfinite(rms)]
+            values += [rms for _, rms in parts]
+            axes.plot(*zip(*parts, strict=True), "-o", color=colour, markersize=2.5, linewidth=1.1,
+                      label=None if number else what)  # fmt: skip
+    noise = found.content["noise_floor"]
+    axes.axhline(noise, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
+    positive = [value for value in values if value > 0.0]
+    if positive and max(positive) > FAR * max(min(positive), 1e-300):
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=0.0)
+    clock = "session time (s)" if one_clock else "time, one record after another (s)"
+    axes.set(xlabel=clock, ylabel=label("rms error", found.content["unit"]))
+    drawing.legend_above(axes, 3)
+    return drawn
+
+
+def frequency(found: Diagnosis, width: float) -> Any:
+    """Spectral density of the error of the worst held-out record."""
+    from scipy.signal import welch
+
+    each, unit = worst(found)[0], found.content["unit"]
+    step = float(np.median(np.diff(each.t)))
+    drawn = drawing.figure(width, 3.6)
+    axes = drawn.subplots()
+    sides = [("before", BEFORE, "refitted")] if found.content["effects"] else []
+    for key, colour, what in (*sides, ("after", AFTER, _last(found))):
+        e = getattr(each, key)
+        known = np.flatnonzero(np.isfinite(e))
+        if len(known) < 64:
+            continue
+        e = np.interp(np.arange(known[0], known[-1] + 1), known, e[known])
+        places, density = welch(e, 1.0 / step, nperseg=min(len(e), max(256, len(e) // 4)))
+        axes.plot(places[1:], np.sqrt(density[1:]), color=colour, linewidth=1.0, label=what)
+    floor = float(found.content["noise_floor"]) * np.sqrt(2.0 * step)
+    axes.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise, if white")
+    for line in (entry for entry in found.content["unexplained"] if entry["kind"] == "line"):
+        if line["frequency"] < 0.5 / step:
+            axes.axvline(line["frequency"], color=drawing.OTHER, linestyle=":", linewidth=1.0)
+            axes.annotate(f"{line['frequency']:.4g} Hz", (line["frequency"], 1.0), xycoords=("data", "axes fraction"),
+                          xytext=(3, -10), textcoords="offset points", fontsize=8, color=drawing.OTHER)  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set(xlabel="frequency (Hz)", ylabel=label("error density", f"{unit}/\N{SQUARE ROOT}Hz" if unit else None))
+    axes.set_title(each.name, pad=8 if width == WIDE else 22)
+    drawing.legend_above(axes, 3 if width == WIDE else 2)
+    return drawn
+
+
+def _last(found: Diagnosis) -> str:
+    return "with the effects" if found.content["effects"] else "refitted model"
+
+
+def _floor(axes: Any, found: Diagnosis) -> None:
+    noise = found.content["noise_floor"]
+    for sign, name in ((1.0, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-1.0, None)):
+        axes.axhline(sign * noise, color=FLOOR, linestyle="--", linewidth=1.0, label=name)
+
+
+def _range(axes: Any, values: Sequence[float]) -> None:
+    """A horizontal axis from zero, or a logarithmic one where the values lie far apart."""
+    positive = [value for value in values if value > 0.0]
+    if positive and max(positive) > FAR * min(positive):
+        axes.set_xscale("log")
+    else:
+        axes.set_xlim(left=0.0)
+
+
+def _rms(e: Array) -> float:
+    known = e[np.isfinite(e)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+FIGURES = {
+    "gap": gap, "overlay": overlay, "records": records, "time": time, "against": against, "frequency": frequency,
+}  # fmt: skip
+
+CAPTIONS = {
+    "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after the other; "
+    "dotted: what each step takes away. The dashed line is the noise, measured without a model.",
+    "overlay": "The held-out records on which the refitted model does worst. Below each: measured less predicted.",
+    "records": "rms error of every record, against the noise.",
+    "time": "rms error in stretches of the records, along the session.",
+    "against": "Mean and scatter of the error on all records against what it may go with. A mean that leaves the "
+    "dashed band of the noise, or a scatter that widens, is structure. Loop centre: the middle between the last two "
+    "reversals of the drive.",
+    "frequency": "Spectral density of the error on the held-out record on which the refitted model does worst.",
+}
+
+ALTERNATIVES = {
+    "gap": "Bars of the held-out error after each step, down to the noise.",
+    "overlay": "Measured and predicted displacement along time, and below it the error before and after.",
+    "records": "Points for the rms error of every record before and after, with the noise as a line.",
+    "time": "rms error before and after along the session, with the noise as a line.",
+    "against": "Six panels of binned errors before and after against drive, rate, displacement, loop centre, session "
+    "time and time since the drive stopped, with the noise.",
+    "frequency": "Spectral density of the error before and after, with that of white noise.",
+}
