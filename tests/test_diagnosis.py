@@ -95,7 +95,7 @@ class TestBlindPlants:
             name for name in names if name not in ("asymmetry", "saturation")
         ]
         shown = (tmp_path / "out" / "report.html").read_text()
-        assert shown.count("<img src=\"data:image/svg+xml;base64,") == 3
+        assert shown.count("<img src=\"data:image/svg+xml;base64,") == 6
         assert "http" not in re.sub(r"base64,[^\"]*", "", shown)
         assert all(name in shown for name in names)
         first = [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())]

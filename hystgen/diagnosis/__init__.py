@@ -238,6 +238,7 @@ def _content(
     sticking = _merged(leftovers.stick_slip(everything, errors, noise.rms))
     left = [each for each in odd if each["kind"] not in told.REPAIRED] + periodic_ones + sticking
     share, _ = description.structure(ready.held, errors[len(ready.to_fit) :])
+    share = max(share, *description.together(everything, errors))
     rest = structure.rms(errors[len(ready.to_fit) :])
     ratio = rest / noise.rms if noise.rms else float("inf")
     if ratio > FAR_ABOVE or (share > STRUCTURE and ratio > ABOVE_FLOOR):

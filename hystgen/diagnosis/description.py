@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import operators
-from hystgen.diagnosis.floor import REPEATS
+from hystgen.diagnosis.periodic import repetition
 from hystgen.diagnosis.structure import Item
 
 Array = NDArray[np.float64]
@@ -115,7 +115,7 @@ def described(items: Sequence[Item], errors: Sequence[Array], noise: float) -> d
     share, shares = structure(items, errors)
     total = np.concatenate([e[np.isfinite(e)] for e in errors])
     rms = float(np.sqrt(np.mean(total**2))) if len(total) else 0.0
-    free, all_of_it = _with_memory(items, errors)
+    free, all_of_it = together(items, errors)
     main = max(shares, key=lambda name: shares[name], default=None)
     if free > MORE * max(share, WORTH):
         shares["memory"], main = round(free, 4), "memory"
@@ -170,8 +170,9 @@ def _folds(n: int) -> NDArray[np.intp]:
     return np.asarray((np.arange(n) * BLOCKS // n) % 2)
 
 
-def _with_memory(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
-    """Cross-validated shares of what is rate-free (drive and plays), and of that together with rates and creep."""
+def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
+    """Cross-validated shares of what is rate-free (drive and plays), and of that together with averages of the drive
+    over several times, which tell of rates and of creep."""
     widest = max(float(np.ptp(item.run.v)) for item in items)
     low = min(float(item.run.v.min()) for item in items)
     every = max(1, sum(int(np.isfinite(e).sum()) for e in errors) // THINNED)
@@ -235,23 +236,6 @@ def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
         powers += 0.5 * float(one @ one + other @ other)
         count += len(one)
     return max(0.0, products / powers) if count >= FEWEST and powers > 0.0 else None
-
-
-def repetition(v: Array) -> int | None:
-    """Samples after which the drive repeats itself for at least as long again; None where it does not."""
-    n = len(v)
-    swing = float(np.ptp(v))
-    if n < 64 or swing == 0.0:
-        return None
-    spectrum = np.abs(np.fft.rfft(v - v.mean(), 2 * n)) ** 2
-    correlation = np.fft.irfft(spectrum)[:n] / np.arange(n, 0, -1)
-    falls = np.flatnonzero(correlation < 0.5 * correlation[0])
-    if not len(falls) or falls[0] >= n // 2:
-        return None
-    peak = int(falls[0] + np.argmax(correlation[falls[0] : n // 2]))
-    apart = {p: float(np.sqrt(np.mean((v[p:] - v[:-p]) ** 2))) for p in range(max(peak - 2, 8), peak + 3)}
-    best = min(apart, key=lambda p: apart[p])
-    return best if apart[best] < 5.0 * REPEATS * swing else None
 
 
 def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:

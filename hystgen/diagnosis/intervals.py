@@ -102,26 +102,20 @@ def entry(effect: Effect) -> dict[str, Any]:
 
 
 def _spread(made: Sequence[Numbers], at: Numbers) -> dict[str, Any]:
-    """`[low, high]` of each key, of a list a list of them; what does not vary and is no number has none."""
-    found: dict[str, Any] = {}
-    for key, value in at.items():
-        values = [each.get(key) for each in made]
-        if isinstance(value, bool | str) or any(v is None for v in values):
-            continue
-        if isinstance(value, int | float):
-            pair = _interval(np.array(values, dtype=np.float64))
-            if pair is not None:
-                found[key] = pair
-        elif isinstance(value, list | tuple) and all(len(v) == len(value) for v in values):  # type: ignore[arg-type]
-            table = np.array(values, dtype=np.float64)
-            pairs = [_interval(column) for column in table.reshape(len(table), -1).T]
-            if table.ndim == 2 and any(pair is not None for pair in pairs):
-                found[key] = [pair if pair is not None else [v, v] for pair, v in zip(pairs, value, strict=True)]
-    return found
+    """`[low, high]` of each key that varies; for a list or a mapping the same of what is in it."""
+    found = {key: _interval([each.get(key) for each in made], value) for key, value in at.items()}
+    return {key: sure for key, sure in found.items() if sure}
 
 
-def _interval(values: Array) -> list[float] | None:
-    if np.ptp(values) == 0.0:
+def _interval(values: Sequence[Any], at: Any) -> Any:
+    if isinstance(at, bool | str) or any(value is None for value in values):
         return None
-    low, high = np.quantile(values, TAILS)
-    return [float(low), float(high)]
+    if isinstance(at, Mapping):
+        return _spread(values, at)
+    if isinstance(at, list | tuple):
+        if any(len(value) != len(at) for value in values):
+            return None
+        found = [_interval([value[k] for value in values], one) for k, one in enumerate(at)]
+        return [sure or [one, one] for sure, one in zip(found, at, strict=True)] if any(found) else None
+    low, high = np.quantile(np.array(values, dtype=np.float64), TAILS)
+    return [float(low), float(high)] if low < high else None

@@ -19,6 +19,9 @@ STANDS = 30.0
 SHARE, ALONE = 0.03, 0.3
 """Least share of a record's residual variance in a line, and where only a few of the records have it."""
 
+OWN, PEAK = 1e-6, 10.0
+"""A line is the drive's own where that has so much of its power there, and so many times its surroundings'."""
+
 PERIODS = 8
 """Fewest periods in a record for a line to be seen, and fewest pitches in the travel."""
 
@@ -28,6 +31,10 @@ BINS = 4096
 """Positions are taken to so many places of the range."""
 
 MAINS = (50.0, 60.0)
+
+
+REPEATS = 0.01
+"""A drive repeats itself where it differs from itself a period later by less than this share of its range, rms."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +76,10 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
     peaks: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
         peaks += [(share, frequency, k) for share, frequency in _peaks(item, error)]
-    lengths = [float(np.ptp(item.run.t)) for item in items]
+    times = [item.run.t[np.isfinite(e)] for item, e in zip(items, errors, strict=True)]
+    lengths = [float(np.ptp(t)) if len(t) > 64 else 0.0 for t in times]
     rates = [1.0 / float(np.median(np.diff(item.run.t))) for item in items]
-    best: tuple[float, float, list[int]] | None = None
+    best: tuple[float, float, list[int], list[int]] | None = None
     for _, frequency, k in peaks:
         near = [p for p in peaks if abs(p[1] - frequency) < 1.5 / min(lengths[p[2]], lengths[k])]
         seen = sorted({p[2] for p in near})
@@ -80,28 +88,30 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
         common = len(seen) >= max(2, 0.4 * len(able)) or len(able) == len(seen)
         if (common or min(p[0] for p in near) > ALONE) and (best is None or strength > best[0]):
             longest = max(near, key=lambda p: lengths[p[2]])  # which tells the frequency best
-            best = strength, longest[1], seen
+            best = strength, longest[1], seen, able
     if best is None:
         return None
-    _, frequency, seen = best
+    _, frequency, seen, able = best
     frequency = _refined(items, errors, frequency, seen, lengths)
-    after, sizes = [], []
+    after, sizes, has = [], [], []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
         if lengths[k] * frequency < 2.0:
             after.append(error)
             continue
         e, size = _without(error, _phase(item, frequency))
         after.append(e)
+        if k in seen or (k in able and _share([error], [e]) > SHARE):
+            has.append(k)
         # two samples a period do not tell the amplitude
         if k in seen and (2.2 * frequency < rates[k] or all(2.2 * frequency > rates[j] for j in seen)):
             sizes.append(size)
-    own = _share([errors[k] for k in seen], [after[k] for k in seen])
+    own = _share([errors[k] for k in has], [after[k] for k in has])
     told = {
         "kind": "line",
         "frequency": float(f"{frequency:.4g}"),
         "amplitude": float(np.median(sizes)),
         "share": own,
-        "records": [items[k].name for k in seen],
+        "records": [items[k].name for k in has],
     }
     width = 0.5 / max(lengths[k] for k in seen)
     order = [(f, n) for f in MAINS for n in (1, 2, 3, 5) if abs(frequency - n * f) < max(width, 0.002 * frequency)]
@@ -125,25 +135,47 @@ def _peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     total, driven = float(np.sum(power)), float(np.sum(drive))
     if total == 0.0:
         return []
-    fundamental = int(np.argmax(drive[1:])) + 1
+    period = repetition(item.run.v)
     found: list[tuple[float, float]] = []
     for k in np.argsort(power)[::-1][:5].tolist():
-        if k < PERIODS:
+        if k < PERIODS or power[k] < np.max(power[k - 1 : k + 2]):
             continue
         around = np.concatenate([power[max(k - 40, 1) : k - 3], power[k + 4 : k + 40]])
         beside = slice(max(k - 2, 0), k + 3)
         share = float(np.sum(power[beside])) / total
         if not len(around) or power[k] <= STANDS * float(np.median(around)) or share <= SHARE:
             continue
-        if float(np.sum(drive[beside])) >= 1e-4 * driven:
+        # a line of the drive, which may be a small one of many harmonics
+        own = np.concatenate([drive[max(k - 40, 1) : k - 3], drive[k + 4 : k + 40]])
+        if float(np.sum(drive[beside])) >= OWN * driven and drive[k] > PEAK * float(np.median(own)):
             continue
-        # a harmonic of a periodic drive is none: it has neighbours at its distance
-        multiple = k / fundamental
-        if fundamental > 3 and abs(multiple - round(multiple)) < 2.0 / fundamental and multiple < 40.0:
-            continue
+        if period is not None and abs(k * period / n - round(k * period / n)) * n / period < 1.5:
+            continue  # a harmonic of the drive
         if not any(abs(other - k / (n * step)) < 4.0 / (n * step) for _, other in found):
             found.append((share, k / (n * step)))
     return found
+
+
+def repetition(v: Array) -> int | None:
+    """Samples after which the drive repeats itself for at least as long again; None where it does not."""
+    n = len(v)
+    swing = float(np.ptp(v))
+    if n < 64 or swing == 0.0:
+        return None
+    x = v - v.mean()
+    squares = np.concatenate([[0.0], np.cumsum(x**2)])
+    lag = np.arange(n // 2 + 1)
+    both = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[: n // 2 + 1]
+    apart = (squares[n - lag] + squares[n] - squares[lag] - 2.0 * both) / (n - lag)
+    gone = np.flatnonzero(apart > (0.25 * swing) ** 2)
+    if not len(gone):
+        return None
+    back = np.flatnonzero(apart[gone[0] :] < (REPEATS * swing) ** 2)
+    if not len(back):
+        return None
+    first = int(gone[0] + back[0])
+    last = min(first + 1 + int(REPEATS * first), n // 2)
+    return first + int(np.argmin(apart[first : last + 1]))
 
 
 def _refined(

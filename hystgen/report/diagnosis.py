@@ -14,6 +14,7 @@ from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, 
 
 if TYPE_CHECKING:
     from hystgen.diagnosis import Diagnosis
+    from hystgen.effects.base import Effect
 
 COMPENSATED = {
     "creep": "exact",
@@ -31,6 +32,9 @@ COMPENSATED = {
     "sensor_nonlinearity": "none needed",
 }
 """What an effect means for a compensator, in a word."""
+
+AT_NOISE = 1.25
+"""An error within this factor of the noise is called noise."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:
@@ -64,13 +68,16 @@ def _found(content: Mapping[str, Any]) -> list[Text | Table]:
     unit = content["unit"]
     rows = [["effect", label("held-out rms before", unit), label("after", unit), "share of the gap", "p"]]
     means = [["effect", "compensation", "how"]]
-    numbers = [["effect", "number", "value", "95 % from", "to"]]
+    numbers = [["effect", "number", "value", "95 % from", "to", "what it is"]]
     for effect in content["effects"]:
         before, after = effect["holdout_before"], effect["holdout_after"]
         share = f"{100.0 * effect['share_of_gap']:.0f} %"
         rows.append([effect["name"], f"{before:.4g}", f"{after:.4g}", share, f"{effect['p_value']:.1g}"])
         means.append([effect["name"], COMPENSATED.get(effect["name"], "its own"), _compensation(effect)])
-        numbers += [[effect["name"], *row] for row in _numbers(effect["parameters"], effect["intervals"])]
+        said = _descriptions(effect)
+        for key, value in effect["parameters"].items():
+            several = _numbers(value, effect["intervals"].get(key), key.replace("_", " "))
+            numbers += [[effect["name"], *row, said.get(key, "")] for row in several]
     return [
         Table(rows, (0,)),
         Text("What they mean for a compensator:"),
@@ -79,42 +86,58 @@ def _found(content: Mapping[str, Any]) -> list[Text | Table]:
             "Their numbers, with intervals that count the correlation of the residuals and the freedom of the weights, "
             "but not that another shape may fit as well:"
         ),
-        Table(numbers, (0, 1)),
+        Table(numbers, (0, 1, 5)),
     ]
 
 
 def _compensation(effect: Mapping[str, Any]) -> str:
     """How a compensator takes an effect into account."""
     name = effect["name"]
-    if name == "asymmetry":
+    if effect["parameters"].get("kind"):
         return "part of the inverse: the front is inverted behind the plays"
     if name not in effects.CATALOGUE:
         return "as the effect's own class says"
-    kinds = effects.shapes(name)
-    chosen = effect["parameters"].get(kinds[0].selector)
+    kind = _kind(effect)
+    return kind.compensation if kind is not None else ""
+
+
+def _descriptions(effect: Mapping[str, Any]) -> dict[str, str]:
+    """What each key of an effect is, with its unit."""
+    kind = _kind(effect)
+    return {key: field.description or "" for key, field in kind.model_fields.items()} if kind is not None else {}
+
+
+def _kind(effect: Mapping[str, Any]) -> type[Effect] | None:
+    """The shape of the catalogue that an entry is of; None for a front and for a user's own effect."""
+    if effect["name"] not in effects.CATALOGUE or effect["parameters"].get("kind"):
+        return None
+    kinds = effects.shapes(effect["name"])
     for kind in kinds:
+        chosen = effect["parameters"].get(kind.selector)
         if chosen is not None and chosen in get_args(kind.model_fields[kind.selector].annotation):
-            return kind.compensation
-    return kinds[0].compensation
+            return kind
+    return kinds[0] if kinds else None
 
 
-def _numbers(parameters: Mapping[str, Any], sure: Mapping[str, Any], of: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one a number."""
-    rows: list[list[str]] = []
-    for key, value in parameters.items():
-        known, name = sure.get(key), f"{of}{key.replace('_', ' ')}"
-        if isinstance(value, dict):
-            rows += _numbers(value, known or {}, f"{name} ")
-        elif isinstance(value, list):
-            several = [x for x in value if isinstance(x, int | float)]
-            for k, each in enumerate(several, 1):
-                pair = known[k - 1] if known else None
-                rows.append([f"{name} {k}" if len(several) > 1 else name, f"{each:.4g}", *_pair(pair)])
-        elif isinstance(value, bool | str):
-            rows.append([name, str(value), "", ""])
-        else:
-            rows.append([name, f"{value:.4g}", *_pair(known)])
-    return rows
+def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
+    """Rows of name, value, low and high, one a number; of equal lists the first one stands for all."""
+    if isinstance(value, Mapping):
+        known = sure or {}
+        return [
+            row for key, each in value.items()
+            for row in _numbers(each, known.get(key), f"{name} {key.replace('_', ' ')}".strip())
+        ]  # fmt: skip
+    if isinstance(value, list):
+        alike = len(value) > 1 and isinstance(value[0], list) and all(each == value[0] for each in value)
+        chosen = value[:1] if alike else value
+        return [
+            row for k, each in enumerate(chosen)
+            for row in _numbers(each, sure[k] if sure else None,
+                                f"{name} of each play" if alike else f"{name} {k + 1}" if len(value) > 1 else name)
+        ]  # fmt: skip
+    if isinstance(value, bool | str):
+        return [[name, str(value), "", ""]]
+    return [[name, f"{value:.4g}", *_pair(sure)]]
 
 
 def _pair(known: Sequence[float] | None) -> list[str]:
@@ -124,9 +147,13 @@ def _pair(known: Sequence[float] | None) -> list[str]:
 def _left(content: Mapping[str, Any]) -> list[Text | Listing | Table]:
     seen = [each for each in content["unexplained"] if each["kind"] not in told.REPAIRED]
     if not seen:
-        return [Text("Nothing but noise.")]
+        after, noise = content["gap"]["after"]["holdout"], content["noise_floor"]
+        if after <= AT_NOISE * noise:
+            return [Text("Nothing but noise.")]
+        times = f"The error that is left is {after / noise:.3g} times the noise" if noise else "Some error is left"
+        return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
     sentences = [told.sentence(each, content["unit"]) for each in seen]
-    blocks: list[Text | Listing | Table] = [Listing([text[0].upper() + text[1:] + "." for text in sentences])]
+    blocks: list[Text | Listing | Table] = [Listing(sentences)]
     for each in seen:
         if each["kind"] == "structure" and each["share_by_variable"]:
             rows = [["what is left goes with", "share of its variance"]]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.description import loop_centre
-from hystgen.diagnosis.floor import still
+from hystgen.diagnosis.floor import STANDS, still
 from hystgen.report import drawing
 from hystgen.report.drawing import label
 from hystgen.report.fit_figures import binned
@@ -71,7 +71,7 @@ def gap(found: Diagnosis, width: float) -> Any:
     axes.invert_yaxis()
     room = 1.4 if width == WIDE else 2.0
     if far:
-        axes.set_xscale("log")
+        _decades(axes, "x")
         axes.set_xlim(least, top * (top / least) ** (0.22 if width == WIDE else 0.6))
     else:
         axes.set_xlim(0.0, room * top)
@@ -153,10 +153,12 @@ def against(found: Diagnosis, width: float) -> Any:
         x = np.concatenate([of(each) for each in shown])
         sides = [("before", BEFORE, "refitted")] if found.content["effects"] else []
         for key, colour, what in (*sides, ("after", AFTER, _last(found))):
-            e = np.concatenate([getattr(each, key) for each in shown])
+            e = np.concatenate([getattr(each, key) * (_direction(each) if log else 1.0) for each in shown])
             _binned(axes, x, e, colour, f"{what}, mean \N{PLUS-MINUS SIGN} 1 sd", log)
         _floor(axes, found)
         axes.set(xlabel=name)
+        if not log:
+            axes.locator_params(axis="x", nbins=7 if wide else 5)
     for axes in grid[:: 2 if wide else 1]:
         axes.set(ylabel=label("error", unit))
     handles, names = grid[0].get_legend_handles_labels()
@@ -178,7 +180,7 @@ def _binned(axes: Any, x: Array, e: Array, colour: str, what: str, log: bool) ->
     axes.fill_between(middle, mean - spread, mean + spread, color=colour, alpha=0.25, linewidth=0)
     axes.plot(middle, mean, color=colour, linewidth=1.5, label=what)
     if log:
-        axes.set_xscale("log")
+        _decades(axes, "x")
 
 
 def _since_stop(each: Signals) -> Array:
@@ -187,6 +189,17 @@ def _since_stop(each: Signals) -> Array:
     for first, last in still(each.v, max(HOLD, len(each.t) // 200)):
         found[first + 1 : last] = each.t[first + 1 : last] - each.t[first]
     return found
+
+
+def _direction(each: Signals) -> Array:
+    """1 where the drive went up when it last moved, -1 where it went down."""
+    found = np.sign(np.diff(each.v, prepend=each.v[0]))
+    tolerance = STANDS * float(np.ptp(each.v))
+    moved = np.flatnonzero(np.abs(np.diff(each.v, prepend=each.v[0])) > tolerance)
+    if not len(moved):
+        return np.ones(len(found))
+    last = np.searchsorted(moved, np.arange(len(found)), side="right") - 1
+    return np.asarray(found[moved[np.maximum(last, 0)]])
 
 
 def time(found: Diagnosis, width: float) -> Any:
@@ -212,8 +225,8 @@ def time(found: Diagnosis, width: float) -> Any:
     noise = found.content["noise_floor"]
     axes.axhline(noise, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     positive = [value for value in values if value > 0.0]
-    if positive and max(positive) > FAR * max(min(positive), 1e-300):
-        axes.set_yscale("log")
+    if positive and max(positive) > FAR * min(positive):
+        _decades(axes, "y")
     else:
         axes.set_ylim(bottom=0.0)
     clock = "session time (s)" if one_clock else "time, one record after another (s)"
@@ -246,8 +259,8 @@ def frequency(found: Diagnosis, width: float) -> Any:
             axes.axvline(line["frequency"], color=drawing.OTHER, linestyle=":", linewidth=1.0)
             axes.annotate(f"{line['frequency']:.4g} Hz", (line["frequency"], 1.0), xycoords=("data", "axes fraction"),
                           xytext=(3, -10), textcoords="offset points", fontsize=8, color=drawing.OTHER)  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    _decades(axes, "x")
+    _decades(axes, "y")
     axes.set(xlabel="frequency (Hz)", ylabel=label("error density", f"{unit}/\N{SQUARE ROOT}Hz" if unit else None))
     axes.set_title(each.name, pad=8 if width == WIDE else 22)
     drawing.legend_above(axes, 3 if width == WIDE else 2)
@@ -268,9 +281,22 @@ def _range(axes: Any, values: Sequence[float]) -> None:
     """A horizontal axis from zero, or a logarithmic one where the values lie far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
-        axes.set_xscale("log")
+        _decades(axes, "x")
     else:
         axes.set_xlim(left=0.0)
+
+
+def _decades(axes: Any, which: str) -> None:
+    """A logarithmic axis with few plain numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+    subs = (1.0, 2.0, 5.0) if high < 200.0 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=8))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def _rms(e: Array) -> float:
@@ -290,7 +316,7 @@ CAPTIONS = {
     "time": "rms error in stretches of the records, along the session.",
     "against": "Mean and scatter of the error on all records against what it may go with. A mean that leaves the "
     "dashed band of the noise, or a scatter that widens, is structure. Loop centre: the middle between the last two "
-    "reversals of the drive.",
+    "reversals of the drive. While the drive stands still the error is counted in the direction of its last move.",
     "frequency": "Spectral density of the error on the held-out record on which the refitted model does worst.",
 }
 
