@@ -91,9 +91,10 @@ def overlay(found: Diagnosis, width: float) -> Any:
     shown, unit = worst(found), found.content["unit"]
     named = bool(found.content["effects"])
     drawn = drawing.figure(width, 4.9 * len(shown))
-    rows = drawn.subfigures(len(shown), 1, squeeze=False)
-    for row, each in zip(rows.flat, shown, strict=True):
-        top, bottom = row.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    panels = drawn.subplots(2 * len(shown), 1, height_ratios=(3, 2) * len(shown))
+    for top, bottom, each in zip(panels[::2], panels[1::2], shown, strict=True):
+        top.sharex(bottom)
+        top.tick_params(labelbottom=False)
         chosen = drawing.kept(0, len(each.t), each.y, each.before, each.after)
         t = each.t[chosen] - each.t[0]
         top.plot(t, each.y[chosen], label="measured", **drawing.LINES["measured"])
@@ -110,7 +111,7 @@ def overlay(found: Diagnosis, width: float) -> Any:
         _floor(bottom, found)
         bottom.set(xlabel="time in the record (s)", ylabel=label("error", unit))
         drawing.legend_above(bottom, 3 if width == WIDE else 2)
-        row.align_ylabels()
+    drawn.align_ylabels(panels)
     return drawn
 
 
