@@ -19,7 +19,7 @@ from hystgen.diagnosis import channels, description, intervals, leftovers, perio
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
-from hystgen.identification.fronts import Straight
+from hystgen.identification.fronts import Kept
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -350,7 +350,7 @@ class TestIntervals:
         (kind,) = shapes("lag")
         about = About((0.0, 100.0), 10.0, STEP, 2.4, 7.2, 500.0, 1e4, THRESHOLDS)
         (candidate,) = kind.candidates(about)
-        form = Structure(np.array(THRESHOLDS), Straight(), (Part("lag", candidate),))
+        form = Structure(np.array(THRESHOLDS), Kept(), (Part("lag", candidate),))
         found = structure.fit(form, items, form.start, np.array(WEIGHTS))
         (sure,) = intervals.intervals(found, items).parts
         (effect,) = form.effects(found.shape)
