@@ -520,12 +520,12 @@ REFUSED = [
     case('offset', H + "model: {pi: {thresholds: [0], weights: [1]}, output_offset: x}\n", [
         '4:61: model.output_offset: must be a number, not the text "x"; write it like 0.45',
     ]),
-    case('effect_keys', eff("[{name: lag, time_constnt: 1}, {name: creep, shape: slow}, {name: drift, shape: x, rate: q}]"), [
+    case('effect_keys', eff("[{name: lag, time_constnt: 1}, {name: creep, shape: slow}, {name: delay, shape: x, time: q}]"), [
         '4:62: model.effects[0].time_constant: is missing; add `time_constant: 0.0125`',
         '4:74: model.effects[0].time_constnt: unknown key; did you mean time_constant?',
         '4:113: model.effects[1].shape: must be exponential or logarithmic, not the text "slow"; choose one of them',
-        '4:134: model.effects[2].shape: unknown key; known here are name, rate',
-        '4:150: model.effects[2].rate: must be a number, not the text "q"; write it like 0.45',
+        '4:134: model.effects[2].shape: unknown key; known here are name, time',
+        '4:150: model.effects[2].time: must be a number, not the text "q"; write it like 0.45',
     ]),
     case('effect_numbers', eff("[{name: lag, time_constant: -1}, {name: resonance, frequency: 0, damping: 11}, {name: drift, rate: .inf}]"), [
         '4:89: model.effects[0].time_constant: must be at least 0, not -1; correct the number',
