@@ -89,7 +89,7 @@ def out_of_bounds(text: str) -> str:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (changed_entry, "the reference"),
+        (changed_entry, "the reference|gives another answer"),  # tables that disagree may do that too
         (loose_clamp, "the reference|the drive is out of range"),  # whichever the fuzzer comes to first
         (beyond_the_range, "the drive is out of range"),
         (out_of_bounds, "runtime error: index|AddressSanitizer"),
