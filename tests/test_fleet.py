@@ -343,6 +343,25 @@ def test_a_unit_that_kills_its_process_stops_no_other() -> None:
     assert answers == {f"u{k}": "" for k in range(9) if k != 2}
 
 
+def interrupted(task: Task) -> Result:
+    """Work that Ctrl-C reaches, as it does every process of a terminal."""
+    os.kill(os.getpid(), signal.SIGINT)
+    return Result(task.unit, "done")
+
+
+def test_processes_leave_ctrl_c_to_the_one_that_started_them() -> None:
+    tasks = (Task(f"u{k}", (), (), {}, None) for k in range(5))
+    answers = {result.unit: result.message for result in workers.on_this_machine(tasks, 2, interrupted)}
+    assert answers == {f"u{k}": "done" for k in range(5)}
+
+
+def test_what_is_given_up_is_given_up_silently(recwarn: pytest.WarningsRecorder) -> None:
+    results = workers.on_this_machine((Task(f"u{k}", (), (), {}, None) for k in range(50)), 2, interrupted)
+    next(results)
+    results.close()
+    assert [str(warning.message) for warning in recwarn] == []
+
+
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     from distributed import LocalCluster

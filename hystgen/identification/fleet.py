@@ -16,7 +16,7 @@ import io
 import json
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -170,10 +170,11 @@ def identify_batch(
         tasks = (_task(job, options, wanted) for job in todo.values())
         with Progress(len(found), progress, "fleet") as bar:
             bar.tick(len(rows))
-            results = workers.on_cluster(tasks, client) if client else _here(tasks, len(todo), jobs, options)
-            for result in results:
-                rows[result.unit] = _keep(folder, todo[result.unit], result)
-                bar.tick(1)
+            work = workers.on_cluster(tasks, client) if client else _here(tasks, len(todo), jobs, options)
+            with contextlib.closing(work) as results:
+                for result in results:
+                    rows[result.unit] = _keep(folder, todo[result.unit], result)
+                    bar.tick(1)
     fleet = _judged([rows[job.unit] for job in found])
     write_atomically(folder / "summary.csv", fleet.summary())
     return fleet
@@ -306,7 +307,9 @@ def _bytes(path: str) -> bytes | None:
         return None
 
 
-def _here(tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, Any]) -> Iterator[Result]:
+def _here(
+    tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, Any]
+) -> Generator[Result, None, None]:
     """Results from this machine, the compiled functions put into its cache first."""
     import joblib
 

@@ -7,8 +7,10 @@ neither the records nor the output folder.
 from __future__ import annotations
 
 import contextlib
+import signal
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -130,7 +132,12 @@ def _figures(fit: Any, model: Any) -> dict[str, Any]:
     }
 
 
-def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Iterator[Result]:
+def _leave_interrupts() -> None:
+    """Ctrl-C reaches all processes of a terminal; the one that was started there ends the others."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:
     """Results in the order in which they come, from `jobs` processes (1: from this one); tasks are taken when needed.
 
     A process that dies takes the whole pool along. What was under way is then repeated one by one: only the unit that
@@ -147,13 +154,14 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
             yield delayed(work)(task)
 
     def pool(**how: Any) -> Any:
-        apart = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE}
+        apart = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE, "initializer": _leave_interrupts}
         with parallel_config("loky", **apart) if jobs > 1 else parallel_config("sequential"):
             return Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered", **how)
 
     while True:
+        results = pool(pre_dispatch="2*n_jobs")(calls())
         try:
-            for result in pool(pre_dispatch="2*n_jobs")(calls()):
+            for result in results:
                 del sent[result.unit]
                 yield result
             return
@@ -164,6 +172,10 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
                 except BrokenProcessPool:
                     yield Result(task.unit, DIED)
             sent.clear()
+        finally:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # that tasks are given up, where nobody waits for them any more
+                results.close()
 
 
 @contextlib.contextmanager
@@ -188,7 +200,7 @@ def cluster(address: str) -> Iterator[Any]:
         yield client
 
 
-def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Iterator[Result]:
+def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Generator[Result, None, None]:
     """Results in the order in which they come, from the workers of a Dask scheduler.
 
     No more tasks than the workers soon need are under way, so that few records are in memory. Dask repeats what a
