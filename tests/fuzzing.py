@@ -58,31 +58,45 @@ class Target:
             f"-max_total_time={seconds}", f"-max_len={LONGEST}", "-len_control=0", "-use_value_profile=1",
             "-timeout=10", "-seed=1", "-print_final_stats=1", "-verbosity=0", f"-artifact_prefix={artifacts}{os.sep}",
         ]  # fmt: skip
-        done = subprocess.run(
-            [self.binary, *options, corpus], capture_output=True, text=True, errors="replace", check=False
-        )
+        done = self._called(*options, corpus)
         if done.returncode:
-            raise FuzzError(done.stderr)
+            told = [done.stderr]
+            for path in sorted(artifacts.iterdir()):
+                for calls in self._logged(path)[1]:
+                    try:
+                        self._compare(path.name, calls)
+                    except FuzzError as difference:
+                        told.append(str(difference))
+            raise FuzzError("\n".join(told))
         return done.stderr
 
     def replay(self, corpus: Path) -> int:
         """Compare every input of `corpus` with the bit reference. Returns the number of calls; raises FuzzError."""
-        log = corpus.parent / "calls.txt"
-        files = sorted(path for path in corpus.iterdir())
-        done = subprocess.run(
-            [self.binary, *files], capture_output=True, text=True, errors="replace", check=False,
-            env={**os.environ, "HYSTGEN_FUZZ_LOG": str(log)},
-        )  # fmt: skip
+        files = sorted(corpus.iterdir())
+        done, inputs = self._logged(*files)
         if done.returncode:
             raise FuzzError(done.stderr)
-        # libFuzzer runs an empty input before those it is given
-        inputs = log.read_text().split("input ")[-len(files) :]
-        assert len(inputs) == len(files)
-        return sum(self._compare(file.name, text.splitlines()) for file, text in zip(files, inputs, strict=True))
+        return sum(self._compare(file.name, text) for file, text in zip(files, inputs, strict=True))
 
-    def _compare(self, name: str, lines: list[str]) -> int:
-        inverse = lines[0] == "1"
-        table = np.array([[int(number) for number in line.split()] for line in lines[1:]], dtype=object).reshape(-1, 4)
+    def _called(self, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [self.binary, *arguments], capture_output=True, text=True, errors="replace", check=False,
+            env={**os.environ, **environment},
+        )  # fmt: skip
+
+    def _logged(self, *inputs: Path) -> tuple[subprocess.CompletedProcess[str], list[str]]:
+        """The calls of each input, of one that crashes those up to there."""
+        log = inputs[0].parent.parent / "calls.txt"
+        done = self._called(*inputs, HYSTGEN_FUZZ_LOG=str(log))
+        # before several inputs libFuzzer runs an empty one
+        return done, log.read_text().split("input ")[-len(inputs) :]
+
+    def _compare(self, name: str, calls: str) -> int:
+        """Raises FuzzError for the first answer, or bits that were read, other than the reference's."""
+        operator, *lines = calls.splitlines()
+        inverse = operator == "1"
+        rows = [[int(number) for number in line.split()] for line in lines]
+        table = np.array([row + [-1] * (4 - len(row)) for row in rows], dtype=object).reshape(-1, 4)
         call = table[:, 0].astype(np.uint8)
         real = comparison.REALS[self.arithmetic]
         x, answer = (table[:, i].astype(f"u{real.itemsize}").view(real) for i in (1, 2))

@@ -89,8 +89,8 @@ def out_of_bounds(text: str) -> str:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (changed_entry, "the reference|gives another answer"),  # tables that disagree may do that too
-        (loose_clamp, "the reference|the drive is out of range"),  # whichever the fuzzer comes to first
+        (changed_entry, "the reference"),
+        (loose_clamp, "the reference"),
         (beyond_the_range, "the drive is out of range"),
         (out_of_bounds, "runtime error: index|AddressSanitizer"),
     ],

@@ -351,8 +351,8 @@ class TestIntervals:
         weights, width = self.covered(colour)
         assert 0.90 <= np.mean(weights) <= 0.99
         assert 0.90 <= width <= 0.99
-        if not colour:
-            assert 0.90 <= np.min(weights) <= np.max(weights) <= 0.99
+        assert np.min(weights) >= (0.86 if colour else 0.90)  # of 200 trials: two standard deviations below 0.9
+        assert colour or np.max(weights) <= 0.99
 
     def test_the_held_out_error(self) -> None:
         v, y = plant(np.asarray, 3)
