@@ -106,6 +106,7 @@ def test_the_catalogue_is_complete() -> None:
         for key, field in type(effect).model_fields.items():
             assert field.description, (effect.name, key)
         assert effect.compensation
+        assert effect.compensated.startswith(("exact", "approximate", "needs a sensor", "none"))
         assert (type(effect).__doc__ or "").strip()
 
 

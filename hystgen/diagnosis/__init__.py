@@ -18,20 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import (
-    believed,
-    channels,
-    description,
-    floor,
-    intervals,
-    leftovers,
-    periodic,
-    selection,
-    structure,
-    told,
-    where,
-)
-from hystgen.diagnosis.floor import Floor
+from hystgen.diagnosis import bad_samples, believed, channels, floor, intervals, selection, structure, told
+from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.identification import stage_content, threads
@@ -45,15 +33,6 @@ if TYPE_CHECKING:
     from hystgen.params import Parameters
 
 Array = NDArray[np.float64]
-
-STRUCTURE = 0.15
-"""Share of the residual's variance that goes with a variable on unseen samples, beyond which it is no noise."""
-
-ABOVE_FLOOR = 1.25
-"""A residual this much larger than the noise, and with structure, is unexplained."""
-
-FAR_ABOVE = 2.0
-"""One this much larger is, whatever it goes with: noise that is not white exceeds its floor by less."""
 
 ENOUGH = 100
 """Samples that have to be left of a record when wrong ones are taken out."""
@@ -179,7 +158,7 @@ def diagnose(
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
-        content = _content(model.parameters, ready, noise, found, as_given, odd)
+        content = content_of(model.parameters, ready, noise, found, as_given, odd)
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
     extended = _extended(model.parameters, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
@@ -187,27 +166,13 @@ def diagnose(
 
 def _without_faults(ready: believed.Prepared) -> believed.Prepared:
     """The records without samples that are plainly wrong, unless hardly any would be left."""
-    repaired = leftovers.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
+    repaired = bad_samples.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
-    items, wrong = leftovers.without_faults([*ready.to_fit, *ready.held], repaired)
+    items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
     to_fit, held = items[:number], items[number:]
     if any(not any(np.count_nonzero(item.known) > ENOUGH for item in group) for group in (to_fit, held)):
         return ready
-    return replace(ready, to_fit=to_fit, held=held, repaired=_merged([*repaired, *wrong]))
-
-
-def _merged(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """One entry a kind and record: a record whose end is held out was looked at in two parts."""
-    found: dict[tuple[str, ...], dict[str, Any]] = {}
-    for each in entries:
-        key = each["kind"], each["record"], each.get("channel", ""), each.get("end", "")
-        if key in found:
-            for number in ("count", "samples"):
-                if number in each:
-                    found[key][number] += each[number]
-        else:
-            found[key] = dict(each)
-    return list(found.values())
+    return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
@@ -220,101 +185,6 @@ def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
 
 STEPS = 120
 """About so many fits are made, for the progress bar."""
-
-
-def _content(
-    parameters: Parameters,
-    ready: believed.Prepared,
-    noise: Floor,
-    found: Outcome,
-    as_given: Sequence[float],
-    odd: list[dict[str, Any]],
-) -> dict[str, Any]:
-    before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
-    after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
-    refitted, last = ([structure.rms(errors) for errors in each] for each in (before, after))
-    everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
-    periodic_ones, errors = periodic.lines(everything, errors)
-    sticking = _merged(leftovers.stick_slip(everything, errors, noise.rms))
-    left = [each for each in odd if each["kind"] not in told.REPAIRED] + periodic_ones + sticking
-    share, _ = description.structure(ready.held, errors[len(ready.to_fit) :])
-    share = max(share, *description.together(everything, errors))
-    rest = structure.rms(errors[len(ready.to_fit) :])
-    ratio = rest / noise.rms if noise.rms else float("inf")
-    if ratio > FAR_ABOVE or (share > STRUCTURE and ratio > ABOVE_FLOOR):
-        left.append(description.described(everything, errors, noise.rms))
-    verdict = "effects_found" if found.found else "unexplained" if left else "nothing_missing"
-    effects = []
-    sure = intervals.intervals(found.fitted, ready.to_fit) if found.found else intervals.Sure({}, ())
-    for k, each in enumerate(found.found):
-        later = sum(other.name == each.name for other in found.found[k + 1 :])
-        effects.append(
-            {
-                "name": each.name,
-                "parameters": _parameters_of(found.fitted, each.name, later),
-                "intervals": sure.of(found.fitted, each.name, later),
-                "share_of_gap": (each.before - each.after) / refitted[1] if refitted[1] else 0.0,
-                "holdout_before": each.before,
-                "holdout_after": each.after,
-                "p_value": each.p_value,
-                "evidence": _evidence(each),
-            }
-        )
-    rivals = [[each.name, rival] for each in found.found for rival in each.rivals]
-    units = parameters.units
-    content = {
-        "hystgen": 1,
-        "verdict": verdict,
-        "noise_floor": noise.rms,
-        "output_range": max(item.output_range for item in (*ready.to_fit, *ready.held)),
-        "unit": units.output,
-        "gap": {
-            "as_given": {"fit": as_given[0], "holdout": as_given[1]},
-            "refitted": {"fit": refitted[0], "holdout": refitted[1]},
-            "after": {"fit": last[0], "holdout": last[1]},
-        },
-        "effects": effects,
-        "unexplained": [*left, *(each for each in odd if each not in left), *ready.repaired],
-        "where": where.places([*ready.to_fit, *ready.held], [*before[0], *before[1]], noise.rms),
-        "not_separable": rivals,
-        "advice": [
-            *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
-            *(more for each in left for more in told.advice(each)),
-        ],
-        "ranking": [
-            [{"name": t.name, "shape": t.option.label, "fit": t.fitted.rms, "holdout": t.held_out} for t in each]
-            for each in found.rankings
-        ],
-    }
-    return _plain(content)  # type: ignore[no-any-return]
-
-
-ADVICE: dict[frozenset[str], str] = {
-    frozenset(("creep", "drift")): "record holds of a minute after moves both ways: creep follows the last move",
-    frozenset(("lag", "delay")): "record full steps with three samples or more to the edge: a lag has a tail",
-    frozenset(("lag", "resonance")): "record steps or a sweep: a resonance rings and has a peak",
-    frozenset(("lag", "rate_dependence")): "record small loops at high rate with reversals: a lag opens them",
-    frozenset(("asymmetry", "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
-}
-"""Which experiment tells two effects apart."""
-
-
-def _advice(one: str, other: str) -> str:
-    return f"{one} and {other} cannot be told apart by these records; hystgen diagnose --plan writes drives that can"
-
-
-def _evidence(each: selection.Found) -> str:
-    gain = 100.0 * (1.0 - each.after / each.before) if each.before else 0.0
-    return f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
-
-
-def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-    """The entry's keys without the name, `later` of that name having been found after it; for a front its stage."""
-    k = intervals.place(fitted, name, later)
-    if k is not None:
-        return intervals.entry(fitted.structure.effects(fitted.shape)[k])
-    stages = fitted.actuator.stages
-    return dict(stage_content(stages[-1])) if stages else {}
 
 
 def _extended(
@@ -348,19 +218,6 @@ def _extended(
 def _offset(fitted: Fitted, item: Item) -> float:
     rows, constant = fitted.actuator.columns(item, fitted.weights)
     return float(np.nanmean(item.y - fitted.actuator.added(item) - rows[0] - constant))
-
-
-def _plain(value: Any) -> Any:
-    """Numbers as JSON has them: ten digits, so that the same input gives the same text."""
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float):
-        return float(f"{value:.8g}") if np.isfinite(value) else None
-    return value
 
 
 __all__ = ["Diagnosis", "IdentificationError", "diagnose"]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import leftovers
+from hystgen.diagnosis import bad_samples
 from hystgen.diagnosis.structure import Actuator, Item, Structure, kept
 from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
@@ -116,7 +116,7 @@ def _without_rails(courses: list[Course]) -> list[dict[str, Any]]:
     """Leave out the samples at which the converter stood at its end; what was left out."""
     told = []
     for k, course in enumerate(courses):
-        for name, level in leftovers.rails(course.y, course.v):
+        for name, level in bad_samples.rails(course.y, course.v):
             at = course.y == level
             courses[k] = replace(courses[k], y=np.where(at, np.nan, courses[k].y))
             what = {"kind": "saturated", "record": course.name, "end": name, "level": level}
@@ -129,7 +129,7 @@ def _outliers(course: Course, record: Record) -> NDArray[np.intp]:
     assert record.y is not None
     missing = np.isnan(course.y)
     missing[: course.first] = False
-    levels = [level for _, level in leftovers.rails(np.asarray(record.y), course.v)]
+    levels = [level for _, level in bad_samples.rails(np.asarray(record.y), course.v)]
     return np.flatnonzero(missing & ~np.isin(record.y, levels))
 
 

@@ -76,10 +76,10 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     drawn = np.random.default_rng(SEED).standard_normal((DRAWS, root.shape[1])) @ root.T
     low, high = fitted.structure.bounds
     shapes = np.clip(shape + sigma * drawn, low, high)
-    stage: dict[str, Any] = {}
+    of_front: dict[str, Any] = {}
     if front:
-        made = [_stage(fitted, one) for one in shapes]
-        stage = _spread(made, _stage(fitted, shape))
+        made = [stage(fitted, one) for one in shapes]
+        of_front = _spread(made, stage(fitted, shape))
     found: list[dict[str, Any]] = []
     for k, part in enumerate(fitted.structure.parts):
         if not len(part.candidate.start):
@@ -88,10 +88,11 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
         numbers = [fitted.structure.pieces(one)[1][k] for one in shapes]
         made = [entry(part.candidate.build(each)) for each in numbers]
         found.append(_spread(made, entry(part.candidate.build(fitted.structure.pieces(shape)[1][k]))))
-    return Sure(stage, tuple(found))
+    return Sure(of_front, tuple(found))
 
 
-def _stage(fitted: Fitted, shape: Array) -> Numbers:
+def stage(fitted: Fitted, shape: Array) -> dict[str, Any]:
+    """The last stage of the front as a parameter file has it; empty without a front."""
     stages = fitted.structure.front.stages(fitted.structure.pieces(shape)[0])
     return dict(stage_content(stages[-1])) if stages else {}
 

@@ -15,6 +15,7 @@ class _Ageing(Effect):
     name: Literal["ageing"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.GAIN
+    compensated: ClassVar[str] = "needs a sensor"
     compensation: ClassVar[str] = "a gain input to `step`"
     timed: ClassVar[bool] = False
 

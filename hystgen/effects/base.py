@@ -105,8 +105,10 @@ class Effect(BaseModel):
     """further columns that a record needs"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
+    compensated: ClassVar[str] = "its own"
+    """how far a compensator can take the effect out: exact, approximate, needs a sensor, none"""
     compensation: ClassVar[str] = ""
-    """what the effect means for a compensator, one clause"""
+    """how, one clause"""
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""

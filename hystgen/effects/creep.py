@@ -45,6 +45,7 @@ class _Creep(Effect):
     name: Literal["creep"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.LINEAR
+    compensated: ClassVar[str] = "exact"
     compensation: ClassVar[str] = "exact and causal: the plays are solved for with the states known"
 
 

@@ -22,6 +22,7 @@ class Delay(Effect):
     time: NotNegative = Field(description="T, s", examples=[2.0e-4])
 
     place: ClassVar[Place] = Place.DRIVE
+    compensated: ClassVar[str] = "none without preview"
     compensation: ClassVar[str] = "preview of a known reference; otherwise named, not inverted"
 
     def drive(self, a: Array, run: Run) -> Array:

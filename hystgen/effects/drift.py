@@ -16,6 +16,7 @@ class _Drift(Effect):
     rate: Number = Field(description="output units per s, at the start of the session", examples=[1e-4])
 
     place: ClassVar[Place] = Place.ADDED
+    compensated: ClassVar[str] = "needs a sensor"
     compensation: ClassVar[str] = "none without a sensor; an offset input to `step`"
 
 

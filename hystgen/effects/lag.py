@@ -24,6 +24,7 @@ class Lag(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 2
+    compensated: ClassVar[str] = "approximate"
     compensation: ClassVar[str] = "a lead with a pole that bounds the noise"
 
     def drive(self, a: Array, run: Run) -> Array:

@@ -21,6 +21,7 @@ class _Noncongruent(Effect):
     place: ClassVar[Place] = Place.PLAYS
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
+    compensated: ClassVar[str] = "exact"
     compensation: ClassVar[str] = "a monotone scalar equation, solved every sample"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:

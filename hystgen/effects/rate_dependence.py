@@ -38,6 +38,7 @@ class ThresholdRate(_RateDependence):
         description="beta_1 .. beta_n, s, one for each threshold but r_0", examples=[[0.001, 0.002]]
     )
 
+    compensated: ClassVar[str] = "exact"
     compensation: ClassVar[str] = "exact while the thresholds stay ordered, else one implicit step a sample"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -106,6 +107,7 @@ class RelaxingPlays(_RateDependence):
         default=1.0, description="m, 1 for a linear dashpot; 0.1 to 10"
     )
 
+    compensated: ClassVar[str] = "exact"
     compensation: ClassVar[str] = "one implicit step a sample"
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:

@@ -26,6 +26,7 @@ class Resonance(Effect):
     place: ClassVar[Place] = Place.LINEAR
     order: ClassVar[int] = 1
     repeatable: ClassVar[bool] = True
+    compensated: ClassVar[str] = "approximate"
     compensation: ClassVar[str] = "a reference filter: notch or zero-vibration shaper, or the second-order inverse"
 
     def _factors(self, times: Array) -> tuple[Array, Array, Array]:

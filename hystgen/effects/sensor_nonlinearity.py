@@ -24,6 +24,7 @@ class SensorPolynomial(Effect):
     place: ClassVar[Place] = Place.OUTPUT
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
+    compensated: ClassVar[str] = "none needed"
     compensation: ClassVar[str] = "corrected in the data, never inverted in the drive"
 
     def mapped(self, y: Array, run: Run) -> Array:

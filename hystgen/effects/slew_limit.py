@@ -23,6 +23,7 @@ class SlewLimit(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 1
+    compensated: ClassVar[str] = "none"
     compensation: ClassVar[str] = "the reference is limited, and what was applied is committed"
 
     @model_validator(mode="after")

@@ -45,6 +45,7 @@ class LoggedThermal(_Thermal):
 
     timed: ClassVar[bool] = False
     columns: ClassVar[tuple[str, ...]] = (COLUMN,)
+    compensated: ClassVar[str] = "needs a sensor"
     compensation: ClassVar[str] = "exact with a temperature input to `step`"
 
     def above(self, run: Run) -> Array:
@@ -81,6 +82,7 @@ class SelfHeating(_Thermal):
     time_constant: Positive = Field(description="tau, s", examples=[60.0])
     heating: NotNegative = Field(description="K s/input^2: heating f V^2 is the final rise", examples=[1.0e-5])
 
+    compensated: ClassVar[str] = "needs a sensor"
     compensation: ClassVar[str] = "flagged: the temperature is not measured"
 
     def above(self, run: Run) -> Array:

@@ -16,23 +16,6 @@ if TYPE_CHECKING:
     from hystgen.diagnosis import Diagnosis
     from hystgen.effects.base import Effect
 
-COMPENSATED = {
-    "creep": "exact",
-    "rate_dependence": "exact",
-    "noncongruent": "exact",
-    "asymmetry": "exact",
-    "saturation": "exact",
-    "resonance": "approximate",
-    "lag": "approximate",
-    "delay": "none without preview",
-    "slew_limit": "none",
-    "thermal": "needs a sensor",
-    "drift": "needs a sensor",
-    "ageing": "needs a sensor",
-    "sensor_nonlinearity": "none needed",
-}
-"""What an effect means for a compensator, in a word."""
-
 AT_NOISE = 1.25
 """An error within this factor of the noise is called noise."""
 
@@ -73,7 +56,7 @@ def _found(content: Mapping[str, Any]) -> list[Text | Table]:
         before, after = effect["holdout_before"], effect["holdout_after"]
         share = f"{100.0 * effect['share_of_gap']:.0f} %"
         rows.append([effect["name"], f"{before:.4g}", f"{after:.4g}", share, f"{effect['p_value']:.1g}"])
-        means.append([effect["name"], COMPENSATED.get(effect["name"], "its own"), _compensation(effect)])
+        means.append([effect["name"], *_compensation(effect)])
         said = _descriptions(effect)
         for key, value in effect["parameters"].items():
             several = _numbers(value, effect["intervals"].get(key), key.replace("_", " "))
@@ -90,15 +73,12 @@ def _found(content: Mapping[str, Any]) -> list[Text | Table]:
     ]
 
 
-def _compensation(effect: Mapping[str, Any]) -> str:
-    """How a compensator takes an effect into account."""
-    name = effect["name"]
+def _compensation(effect: Mapping[str, Any]) -> tuple[str, str]:
+    """How far a compensator can take an effect out, and how."""
     if effect["parameters"].get("kind"):
-        return "part of the inverse: the front is inverted behind the plays"
-    if name not in effects.CATALOGUE:
-        return "as the effect's own class says"
+        return "exact", "part of the inverse: the front is inverted behind the plays"
     kind = _kind(effect)
-    return kind.compensation if kind is not None else ""
+    return (kind.compensated, kind.compensation) if kind is not None else ("its own", "as the effect's own class says")
 
 
 def _descriptions(effect: Mapping[str, Any]) -> dict[str, str]:

@@ -15,7 +15,7 @@ from recordings import brute_output, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.diagnosis import channels, description, intervals, leftovers, periodic, structure
+from hystgen.diagnosis import bad_samples, channels, description, intervals, periodic, stick_slip, structure
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
@@ -86,17 +86,17 @@ class TestSilence:
         items = session(colour)
         if grain:
             items = [changed(item, grain * np.round(item.y / grain)) for item in items]
-        same, told = leftovers.without_faults(items, [])
+        same, told = bad_samples.without_faults(items, [])
         assert told == []
         assert same == items
-        assert [leftovers.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
+        assert [bad_samples.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
         assert periodic.lines(items, errors(items))[0] == []
-        assert leftovers.stick_slip(items, errors(items), NOISE) == []
+        assert stick_slip.stick_slip(items, errors(items), NOISE) == []
 
     def test_without_noise(self) -> None:
         """Holds of a simulation are equal samples, and no fault."""
         items = [changed(item, plant(item.run.v)) for item in session()]
-        assert leftovers.without_faults(items, [])[1] == []
+        assert bad_samples.without_faults(items, [])[1] == []
 
     def test_records_as_they_should_be(self) -> None:
         kept, told = check(records())
@@ -114,7 +114,7 @@ class TestWrongSamples:
             for a, b in runs:
                 y[a:b] = -3.0 if constant else -3.0 + noise(b - a, a)
             items[k] = changed(items[k], y)
-        clean, told = leftovers.without_faults(items, [])
+        clean, told = bad_samples.without_faults(items, [])
         assert [each["record"] for each in told] == ["r0.csv", "r2.csv", "r3.csv"]
         for k, runs in places.items():
             each = told_of("drop_outs", told, f"r{k}.csv")
@@ -132,7 +132,7 @@ class TestWrongSamples:
         for a, b in runs:
             y[a:b] = y[a]
         items[0] = changed(items[0], y)
-        clean, told = leftovers.without_faults(items, [])
+        clean, told = bad_samples.without_faults(items, [])
         (each,) = told
         assert (each["kind"], each["record"], each["count"]) == ("held_samples", "r0.csv", 3)
         assert each["samples"] == sum(b - a for a, b in runs)
@@ -141,11 +141,11 @@ class TestWrongSamples:
 
     def test_a_converter_at_its_end(self) -> None:
         items = [changed(item, np.minimum(item.y, 9.0)) for item in session()]
-        found = [leftovers.rails(item.y, item.run.v) for item in items]
+        found = [bad_samples.rails(item.y, item.run.v) for item in items]
         assert found[0] == [("largest", 9.0)]
         repaired = [{"kind": "saturated", "record": "r0.csv", "end": "largest", "level": 9.0, "count": 1}]
-        assert leftovers.not_at_the_end(repaired, items) == repaired
-        clean, told = leftovers.without_faults(items, repaired)
+        assert bad_samples.not_at_the_end(repaired, items) == repaired
+        clean, told = bad_samples.without_faults(items, repaired)
         assert {each["kind"] for each in told} == {"saturated"}
         for item, left in zip(items, clean, strict=True):
             at = np.flatnonzero(item.y == 9.0)
@@ -154,7 +154,7 @@ class TestWrongSamples:
     def test_held_at_the_top_is_no_end_of_the_converter(self) -> None:
         items = session()
         repaired = [{"kind": "saturated", "record": "r2.csv", "end": "largest", "level": 6.0, "count": 30}]
-        (each,) = leftovers.not_at_the_end(repaired, items)
+        (each,) = bad_samples.not_at_the_end(repaired, items)
         assert each == {"kind": "held_samples", "record": "r2.csv", "count": 1, "samples": 30}
 
 
@@ -211,7 +211,7 @@ def test_stick_slip() -> None:
     for k in (0, 1):
         y, jumps[k] = sticking(plant(items[k].run.v), 0.3, k)
         items[k] = changed(items[k], y + noise(len(y), k))
-    found = leftovers.stick_slip(items, errors(items), NOISE)
+    found = stick_slip.stick_slip(items, errors(items), NOISE)
     assert [each["record"] for each in found] == ["r0.csv", "r1.csv"]
     for k, each in zip((0, 1), found, strict=True):
         assert each["count"] == pytest.approx(len(jumps[k]), rel=0.15)
@@ -222,9 +222,9 @@ def test_stick_slip() -> None:
 @pytest.mark.parametrize("tau", [5.0, 40.0])
 def test_a_lag_and_ringing_are_no_stick_slip(tau: float) -> None:
     items = [changed(item, lfilter(*_smooth(tau), item.y)) for item in session()]
-    assert leftovers.stick_slip(items, errors(items), NOISE) == []
+    assert stick_slip.stick_slip(items, errors(items), NOISE) == []
     ringing = [changed(item, lfilter([0.15], [1.0, -1.8, 0.95], item.y)) for item in session()]
-    assert leftovers.stick_slip(ringing, errors(ringing), NOISE) == []
+    assert stick_slip.stick_slip(ringing, errors(ringing), NOISE) == []
 
 
 def records() -> list[Record]:
