@@ -28,7 +28,8 @@ PLACES = 201
 class Option:
     """One way to extend a hypothesis. `front`: it puts a memoryless part in front, which is named once found.
 
-    `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`.
+    `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`. `beyond`: label of
+    the simpler one that it contains, and without which it is not tried.
     """
 
     label: str
@@ -37,6 +38,7 @@ class Option:
     alone: Structure
     starts: tuple[Array, ...]
     front: bool = False
+    beyond: str = ""
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
         """The shape of all, where the extension has these numbers and the rest is as it was."""
@@ -92,7 +94,8 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
         for candidate in kind.candidates(known):
             part = Part(name, candidate)
             pair = replace(structure, parts=(*structure.parts, part)), replace(held, parts=(*held.parts, part))
-            found.append(Option(candidate.label, name, *pair, (candidate.start, *candidate.others)))
+            starts = (candidate.start, *candidate.others)
+            found.append(Option(candidate.label, name, *pair, starts, beyond=candidate.beyond))
     return found
 
 

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +22,8 @@ from hystgen.identification.fronts import Kept
 from hystgen.identification.uncertainty import correlation_time
 
 Array = NDArray[np.float64]
+One = TypeVar("One")
+Made = TypeVar("Made")
 
 SCREENED = 12_000
 """Samples compared while the many shapes are told apart."""
@@ -89,6 +95,15 @@ class Tried:
         return len(self.fitted.shape)
 
 
+@dataclass(frozen=True, eq=False)
+class _Screened:
+    """An option after the first steps, and its held-out rms."""
+
+    option: Option
+    fitted: Fitted
+    left: float
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The believed model refitted, what was found, the model after it, and the ranking of each round."""
@@ -119,6 +134,30 @@ class _Records:
     def left(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
         return fits.rms(fitted.errors(self.held))
+
+    def side_by_side(
+        self, work: Callable[[One, Sequence[Item], Sequence[Item]], Made], several: Sequence[One], thin: bool = False
+    ) -> list[Made]:
+        """`work(one, fitted records, held-out ones)` for each of several, in their order, on all cores."""
+
+        def apart() -> tuple[list[Item], list[Item]]:
+            groups = (self.thin, self.thin_held) if thin else (self.to_fit, self.held)
+            fitted, held = ([replace(item, moved={}) for item in group] for group in groups)
+            return fitted, held
+
+        own = threading.local()
+
+        def one(given: One) -> Made:
+            if not hasattr(own, "records"):
+                own.records = apart()
+            return work(given, *own.records)
+
+        found = []
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            for made in pool.map(one, several):
+                found.append(made)
+                self.tick()
+        return found
 
 
 def select(
@@ -211,48 +250,55 @@ def _alike(other: Tried, best: Tried) -> bool:
 def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[tuple[Option, Fitted]]:
     """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
 
-    What was found before keeps its numbers; it is fitted jointly with those that are followed up.
+    What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
+    a simpler one is tried where that takes something away.
     """
-    tried: list[tuple[float, Option, Fitted]] = []
-    for option in found:
-        records.tick()
-        begun = [fits.fit(option.alone, records.thin, start, now.weights, FIRST_STEPS) for start in option.starts]
+    worth = (1.0 - SHARE) * fits.rms(now.errors(records.thin_held))
+
+    def begin(option: Option, items: Sequence[Item], held: Sequence[Item]) -> _Screened:
+        begun = [fits.fit(option.alone, items, start, now.weights, FIRST_STEPS) for start in option.starts]
         best = min(begun, key=lambda each: each.rms)
-        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
-        if math.isfinite(fitted.rms):
-            tried.append((fits.rms(fitted.errors(records.thin_held)), option, fitted))
-    kept: list[tuple[Option, Fitted]] = []
-    by_held_out, by_fit = sorted(tried, key=lambda one: one[0]), sorted(tried, key=lambda one: one[2].rms)
+        fitted = fits.fit(option.alone, items, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
+        return _Screened(option, fitted, fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf)
+
+    tried = records.side_by_side(begin, [option for option in found if not option.beyond], thin=True)
+    helpful = {each.option.label for each in tried if each.left < worth}
+    tried += records.side_by_side(begin, [option for option in found if option.beyond in helpful], thin=True)
+    tried = [each for each in tried if math.isfinite(each.left)]
+    kept: list[_Screened] = []
+    by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)
     for order, most in ((by_held_out, KEPT), (by_fit, KEPT + ALSO)):
-        for _, option, fitted in order:
+        for each in order:
             if len(kept) == most:
                 break
-            if sum(other.name == option.name for other, _ in kept) < SHAPES and all(o is not option for o, _ in kept):
-                kept.append((option, fitted))
-    return kept
+            if sum(other.option.name == each.option.name for other in kept) < SHAPES and each not in kept:
+                kept.append(each)
+    return [(each.option, each.fitted) for each in kept]
 
 
 def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _Records) -> list[Tried]:
     """The options fitted to everything and run over the held-out records, the best one first."""
-    begun = []
-    for option, screened in kept:
-        records.tick()
-        shape = option.joined(now, screened.shape)
-        fitted = fits.fit(option.structure, records.to_fit, shape, screened.weights, JOINT_STEPS)
-        begun.append((records.left(fitted), option, fitted))
-    hopeful = HOPEFUL * min((left for left, _, _ in begun), default=0.0)
-    tried = []
-    for left, option, fitted in begun:
-        if left <= hopeful:
-            fitted = fits.fit(option.structure, records.to_fit, fitted.shape, fitted.weights)
-        if fitted.rms >= now.rms:
-            continue
-        errors = fitted.errors(records.held)
+
+    def begin(one: tuple[Option, Fitted], items: Sequence[Item], held: Sequence[Item]) -> _Screened:
+        option, screened = one
+        fitted = fits.fit(option.structure, items, option.joined(now, screened.shape), screened.weights, JOINT_STEPS)
+        return _Screened(option, fitted, fits.rms(fitted.errors(held)))
+
+    begun = records.side_by_side(begin, kept)
+    hopeful = HOPEFUL * min((each.left for each in begun), default=0.0)
+
+    def finish(one: _Screened, items: Sequence[Item], held: Sequence[Item]) -> Tried:
+        option, fitted = one.option, one.fitted
+        if one.left <= hopeful:
+            fitted = fits.fit(option.structure, items, fitted.shape, fitted.weights)
+        errors = fitted.errors(held)
         name = option.name
         if option.front:
             shape, _ = fitted.structure.pieces(fitted.shape)
             name = front_name(fitted.structure.front, shape, records.known.drive)
-        tried.append(Tried(option, fitted, name, fits.rms(errors), errors))
+        return Tried(option, fitted, name, fits.rms(errors), errors)
+
+    tried = [each for each in records.side_by_side(finish, begun) if each.fitted.rms < now.rms]
     return sorted(tried, key=lambda each: each.held_out)
 
 

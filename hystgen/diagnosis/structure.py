@@ -7,7 +7,7 @@ weights and the change of all other numbers at once (`identification.joint`), on
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -323,8 +323,3 @@ def rms(errors: Sequence[Array]) -> float:
     joined = np.concatenate(list(errors))
     joined = joined[np.isfinite(joined)]
     return float(np.sqrt(np.mean(joined**2))) if len(joined) else float("nan")
-
-
-def by_name(parts: Sequence[Part]) -> Mapping[str, int]:
-    """How often each effect occurs."""
-    return {part.name: sum(other.name == part.name for other in parts) for part in parts}

@@ -7,9 +7,11 @@ are; before the first sample everything is at rest at that sample.
 from __future__ import annotations
 
 import enum
+import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +32,10 @@ class Place(enum.Enum):
     ADDED = "added"
 
 
+REMEMBERED = 32
+"""Time constants of which a record remembers the factors."""
+
+
 @dataclass(frozen=True)
 class Run:
     """What an effect sees of one record, N samples.
@@ -43,10 +49,15 @@ class Run:
     extra: Mapping[str, Array] = field(default_factory=dict)
     rest: float = 0.0
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """Seconds from each sample to the next, N - 1 of them."""
         return np.diff(self.t)
+
+    @cached_property
+    def decays(self) -> Callable[[float], Array]:
+        """`decays` of the steps and a time constant, (3, N - 1); a search comes back to most of them."""
+        return functools.lru_cache(REMEMBERED)(lambda time_constant: np.stack(decays(self.steps, time_constant)))
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,8 @@ class Candidate:
     """One shape of an effect to try in a fit: free numbers within bounds, and the effect that they make.
 
     `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens;
-    `others`: further starts, where the error may have several minima.
+    `others`: further starts, where the error may have several minima; `beyond`: label of a shape of fewer numbers that
+    this one contains, and without which it is not worth trying.
     """
 
     label: str
@@ -85,6 +97,7 @@ class Candidate:
     build: Callable[[Array], Effect]
     none: Array | None = None
     others: tuple[Array, ...] = ()
+    beyond: str = ""
 
 
 class Effect(BaseModel):

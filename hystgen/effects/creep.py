@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, decays, span
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, span
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative, Positive
 
@@ -25,15 +25,11 @@ PER_DECADE = 2
 
 def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
     """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
-    rows = np.ascontiguousarray(np.atleast_2d(h))
-    total = np.zeros_like(rows)
-    state = np.empty(rows.shape[1])
-    for tau, weight in zip(time_constants, weights, strict=True):
-        factors = decays(run.steps, float(tau))
-        for i, row in enumerate(rows):
-            code().follow(row, *factors, float(row[0]), state)
-            total[i] += weight * state
-    return total.reshape(np.shape(h))
+    rows = np.ascontiguousarray(np.atleast_2d(h).T)
+    total = np.empty_like(rows)
+    factors = np.stack([run.decays(float(tau)) for tau in time_constants], axis=1)
+    code().creep(rows, *factors, np.ascontiguousarray(weights), np.tile(rows[0], (len(weights), 1)), total)
+    return total.T.reshape(np.shape(h))
 
 
 def _fading(run: Run, time_constants: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, decays, from_zero
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, from_zero
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative
 
@@ -30,18 +30,19 @@ class Lag(Effect):
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""
         out = np.empty_like(a)
-        code().follow(a, *decays(run.steps, self.time_constant), float(a[0]), out)
+        code().follow(a, *run.decays(self.time_constant), float(a[0]), out)
         return out
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The time constant, from none to a fifth of the longest record."""
+        """The time constant, from none to a fifth of the longest record, sought from several places on."""
         low, high, start, value = from_zero(0.1 * about.sample_time, 0.2 * about.duration, about.sample_time)
-        return [
-            Candidate(
-                "lag", low, high, start, lambda x: cls(name="lag", time_constant=value(float(x[0]))), none=np.zeros(1)
-            )
-        ]
+
+        def build(x: Array) -> Lag:
+            return cls(name="lag", time_constant=value(float(x[0])))
+
+        others = tuple(x for decades in (1.0, 2.0) if (x := start + decades) < high)
+        return [Candidate("lag", low, high, start, build, np.zeros(1), others)]
 
 
 SHAPES = (Lag,)

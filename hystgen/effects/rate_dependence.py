@@ -134,12 +134,13 @@ class RelaxingPlays(_RateDependence):
         def bent(x: Array) -> RelaxingPlays:
             return linear(x).model_copy(update={"exponent": float(10.0 ** x[1])})
 
-        zero = np.zeros(1)
+        straight = Candidate("rate dependence, relaxation", low, high, start, linear, none=np.zeros(1))
         return [
-            Candidate("rate dependence, relaxation", low, high, start, linear, none=np.zeros(1)),
+            straight,
             Candidate(
-                "rate dependence, relaxation with exponent",
-                np.append(low, -0.6), np.append(high, 0.6), np.append(start, zero), bent, none=np.zeros(2),
+                f"{straight.label} with exponent",
+                np.append(low, -0.6), np.append(high, 0.6), np.append(start, 0.0), bent, none=np.zeros(2),
+                beyond=straight.label,
             ),
         ]  # fmt: skip
 

@@ -32,6 +32,28 @@ def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Arr
         out[k + 1] = x
 
 
+def creep(
+    u: Array, decay: Array, early: Array, late: Array, weight: Array, state: Array, total: Array
+) -> None:
+    """Weighted sum of first-order filters from `state` (m, R), each of every column of `u` (N, R); factors (m, N - 1).
+
+    Filters and columns side by side, since each by itself waits for its own last sample.
+    """
+    for i in range(u.shape[1]):
+        total[0, i] = 0.0
+        for j in range(len(weight)):
+            total[0, i] += weight[j] * state[j, i]
+    for k in range(len(u) - 1):
+        for i in range(u.shape[1]):
+            total[k + 1, i] = 0.0
+        for j in range(len(weight)):
+            d, b, c, w = decay[j, k], early[j, k], late[j, k], weight[j]
+            for i in range(u.shape[1]):
+                x = d * state[j, i] + b * u[k, i] + c * u[k + 1, i]
+                state[j, i] = x
+                total[k + 1, i] += w * x
+
+
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
     """`u` followed by moves of at most `up_k` upwards and `down_k` downwards to sample k + 1."""
     x = u[0]
@@ -165,7 +187,7 @@ def relaxing_play(
         out[k + 1] = state
 
 
-COMPILED: list[Callable[..., Any]] = [follow, limit, ring, dilated_play, mean_decay, stretch, relaxing_play]
+COMPILED: list[Callable[..., Any]] = [follow, creep, limit, ring, dilated_play, mean_decay, stretch, relaxing_play]
 
 
 @functools.cache
