@@ -297,6 +297,12 @@ class TestFaults:
             v, y = plant(bent, seed)
             assert hystgen.identify(record(v, y)).warnings == ()
 
+    def test_there_are_none_at_steps_that_the_output_follows_late(self) -> None:
+        v = np.concatenate([wander(4)[:800], np.repeat(np.random.default_rng(2).uniform(0.0, 100.0, 30), 80)])
+        y = noisy(brute_output(lfilter([0.6], [1.0, -0.4], v), THRESHOLDS, WEIGHTS, 0.0), NOISE)
+        fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS)
+        assert not any("isolated" in text for text in fit.warnings)
+
     def test_spikes_of_the_drive_that_the_output_does_not_see(self) -> None:
         v, y = plant(np.asarray, 4)
         wrong = [300, 900, 901, 1500]

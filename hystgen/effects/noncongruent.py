@@ -69,7 +69,7 @@ class PlayFunctions(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The same parabola for all plays, then with a cubic term; then that changing evenly with the threshold."""
+        """The same parabola for all plays, then with a cubic term, that changing evenly with the threshold, a quartic."""
         plays = len(about.thresholds) - 1
         if plays < 1:
             return []
@@ -78,20 +78,23 @@ class PlayFunctions(_Noncongruent):
 
         share = np.array(about.thresholds[1:]) / about.thresholds[-1]
 
-        def candidate(label: str, terms: int, *courses: Array) -> Candidate:
+        def candidate(label: str, terms: int, *courses: Array, beyond: str = "") -> Candidate:
             def build(x: Array) -> PlayFunctions:
                 table = 0.1 * x.reshape(len(courses), terms) / largest ** np.arange(1, terms + 1)
                 rows = np.array(courses).T @ table
                 return cls(name="noncongruent", coefficients=tuple(map(tuple, rows.tolist())))
 
             n = terms * len(courses)
-            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), np.zeros(n), build, none=np.zeros(n))
+            zero = np.zeros(n)
+            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), zero, build, zero, beyond=beyond)
 
         even = np.ones(plays)
         return [
             candidate("noncongruent, parabola", 1, even),
             candidate("noncongruent, cubic", 2, even),
             candidate("noncongruent, cubic over r", 2, 1.0 - share, share),
+            candidate("noncongruent, quartic", 3, even, beyond="noncongruent, cubic"),
+            candidate("noncongruent, quartic over r", 3, 1.0 - share, share, beyond="noncongruent, cubic over r"),
         ]
 
 

@@ -30,6 +30,9 @@ AROUND, CLEAR = 6, 2.5
 TAIL, NORMAL_TAIL = 0.98, 2.326
 """A quantile of the deviations, and what it is for normal ones of standard deviation one."""
 
+STEP, STEP_OF_RANGE = 3.0, 0.02
+"""A step of the drive is so many times nearly all of its moves (`TAIL`), and such a share of its range."""
+
 MOST = 0.01
 """Largest share of samples that is left out as outliers; beyond it they are no outliers."""
 
@@ -40,8 +43,10 @@ ALONE = 20.0
 """A drive spike jumps by so many times what the drive moves in a step elsewhere (its 99th percentile)."""
 
 
-def outliers(error: Array) -> NDArray[np.bool_]:
+def outliers(error: Array, v: Array) -> NDArray[np.bool_]:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN counts as none.
+
+    Those at a step of the drive `v` (N,) are not: a model that lacks a lag or a resonance misses them.
 
     The scatter is taken from the median absolute deviation from a running median (Hampel identifier; Pearson, Control
     Engineering Practice 2005), so that neither the outliers nor what a model misses widens it.
@@ -57,11 +62,21 @@ def outliers(error: Array) -> NDArray[np.bool_]:
     # the quantile of a normal distribution with the same tail: a model that misses sharp corners has wide tails too
     scatter = max(1.4826 * float(np.median(from_middle)), float(np.quantile(from_middle, TAIL)) / NORMAL_TAIL)
     far = from_middle > FAR * max(scatter, 1e-9 * float(np.max(np.abs(e))))
+    stepped = _stepped(v)
     for first, last in _runs(far):
-        if last - first <= LONGEST and _stands_out(e, first, last):
+        if last - first <= LONGEST and not stepped[known[first:last]].any() and _stands_out(e, first, last):
             found[known[first:last]] = True
     if np.count_nonzero(found) > MOST * len(known):
         found[:] = False
+    return found
+
+
+def _stepped(v: Array) -> NDArray[np.bool_]:
+    """Samples around a step of the drive that is far larger than nearly all others, and a part of its range."""
+    step = np.abs(np.diff(v))
+    found = np.zeros(len(v), dtype=bool)
+    for k in np.flatnonzero(step > max(STEP * float(np.quantile(step, TAIL)), STEP_OF_RANGE * float(np.ptp(v)))):
+        found[max(k - LONGEST, 0) : k + 2 + LONGEST] = True
     return found
 
 

@@ -66,6 +66,6 @@ def mask_outliers(
     for group in (to_fit, held):
         for k, item in enumerate(group):
             error = pi.compare(replace(item, first=0), solution.thresholds, solution.weights).error
-            wrong = faults.outliers(error)
+            wrong = faults.outliers(error, item.v)
             if wrong.any():
                 group[k] = replace(item, y=np.where(wrong, np.nan, item.y))
