@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+AT_NOISE, ELSEWHERE = 1.5, 2.0
+"""What is missing shows in held-out records alone where they leave so many times the noise, and the others not."""
+
 ENOUGH = 100
 """Samples that have to be left of a record when wrong ones are taken out."""
 
@@ -152,9 +155,11 @@ def diagnose(
         ready = _without_faults(ready)
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
-        found = selection.select(
-            ready.to_fit, ready.held, base, start, noise.rms, effects, lambda: bar.tick(1)
-        )
+        refitted = selection.refit(base, ready.to_fit, start)
+        if _shows_elsewhere(refitted, ready, noise.rms):
+            ready = believed.shared(ready)
+            refitted = selection.refit(base, ready.to_fit, start)
+        found = selection.select(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
@@ -173,6 +178,12 @@ def _without_faults(ready: believed.Prepared) -> believed.Prepared:
     if any(not any(np.count_nonzero(item.known) > ENOUGH for item in group) for group in (to_fit, held)):
         return ready
     return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
+
+
+def _shows_elsewhere(refitted: Fitted, ready: believed.Prepared, noise: float) -> bool:
+    """Whether the refitted model leaves nothing but noise where it was fitted, and far more on held-out records."""
+    left = structure.rms(refitted.errors(ready.held))
+    return refitted.rms < AT_NOISE * noise and left > ELSEWHERE * max(refitted.rms, noise)
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:

@@ -15,8 +15,8 @@ from hystgen.identification.fronts import DeadZones, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 
-BREAKS = 4
-"""Breaks of the dead-zone sum that an asymmetry is sought with."""
+BREAKS, FINER = 4, 8
+"""Breaks of the dead-zone sum that an asymmetry is sought with, and of the one that is tried where it helps."""
 
 BENT, ASIDE = 0.3, 2.0
 """Curvature and place of tanh envelopes from which a search starts too: bent one way all over the range."""
@@ -77,15 +77,17 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     there = [part.name for part in structure.parts]
     found = []
     if not held.front.stages(np.empty(0)):
-        tanh, dead_zones = Tanh(known.drive), DeadZones(known.drive, even_breaks(known.drive, BREAKS))
+        tanh = Tanh(known.drive)
+        dead_zones, finer = (DeadZones(known.drive, even_breaks(known.drive, n)) for n in (BREAKS, FINER))
         bent = [np.array([BENT, side]) for side in (-ASIDE, ASIDE)]
-        fronts: list[tuple[str, Front, tuple[Array, ...]]] = [
-            ("front of dead zones", dead_zones, (dead_zones.straight,)),
-            ("front of one tanh", tanh, (tanh.straight, *bent)),
+        fronts: list[tuple[str, Front, tuple[Array, ...], str]] = [
+            ("front of dead zones", dead_zones, (dead_zones.straight,), ""),
+            ("front of more dead zones", finer, (finer.straight,), "front of dead zones"),
+            ("front of one tanh", tanh, (tanh.straight, *bent), ""),
         ]
-        for label, front, starts in fronts:
+        for label, front, starts, beyond in fronts:
             pair = replace(structure, front=front), replace(held, front=front)
-            found.append(Option(label, "asymmetry", *pair, starts, True))
+            found.append(Option(label, "asymmetry", *pair, starts, True, beyond))
     kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
     kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
     for name, kind in kinds:

@@ -51,11 +51,9 @@ ABOVE_NOISE = 0.6
 SURE, REPEATED = 1e-3, 0.05
 """Largest p-value of the difference in held-out error; or of that where the fitted records show it with the first."""
 
-ALIKE = 0.05
-"""Effects whose held-out rms lies within this share of the best one's cannot be told apart from it."""
-
 UNSURE, DIFFERENT = 0.25, 0.01
-"""Nor can those within this share, unless chance explains the difference with a lower probability than that."""
+"""Effects cannot be told apart within this share of the held-out rms, unless chance explains the difference with a
+lower probability than that."""
 
 SIMPLER = 0.02
 """A shape with fewer numbers is taken for one whose held-out rms is better by less than this share."""
@@ -160,24 +158,28 @@ class _Records:
         return found
 
 
+def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
+    """The believed structure with its weights and the shape of its front, sought from `start`, fitted anew."""
+    return fits.fit(base, to_fit, start, _first_weights(base, to_fit, start))
+
+
 def select(
     to_fit: Sequence[Item],
     held: Sequence[Item],
-    base: Structure,
-    start: Array,
+    refitted: Fitted,
     noise: float,
     user: Sequence[type[Effect]] = (),
     tick: Callable[[], None] = lambda: None,
 ) -> Outcome:
-    """Refit the believed structure, then add effects as long as one qualifies."""
-    refitted = now = fits.fit(base, to_fit, start, _first_weights(base, to_fit, start))
+    """Add effects to the refitted model as long as one qualifies."""
+    now = refitted
     every = max(1, sum(int(np.count_nonzero(item.known)) for item in to_fit) // SCREENED)
     records = _Records(
         to_fit,
         held,
         [item.thinned(every) for item in to_fit],
         [item.thinned(every) for item in held],
-        about(to_fit, base.thresholds),
+        about(to_fit, refitted.structure.thresholds),
         user,
         noise,
         tick,
@@ -197,7 +199,7 @@ def select(
         merit = _merit(now, best, records)
         if merit is None or merit.equal - best.held_out < SHARE * gap:
             break
-        found.append(_found(best, tried, before, merit))
+        found.append(_found(best, tried, before, merit, records))
         now = best.fitted
         now, found = _without_needless(now, found, records)
         now, found = _exchanged(now, found, records)
@@ -228,8 +230,8 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     return _Merit(equal, p_value) if sure else None
 
 
-def _found(best: Tried, tried: Sequence[Tried], before: float, merit: _Merit) -> Found:
-    rivals = dict.fromkeys(t.name for t in tried if t.name != best.name and _alike(t, best))
+def _found(best: Tried, tried: Sequence[Tried], before: float, merit: _Merit, records: _Records) -> Found:
+    rivals = dict.fromkeys(t.name for t in tried if t.name != best.name and _alike(t, best, records.noise))
     return Found(best.name, best.option.label, before, best.held_out, merit.p_value, tuple(rivals))
 
 
@@ -241,10 +243,15 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
     return weights.non_negative(system, np.arange(len(ones)))
 
 
-def _alike(other: Tried, best: Tried) -> bool:
-    """Whether the records leave open which of two effects it is."""
-    worse = other.held_out / best.held_out - 1.0 if best.held_out > 0.0 else math.inf
-    return worse <= ALIKE or (worse <= UNSURE and difference(other.errors, best.errors) > DIFFERENT)
+def _alike(other: Tried, best: Tried, noise: float) -> bool:
+    """Whether the records leave open which of two effects it is.
+
+    What one explains more than the other has to be as much as makes an effect worth a name, and no chance.
+    """
+    more = math.sqrt(max(other.held_out**2 - best.held_out**2, 0.0))
+    if more < ABOVE_NOISE * max(noise, best.held_out):
+        return True
+    return other.held_out <= (1.0 + UNSURE) * best.held_out and difference(other.errors, best.errors) > DIFFERENT
 
 
 def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[tuple[Option, Fitted]]:
@@ -338,7 +345,7 @@ def _exchanged(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitt
         without = records.left(fitted)
         merit = _merit(fitted, best, records)
         if merit is not None:
-            other = _found(best, tried, without, merit)
+            other = _found(best, tried, without, merit, records)
             chain = _in_place(best.fitted, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
             chain = chain or [*_rest(found, k, without), other]
             return _exchanged(*_without_needless(best.fitted, chain, records), records)

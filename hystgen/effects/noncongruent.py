@@ -69,7 +69,7 @@ class PlayFunctions(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The same parabola for all plays, then with a cubic term, that changing evenly with the threshold, a quartic."""
+        """The same parabola for all plays; with a cubic term, which may change evenly over r; with a quartic one."""
         plays = len(about.thresholds) - 1
         if plays < 1:
             return []
@@ -94,7 +94,6 @@ class PlayFunctions(_Noncongruent):
             candidate("noncongruent, cubic", 2, even),
             candidate("noncongruent, cubic over r", 2, 1.0 - share, share),
             candidate("noncongruent, quartic", 3, even, beyond="noncongruent, cubic"),
-            candidate("noncongruent, quartic over r", 3, 1.0 - share, share, beyond="noncongruent, cubic over r"),
         ]
 
 
