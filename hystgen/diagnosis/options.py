@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +29,7 @@ class Option:
     """One way to extend a hypothesis. `front`: it puts a memoryless part in front, which is named once found.
 
     `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`. `beyond`: label of
-    the simpler one that it contains, and without which it is not tried.
+    the simpler one that it contains, and without which it is not tried; `grown`: a start from the numbers of that.
     """
 
     label: str
@@ -39,6 +39,7 @@ class Option:
     starts: tuple[Array, ...]
     front: bool = False
     beyond: str = ""
+    grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
         """The shape of all, where the extension has these numbers and the rest is as it was."""
@@ -97,7 +98,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
             part = Part(name, candidate)
             pair = replace(structure, parts=(*structure.parts, part)), replace(held, parts=(*held.parts, part))
             starts = (candidate.start, *candidate.others)
-            found.append(Option(candidate.label, name, *pair, starts, beyond=candidate.beyond))
+            found.append(Option(candidate.label, name, *pair, starts, False, candidate.beyond, candidate.grown))
     return found
 
 

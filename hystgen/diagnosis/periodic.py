@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,9 @@ PERIODS = 8
 """Fewest periods in a record for a line to be seen, and fewest pitches in the travel."""
 
 MOST = 4
+
+CLOSE = 0.02
+"""Frequencies of ringing that differ by less are the same."""
 
 BINS = 4096
 """Positions are taken to so many places of the range."""
@@ -73,15 +77,15 @@ def _share(before: Sequence[Array], after: Sequence[Array]) -> float:
 
 def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
     """The strongest line that is in most of the records that are long enough for it, or that rules a few."""
-    peaks: list[tuple[float, float, int]] = []
+    found: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
-        peaks += [(share, frequency, k) for share, frequency in _peaks(item, error)]
+        found += [(share, frequency, k) for share, frequency in peaks(item, error)]
     times = [item.run.t[np.isfinite(e)] for item, e in zip(items, errors, strict=True)]
     lengths = [float(np.ptp(t)) if len(t) > 64 else 0.0 for t in times]
     rates = [1.0 / float(np.median(np.diff(item.run.t))) for item in items]
     best: tuple[float, float, list[int], list[int]] | None = None
-    for _, frequency, k in peaks:
-        near = [p for p in peaks if abs(p[1] - frequency) < 1.5 / min(lengths[p[2]], lengths[k])]
+    for _, frequency, k in found:
+        near = [p for p in found if abs(p[1] - frequency) < 1.5 / min(lengths[p[2]], lengths[k])]
         seen = sorted({p[2] for p in near})
         able = [j for j, n in enumerate(lengths) if n * frequency >= PERIODS and 2.0 * frequency <= rates[j]]
         strength = sum(p[0] for p in near)
@@ -121,7 +125,7 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
     return Line(told, after, _share(errors, after))
 
 
-def _peaks(item: Item, error: Array) -> list[tuple[float, float]]:
+def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     """Share and frequency of narrow peaks of one residual that are no multiples of what the drive does."""
     known = np.isfinite(error)
     n = len(error)
@@ -154,6 +158,17 @@ def _peaks(item: Item, error: Array) -> list[tuple[float, float]]:
         if not any(abs(other - k / (n * step)) < 4.0 / (n * step) for _, other in found):
             found.append((share, k / (n * step)))
     return found
+
+
+def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[float, ...]:
+    """The frequencies of narrow peaks in any record, the strongest first, close ones once."""
+    each = (peaks(item, error) for item, error in zip(items, errors, strict=True))
+    found = sorted(itertools.chain(*each), reverse=True)
+    kept: list[float] = []
+    for _, frequency in found:
+        if len(kept) < most and all(abs(frequency / other - 1.0) > CLOSE for other in kept):
+            kept.append(frequency)
+    return tuple(kept)
 
 
 def repetition(v: Array) -> int | None:

@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_name, options
 from hystgen.diagnosis.structure import Fitted, Item, Structure
@@ -39,6 +40,9 @@ JOINT_STEPS, HOPEFUL = 5, 1.3
 
 SHAPES = 2
 """Of one effect no more than so many."""
+
+RINGING = 3
+"""Frequencies at which the error rings, from which a search for a resonance starts too."""
 
 ROUNDS = 5
 
@@ -127,7 +131,8 @@ class _Records:
 
     def extensions(self, now: Fitted) -> list[Tried]:
         """One effect more, the best shapes of all, the best one first."""
-        return _followed_up(now, _screened(now, self, options(now, self.known, self.user)), self)
+        known = replace(self.known, ringing=periodic.ringing(self.to_fit, now.errors(self.to_fit), RINGING))
+        return _followed_up(now, _screened(now, self, options(now, known, self.user)), self)
 
     def left(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
@@ -262,15 +267,20 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     """
     worth = (1.0 - SHARE) * fits.rms(now.errors(records.thin_held))
 
+    simpler: dict[str, _Screened] = {}
+
     def begin(option: Option, items: Sequence[Item], held: Sequence[Item]) -> _Screened:
-        begun = [fits.fit(option.alone, items, start, now.weights, FIRST_STEPS) for start in option.starts]
+        starts = list(option.starts)
+        if option.grown is not None:
+            starts.append(option.grown(simpler[option.beyond].fitted.shape))
+        begun = [fits.fit(option.alone, items, start, now.weights, FIRST_STEPS) for start in starts]
         best = min(begun, key=lambda each: each.rms)
         fitted = fits.fit(option.alone, items, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
         return _Screened(option, fitted, fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf)
 
     tried = records.side_by_side(begin, [option for option in found if not option.beyond], thin=True)
-    helpful = {each.option.label for each in tried if each.left < worth}
-    tried += records.side_by_side(begin, [option for option in found if option.beyond in helpful], thin=True)
+    simpler.update((each.option.label, each) for each in tried if each.left < worth)
+    tried += records.side_by_side(begin, [option for option in found if option.beyond in simpler], thin=True)
     tried = [each for each in tried if math.isfinite(each.left)]
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)

@@ -79,6 +79,8 @@ class About:
     thresholds: tuple[float, ...]
     columns: frozenset[str] = frozenset()
     """further columns that every record has"""
+    ringing: tuple[float, ...] = ()
+    """frequencies at which the error so far has narrow peaks of its own, Hz, the strongest first"""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Candidate:
 
     `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens;
     `others`: further starts, where the error may have several minima; `beyond`: label of a shape of fewer numbers that
-    this one contains, and without which it is not worth trying.
+    this one contains, and without which it is not worth trying; `grown`: a start made of the numbers of that one.
     """
 
     label: str
@@ -98,6 +100,7 @@ class Candidate:
     none: Array | None = None
     others: tuple[Array, ...] = ()
     beyond: str = ""
+    grown: Callable[[Array], Array] | None = None
 
 
 class Effect(BaseModel):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -78,7 +78,7 @@ class PlayFunctions(_Noncongruent):
 
         share = np.array(about.thresholds[1:]) / about.thresholds[-1]
 
-        def candidate(label: str, terms: int, *courses: Array, beyond: str = "") -> Candidate:
+        def candidate(label: str, terms: int, *courses: Array, **more: Any) -> Candidate:
             def build(x: Array) -> PlayFunctions:
                 table = 0.1 * x.reshape(len(courses), terms) / largest ** np.arange(1, terms + 1)
                 rows = np.array(courses).T @ table
@@ -86,14 +86,16 @@ class PlayFunctions(_Noncongruent):
 
             n = terms * len(courses)
             zero = np.zeros(n)
-            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), zero, build, zero, beyond=beyond)
+            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), zero, build, zero, **more)
 
         even = np.ones(plays)
         return [
             candidate("noncongruent, parabola", 1, even),
             candidate("noncongruent, cubic", 2, even),
             candidate("noncongruent, cubic over r", 2, 1.0 - share, share),
-            candidate("noncongruent, quartic", 3, even, beyond="noncongruent, cubic"),
+            candidate(
+                "noncongruent, quartic", 3, even, beyond="noncongruent, cubic", grown=lambda x: np.append(x, 0.0)
+            ),
         ]
 
 

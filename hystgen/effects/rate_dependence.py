@@ -134,13 +134,14 @@ class RelaxingPlays(_RateDependence):
         def bent(x: Array) -> RelaxingPlays:
             return linear(x).model_copy(update={"exponent": float(10.0 ** x[1])})
 
-        straight = Candidate("rate dependence, relaxation", low, high, start, linear, none=np.zeros(1))
+        others = tuple(x for decades in (1.0, 2.0, 3.0) if (x := start + decades) < high)
+        straight = Candidate("rate dependence, relaxation", low, high, start, linear, np.zeros(1), others)
         return [
             straight,
             Candidate(
                 f"{straight.label} with exponent",
                 np.append(low, -0.6), np.append(high, 0.6), np.append(start, 0.0), bent, none=np.zeros(2),
-                beyond=straight.label,
+                beyond=straight.label, grown=lambda x: np.append(x, 0.0),
             ),
         ]  # fmt: skip
 

@@ -72,7 +72,10 @@ class Resonance(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Frequency from two periods a record to the sampling rate, damping 0.3 % to 1; starts all over log f."""
+        """Frequency from two periods a record to the sampling rate, damping 0.3 % to 1; starts all over log f.
+
+        A light damping rings long, and is found from the frequency at which the error so far rings alone.
+        """
         low, high = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
 
         def build(x: Array) -> Resonance:
@@ -81,14 +84,18 @@ class Resonance(Effect):
         def start(place: float) -> Array:
             return np.array([high - max(high - low, 0.0) * place, -1.3])
 
+        places = {
+            "high": [start(place) for place in (0.12, 0.2, 0.28)],
+            "middle": [start(place) for place in (0.36, 0.44, 0.52)],
+            "low": [start(place) for place in (0.6, 0.7, 0.8)],
+            "where it rings": [np.array([np.log10(f), -1.8]) for f in about.ringing],
+        }
         return [
             Candidate(
-                f"resonance, {name}", np.array([low, -2.5]), np.array([high, 0.0]), start(first), build,
-                others=tuple(map(start, others)),
+                f"resonance, {name}", np.array([low, -2.5]), np.array([high, 0.0]), starts[0], build,
+                others=tuple(starts[1:]),
             )
-            for name, first, *others in (
-                ("high", 0.12, 0.2, 0.28), ("middle", 0.36, 0.44, 0.52), ("low", 0.6, 0.7, 0.8)
-            )
+            for name, starts in places.items() if starts
         ]  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -46,13 +46,14 @@ class SlewLimit(Effect):
         def build(x: Array) -> SlewLimit:
             return cls(name="slew_limit", rate=10.0 ** float(x[0]), falling_rate=10.0 ** float(x[-1]))
 
+        def candidate(label: str, n: int, **more: Any) -> Candidate:
+            none = np.full(n, fastest)
+            return Candidate(label, none - 2.0, none, none - 0.3, build, none, (none - 1.0,), **more)
+
         return [
-            Candidate(
-                label, np.full(n, fastest - 2.0), np.full(n, fastest), np.full(n, fastest - 0.3), build,
-                none=np.full(n, fastest),
-            )
-            for label, n in (("slew limit", 1), ("slew limit, rising and falling", 2))
-        ]  # fmt: skip
+            candidate("slew limit", 1),
+            candidate("slew limit, rising and falling", 2, beyond="slew limit", grown=lambda x: np.repeat(x, 2)),
+        ]
 
 
 SHAPES = (SlewLimit,)
