@@ -265,8 +265,7 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
     a simpler one is tried where that takes something away.
     """
-    worth = (1.0 - SHARE) * fits.rms(now.errors(records.thin_held))
-
+    without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
     simpler: dict[str, _Screened] = {}
 
     def begin(option: Option, items: Sequence[Item], held: Sequence[Item]) -> _Screened:
@@ -279,7 +278,9 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
         return _Screened(option, fitted, fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf)
 
     tried = records.side_by_side(begin, [option for option in found if not option.beyond], thin=True)
-    simpler.update((each.option.label, each) for each in tried if each.left < worth)
+    for each in tried:
+        if any(left < (1.0 - SHARE) * b for left, b in zip((each.fitted.rms, each.left), without, strict=True)):
+            simpler[each.option.label] = each
     tried += records.side_by_side(begin, [option for option in found if option.beyond in simpler], thin=True)
     tried = [each for each in tried if math.isfinite(each.left)]
     kept: list[_Screened] = []
