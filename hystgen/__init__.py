@@ -5,6 +5,8 @@
 >>> y = model.simulate(v)
 >>> v = model.inverse().simulate(u)
 >>> hystgen.emit(model, "firmware/")
+
+`hystgen.closed_loop` simulates it with a plant and a controller.
 """
 
 from __future__ import annotations
@@ -42,6 +44,7 @@ _PLACES = {
 __all__ = [*sorted(_PLACES), "__version__"]
 
 if TYPE_CHECKING:
+    from hystgen import closed_loop as closed_loop
     from hystgen.api import InverseModel as InverseModel
     from hystgen.api import Model as Model
     from hystgen.api import diagnose as diagnose
@@ -66,6 +69,8 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
+    if name == "closed_loop":
+        return importlib.import_module("hystgen.closed_loop")
     if name not in _PLACES:
         raise AttributeError(f"module 'hystgen' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"hystgen.{_PLACES[name]}"), name)

@@ -42,6 +42,10 @@ class Session:
         self._range = cascade.input_range
         self.state = reference.new_state(self.tables)
         self._code = compiled.reference(self.tables)
+        self.init()
+
+    def init(self) -> None:
+        """Back to the start memory."""
         self._code.init(self.tables, self.state)
 
     @property

@@ -1,0 +1,381 @@
+"""Closed loops: a plant with hysteresis at its input, a compensator and a controller, at the firmware's rate.
+
+    reference --(+)--> controller --> compensator --> hysteresis --> plant --+--> output
+                -^                                                           |
+                 +-----------------------------------------------------------+
+
+At sample k, at t_k = k T and in this order: the sensor takes the output y_k, before anything moves; the controller
+answers the error r_k - y_k with u_k; the compensator turns u_k into the drive v_k; the actuator, without a delay,
+into h_k; and v_k, with it h_k, is held up to t_(k+1). So y_k has seen the drives up to v_(k-1), which leaves no
+algebraic loop even where the plant passes its input straight on. A controller or compensator that takes a whole sample
+to compute is a factor 1/z in the controller.
+
+Nothing is integrated numerically: hysteresis is rate-independent, so a held drive gives a held h, and zero-order hold
+is exact for a linear plant with a held input. Between the samples lies nothing that a finer step would change at them.
+
+>>> import math
+>>> from hystgen import PI
+>>> from hystgen.closed_loop import Loop, PIController
+>>> actuator = PI([0, 0.45, 0.9], [0.72, 0.6, 0.48])
+>>> loop = Loop(([1e6], [1, 1e3, 1e6]), PIController(0.185, 185.0), 5e-5, actuator, actuator.inverse())
+>>> response = loop.run(lambda t: 4 * math.sin(2 * math.pi * t), duration=2.0)
+>>> round(response.max_error(start=1.0), 3)
+0.136
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import linalg, signal
+
+from hystgen import fixed_tables, tables
+from hystgen.api import InverseModel, Model, emit_options
+from hystgen.models import PI, Cascade, InverseCascade
+from hystgen.simulation import Session
+
+Array = NDArray[np.float64]
+
+
+@runtime_checkable
+class Block(Protocol):
+    """A part of the loop that remembers: a controller (error in), a compensator or an actuator (drive out)."""
+
+    def reset(self) -> None:
+        """Back to the start; called before every run."""
+
+    def step(self, x: float, /) -> float:
+        """The answer to one sample."""
+
+
+@dataclass(frozen=True)
+class PIController:
+    """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, T the loop's sample time.
+
+    `kp` in controller output per error unit, `ki` in the same per second. Nothing is limited.
+    """
+
+    kp: float
+    ki: float
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What a loop did: arrays (N,), one entry a sample.
+
+    `t` in s; `reference`, `output` and `error` (reference less output) in units of the plant's output; `control`: what
+    the controller asks for; `drive`: what the compensator makes of it; `displacement`: the plant's input, behind the
+    hysteresis. A loop that diverges ends in infinities and NaN.
+    """
+
+    t: Array
+    reference: Array
+    output: Array
+    error: Array
+    control: Array
+    drive: Array
+    displacement: Array
+
+    def max_error(self, start: float = 0.0) -> float:
+        """Largest |error| from `start` (s) on, at the samples. Raises ValueError where nothing is left."""
+        return float(np.max(np.abs(self._error_from(start))))
+
+    def rms_error(self, start: float = 0.0) -> float:
+        """Root of the mean square error from `start` (s) on. Raises ValueError where nothing is left."""
+        return float(np.sqrt(np.mean(self._error_from(start) ** 2)))
+
+    def _error_from(self, start: float) -> Array:
+        # a start that is meant to be a sample is one, whatever its last digit
+        kept = self.error[self.t >= start - 1e-9 * abs(start)]
+        if not len(kept):
+            raise ValueError(f"the response ends at {self.t[-1]:g} s, before {start:g} s")
+        return kept
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A closed loop, sampled every `sample_time` seconds.
+
+    `plant`: a continuous system of scipy.signal, or what makes one, (num, den), (zeros, poles, gain) or (A, B, C, D),
+    with one input and one output, at rest at first; or a discrete one with dt = sample_time. Controller, hysteresis
+    and compensator are each one of
+
+    - None: passes on what it gets (not for the controller);
+    - a number: a gain;
+    - a model (`Model`, `Cascade`, `PI`), in double precision and unlimited, or the `inverse()` of one: that of a
+      `Model` or `Cascade` keeps the drive inside its `input_range`;
+    - a `PIController`, or a discrete system of scipy.signal with dt = sample_time;
+    - a `Block`, such as `BitReference` and `CompiledC`, or any object with `step` and `reset`;
+    - a function of one number, without memory.
+
+    Raises ValueError for a plant or sample time that cannot be used, TypeError for a part that is none of these,
+    UnsupportedEffectsError for a model with effects: what is linear there belongs into the plant.
+    """
+
+    plant: Any
+    controller: object
+    sample_time: float
+    hysteresis: object = None
+    compensator: object = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.sample_time) and self.sample_time > 0.0):
+            raise ValueError(f"the sample time {self.sample_time!r} is not positive; give seconds per sample")
+        if self.controller is None:
+            raise TypeError("a loop needs a controller")
+        _ = self.sampled_plant, self._blocks
+
+    @cached_property
+    def sampled_plant(self) -> tuple[Array, Array, Array, float]:
+        """A (n, n), B (n,), C (n,) and D of the plant with its input held: `x_(k+1) = A x_k + B h_k`."""
+        return _sampled(self.plant, self.sample_time, "the plant")
+
+    @cached_property
+    def _blocks(self) -> tuple[Block, Block, Block]:
+        return (
+            _block(self.controller, self.sample_time, "the controller"),
+            _block(1.0 if self.compensator is None else self.compensator, self.sample_time, "the compensator"),
+            _block(1.0 if self.hysteresis is None else self.hysteresis, self.sample_time, "the hysteresis"),
+        )
+
+    def run(self, reference: ArrayLike | Callable[[float], float], duration: float | None = None) -> Response:
+        """The response to `reference` from rest: N samples at t_k, or a function of the time in s with a `duration`.
+
+        Every run starts anew: plant at 0, all memories at their start. Raises ValueError for a reference that is not a
+        signal or a duration that is none.
+        """
+        r = self._reference(reference, duration)
+        controller, compensator, hysteresis = self._blocks
+        for block in self._blocks:
+            block.reset()
+        a, b, c, d = self.sampled_plant
+        x, h = np.zeros(len(b)), 0.0
+        signals = np.empty((4, len(r)))
+        # a loop may diverge; that is an answer too
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, wanted in enumerate(r.tolist()):
+                y = float(c @ x) + d * h
+                u = controller.step(wanted - y)
+                v = compensator.step(u)
+                h = hysteresis.step(v)
+                x = a @ x + b * h
+                signals[:, k] = y, u, v, h
+            t = np.asarray(np.arange(len(r)) * self.sample_time, dtype=np.float64)
+            return Response(t, r, signals[0], r - signals[0], *signals[1:])
+
+    def _reference(self, reference: ArrayLike | Callable[[float], float], duration: float | None) -> Array:
+        if callable(reference):
+            if duration is None or not (math.isfinite(duration) and duration >= self.sample_time):
+                raise ValueError("a reference that is a function needs a duration of a sample or more, in s")
+            count = round(duration / self.sample_time)
+            reference = [reference(k * self.sample_time) for k in range(count)]
+        elif duration is not None:
+            raise ValueError("a reference given as samples has its own duration")
+        r = np.array(reference, dtype=np.float64)
+        if r.ndim != 1 or not len(r) or not np.all(np.isfinite(r)):
+            raise ValueError("a reference is one finite number a sample, at least one")
+        return r
+
+
+def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, Array, float]:
+    """State space of a continuous system with held input, or of a discrete one."""
+    if not isinstance(system, signal.lti | signal.dlti):
+        try:
+            system = signal.lti(*system)
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"{what} is no system of scipy.signal; give one, or (num, den), (zeros, poles, gain), (A, B, C, D)"
+            ) from None
+    try:
+        space = system.to_ss()
+    except ValueError as error:
+        raise ValueError(f"{what} is not proper, it has more zeros than poles: {error}") from None
+    a, b, c, d = (np.array(m, dtype=np.float64) for m in (space.A, space.B, space.C, space.D))
+    if d.shape != (1, 1):
+        raise ValueError(f"{what} has {d.shape[1]} inputs and {d.shape[0]} outputs, a loop needs one of each")
+    if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
+        raise ValueError(f"{what} has coefficients that are not finite")
+    if space.dt is None:
+        # A companion matrix has entries of many magnitudes, which cost the exponential up to half its digits
+        a, (scale, _) = linalg.matrix_balance(a, permute=False, separate=True)
+        a, b, c, d, _ = signal.cont2discrete((a, b / scale[:, None], c * scale, d), sample_time, "zoh")
+    elif not math.isclose(float(space.dt), sample_time, rel_tol=1e-9):
+        raise ValueError(f"{what} has a sample time of {space.dt} s, the loop {sample_time:g} s")
+    return a, b[:, 0], c[0], float(d[0, 0])
+
+
+def _block(part: object, sample_time: float, what: str) -> Block:
+    if isinstance(part, PIController):
+        return _PI(part, sample_time)
+    if isinstance(part, signal.dlti):
+        return _Discrete(*_sampled(part, sample_time, what))
+    if isinstance(part, PI):
+        part = Cascade(part)
+    if isinstance(part, Cascade):
+        return _Operator(Session(part))
+    if isinstance(part, InverseCascade):
+        return _Operator(Session(part.forward, "inverse", clamp=True))
+    if isinstance(part, Model):
+        return _Operator(part.session())
+    if isinstance(part, InverseModel):
+        return _Operator(part.forward.session("inverse", clamp=True))
+    if isinstance(part, numbers.Real):
+        gain = float(part)
+        return _Function(lambda x: gain * x)
+    if isinstance(part, signal.lti):
+        discrete = f"to_discrete({sample_time:g})"
+        raise TypeError(f"{what} is a continuous system; give a discrete one, for example what its {discrete} returns")
+    if isinstance(part, Block) and not isinstance(part, type):
+        return part
+    if callable(part) and not isinstance(part, type):
+        return _Function(part)
+    raise TypeError(f"{what} is none of the parts that a loop can have: {part!r}")
+
+
+class _Function:
+    """No memory."""
+
+    def __init__(self, function: Callable[[float], float]) -> None:
+        self._function = function
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def step(self, x: float, /) -> float:
+        return float(self._function(x))
+
+
+class _PI:
+    def __init__(self, gains: PIController, sample_time: float) -> None:
+        self._kp, self._gain = gains.kp, gains.ki * sample_time
+        self.reset()
+
+    def reset(self) -> None:
+        self._integral = 0.0
+
+    def step(self, x: float, /) -> float:
+        self._integral += self._gain * x
+        return self._kp * x + self._integral
+
+
+class _Discrete:
+    """A linear discrete system, its state 0 at first."""
+
+    def __init__(self, a: Array, b: Array, c: Array, d: float) -> None:
+        self._a, self._b, self._c, self._d = a, b, c, d
+        self.reset()
+
+    def reset(self) -> None:
+        self._x = np.zeros(len(self._b))
+
+    def step(self, x: float, /) -> float:
+        answer = float(self._c @ self._x) + self._d * x
+        self._x = self._a @ self._x + self._b * x
+        return answer
+
+
+class _Operator:
+    """A model or its inverse, from its start memory, in what its session takes."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def reset(self) -> None:
+        self._session.init()
+
+    def step(self, x: float, /) -> Any:
+        return self._session.run([x])[0].item()
+
+
+class _InUnits:
+    """An operator of an arithmetic behind its converters: physical units in and out.
+
+    Fixed point gets the nearest code, ties away from zero, as far as codes go (the last one again for a NaN).
+    """
+
+    def __init__(self, model: Model, operator: str, arithmetic: str | None, engine: str | None) -> None:
+        if operator not in ("inverse", "forward"):
+            raise ValueError(f"operator {operator!r} is neither inverse nor forward")
+        self._options = emit_options(model, operator, arithmetic, engine)
+        self._lsb: tuple[float, float] | None = None
+        if self._options.arithmetic not in tables.FLOAT_ARITHMETICS:
+            emit = model.parameters.emit
+            about = (self._options.arithmetic, self._options.engine, emit.drive_lsb, emit.output_lsb)
+            codes = fixed_tables.build(model.cascade, *about)[1]
+            drive, output = float(codes.drive_lsb), float(codes.output_lsb)
+            self._lsb = (output, drive) if operator == "inverse" else (drive, output)
+            self._most = 2 ** fixed_tables.CODE_BITS[self._options.arithmetic] - 1
+        self._code = 0
+
+    def reset(self) -> None:
+        self._code = 0
+        self._start()
+
+    def step(self, x: float, /) -> float:
+        if self._lsb is None:
+            return float(self._answer(x))
+        if not math.isnan(x):
+            code = min(max(x / self._lsb[0], -self._most - 1.0), float(self._most))
+            whole = math.floor(abs(code))
+            self._code = int(math.copysign(whole + (abs(code) - whole >= 0.5), code))
+        return float(self._answer(self._code) * self._lsb[1])
+
+    def _start(self) -> None:
+        raise NotImplementedError
+
+    def _answer(self, x: Any) -> Any:
+        raise NotImplementedError
+
+
+class BitReference(_InUnits):
+    """A model's `inverse` or `forward` operator with the emitted C's bits, computed in Python; in physical units.
+
+    `arithmetic` and `engine` default to the parameter file's. Raises NotInvertibleError, FormatError, ValueError and
+    UnsupportedEffectsError.
+    """
+
+    def __init__(
+        self, model: Model, operator: str = "inverse", arithmetic: str | None = None, engine: str | None = None
+    ) -> None:
+        super().__init__(model, operator, arithmetic, engine)
+        self._operator = _Operator(model.session(operator, self._options.arithmetic, self._options.engine))
+
+    def _start(self) -> None:
+        self._operator.reset()
+
+    def _answer(self, x: Any) -> Any:
+        return self._operator.step(x)
+
+
+class CompiledC(_InUnits):
+    """The emitted C of a model's `inverse` or `forward` operator, compiled for this machine; in physical units.
+
+    `arithmetic` and `engine` default to the parameter file's, `compiler` (gcc, clang or zig) to the first that is
+    installed. Raises CompileError, NotInvertibleError, FormatError, ValueError and UnsupportedEffectsError.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        operator: str = "inverse",
+        arithmetic: str | None = None,
+        engine: str | None = None,
+        compiler: str | None = None,
+    ) -> None:
+        from hystgen.verification.instance import Instance
+
+        super().__init__(model, operator, arithmetic, engine)
+        self._instance = Instance(model, self._options, compiler)
+
+    def _start(self) -> None:
+        self._instance.init()
+
+    def _answer(self, x: Any) -> Any:
+        return self._instance.step(x)

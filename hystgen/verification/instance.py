@@ -1,0 +1,53 @@
+"""One instance of an emitted operator, compiled for this machine and called sample by sample."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import cffi
+
+from hystgen.api import Model
+from hystgen.emission import module, runtime
+from hystgen.verification import compilers, sources
+
+
+class Instance:
+    """A context of NAME_OP_init and NAME_OP_step in the C that a model emits; numbers as the C takes them.
+
+    `options`: one operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is installed; it is called as a
+    user calls it, in its default dialect. The files lie in a temporary folder. Raises CompileError, also where there
+    is no compiler.
+    """
+
+    def __init__(self, model: Model, options: module.Options, compiler: str | None = None) -> None:
+        chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
+        if chosen is None:
+            missing = f"{compiler} is not installed" if compiler else "no C compiler found"
+            raise compilers.CompileError(f"{missing}; install gcc or clang, or: pip install 'hystgen[zig]'")
+        name, op = model.name, options.operator
+        real = runtime.FAMILIES[options.arithmetic].real
+        self._ffi = cffi.FFI()
+        self._ffi.cdef(
+            f"size_t hystgen_harness_{op}_size(void); void {name}_{op}_init(void *);"
+            f"{real} {name}_{op}_step(void *, {real});"
+        )
+        # What is loaded stays so without its file; only Windows keeps the file until then
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            library = Path(folder) / "instance.so"
+            chosen.shared_library(sources.write(Path(folder), model, options).all, library, compilers.USER)
+            self._library = self._ffi.dlopen(str(library))
+        size = getattr(self._library, f"hystgen_harness_{op}_size")()
+        self._context = self._ffi.new("long long[]", size // 8 + 1)
+        self._init = getattr(self._library, f"{name}_{op}_init")
+        self._step = getattr(self._library, f"{name}_{op}_step")
+        self.init()
+
+    def init(self) -> None:
+        """Back to the start memory of the parameter file."""
+        self._init(self._context)
+
+    def step(self, x: Any) -> Any:
+        """One sample."""
+        return self._step(self._context, x)
