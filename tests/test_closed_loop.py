@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import math
+import runpy
 import subprocess
 import sys
 from collections.abc import Callable
@@ -196,10 +197,28 @@ def test_figure_16_is_what_the_model_page_says() -> None:
         "exact": (STAGE.inverse(), 0.136),
         "approximate": (PI(R_OFF, P_OFF).inverse(), 0.139),
         "scale": (1.0 / 2.05, 0.206),
+        "scale of the gain in this loop": (1.0 / 1.69, 0.171),
     }
     for name, (compensator, expected) in cases.items():
         response = Loop((NUMERATOR, DENOMINATOR), GAINS, T, STAGE, compensator).run(wanted, 2.0)
         assert round(response.max_error(start=1.0), 3) == expected, name
+
+
+def test_the_uncompensated_loop_rings_where_its_slope_is_beyond_the_stability_limit() -> None:
+    """With a slope m of the actuator, s den + m (kp s + ki) num has its roots on the left up to m = 1.28."""
+
+    def damped(slope: float) -> bool:
+        closed = np.polyadd([*DENOMINATOR, 0.0], slope * NUMERATOR[0] * np.array([0.185, 185.0]))
+        return bool(np.max(np.roots(closed).real) < 0.0)
+
+    def ripple(**parts: object) -> float:
+        response = Loop((NUMERATOR, DENOMINATOR), GAINS, 1e-5, **parts).run(wanted, 0.98)  # type: ignore[arg-type]
+        return float(np.ptp(np.diff(response.error[-5000:], 2)))
+
+    assert damped(sum(P[:2]) * 0.97)
+    assert not damped(sum(P[:2]))
+    assert ripple(hysteresis=STAGE) > 1e3 * ripple(hysteresis=STAGE, compensator=STAGE.inverse())
+    assert ripple(hysteresis=1.25) < 1e-3 < 1e3 < ripple(hysteresis=1.33)
 
 
 @pytest.mark.parametrize("case", ["none", "exact", "approximate", "scale"])
@@ -414,3 +433,12 @@ def test_the_example_of_the_module_runs() -> None:
     result = doctest.testmod(closed_loop)
     assert result.failed == 0
     assert result.attempted > 3
+
+
+def test_the_example_of_the_note_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It checks the four cases' errors itself; C in float32 keeps the exact inverse's error."""
+    example = Path(__file__).parents[1] / "examples" / "note" / "closed_loop.py"
+    runpy.run_path(str(example))["make"](tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["figure_15.svg", "figure_16.svg"]
+    lines = {line[2:42].strip(): line.split()[-3:] for line in capsys.readouterr().out.splitlines()}
+    assert lines["emitted C, float32"] == lines["exact inverse"] == ["0.1357", "0.0960", "0.0000"]
