@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from recordings import part_of_file
+from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
 from hystgen.diagnosis import floor, selection
@@ -139,6 +139,28 @@ class TestNoise:
         assert selection.difference(before, less) < 1e-6
         assert selection.difference(before, same) > 1e-3
         assert selection.difference(less, before) > 0.9
+
+
+def test_what_shows_in_held_out_records_alone(tmp_path: Path) -> None:
+    """Only the steps of the held-out record are faster than the amplifier."""
+    rest = np.zeros(40)  # the memory is known
+    slow = [np.concatenate([rest, wander(seed, turns=40)]) for seed in (1, 2)]
+    steps = np.concatenate([rest, np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
+    records = []
+    for number, v in enumerate((*slow, steps)):
+        a = v.copy()
+        for k in range(1, len(a)):
+            a[k] = a[k - 1] + np.clip(v[k] - a[k - 1], -7.0, 7.0)  # 7000 a second
+        y = noisy(brute_output(a, (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0), 0.05, number)
+        records.append(record(v, y, f"record {number}"))
+    found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0])
+    assert [effect["name"] for effect in found.content["effects"]] == ["slew_limit"]
+    assert found.content["effects"][0]["parameters"]["rate"] == pytest.approx(7000.0, rel=1e-3)
+    gap = found.content["gap"]
+    assert gap["after"]["holdout"] < 0.05 * gap["refitted"]["holdout"]
+    assert any("shows in held-out records alone (record 2)" in note for note in found.notes)
+    content = hystgen.diagnose(_model(tmp_path), records[1:], holdout=records[:1], history=[0.0])
+    assert not any("alone" in note for note in content.notes)
 
 
 def test_no_records_to_judge_by(tmp_path: Path) -> None:
