@@ -143,9 +143,8 @@ class TestNoise:
 
 def test_what_shows_in_held_out_records_alone(tmp_path: Path) -> None:
     """Only the steps of the held-out record are faster than the amplifier."""
-    rest = np.zeros(40)  # the memory is known
-    slow = [np.concatenate([rest, wander(seed, turns=40)]) for seed in (1, 2)]
-    steps = np.concatenate([rest, np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
+    slow = [np.concatenate([np.linspace(0.0, v[0], 40), v]) for v in (wander(seed, turns=40) for seed in (1, 2))]
+    steps = np.concatenate([np.zeros(40), np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
     records = []
     for number, v in enumerate((*slow, steps)):
         a = v.copy()
