@@ -34,9 +34,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-AT_NOISE, ELSEWHERE = 2.0, 2.0
-"""What is missing shows in held-out records alone where the others leave less than so many times the noise, and these
-so many times as much as they."""
+ELSEWHERE = 3.0
+"""What is missing shows in held-out records alone where these leave so many times what the fitted ones do."""
 
 ENOUGH = 100
 """Samples that have to be left of a record when wrong ones are taken out."""
@@ -182,9 +181,8 @@ def _without_faults(ready: believed.Prepared) -> believed.Prepared:
 
 
 def _shows_elsewhere(refitted: Fitted, ready: believed.Prepared, noise: float) -> bool:
-    """Whether the refitted model leaves nothing but noise where it was fitted, and far more on held-out records."""
-    left = structure.rms(refitted.errors(ready.held))
-    return refitted.rms < AT_NOISE * noise and left > ELSEWHERE * max(refitted.rms, noise)
+    """Whether the refitted model leaves far more on held-out records than where it was fitted, noise aside."""
+    return structure.rms(refitted.errors(ready.held)) > ELSEWHERE * max(refitted.rms, noise)
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
