@@ -505,7 +505,9 @@ class _Curve:
 
     def _fit(self, a: int, b: int) -> tuple[_Piece, float]:
         if b - a == 1:
-            return _Piece(a, 30, (round(self.function(float(a))), *(0,) * self.degree)), 0.0
+            first = round(self.function(float(a)))
+            kept = _kept(first)
+            return _Piece(a, 30, (kept, *(0,) * self.degree)), float(abs(first - kept))
         scale = 31 - (b - a).bit_length()
         whole = float(2 ** (31 - scale))
         length = (b - 1 - a) / whole  # the last argument, in the variable of the polynomial
@@ -519,7 +521,7 @@ class _Curve:
                 value = coefficient + h * value
             miss = max(miss, abs(self.function(a + h * whole) - value))
         first, *others = map(round, c)
-        kept = min(max(first, -TABLE_MAX), TABLE_MAX)  # the last code of the type, which rounding can pass
+        kept = _kept(first)
         return _Piece(a, scale, (kept, *others)), miss + abs(first - kept)
 
     def at(self, x: int) -> int:
@@ -530,6 +532,11 @@ class _Curve:
         for c in reversed(piece.coefficients):
             y = c + ((y * h + fixed.HALF) >> 31)
         return y
+
+
+def _kept(value: int) -> int:
+    """The nearest number of the tables' type: rounding at an end of the drive's range can pass its last code."""
+    return min(max(value, -TABLE_MAX), TABLE_MAX)
 
 
 SAMPLES = 25  # of the error of a piece, both ends among them

@@ -232,3 +232,14 @@ def test_simulating_on_the_command_line_speaks_of_codes(tmp_path: Path) -> None:
         done = CliRunner().invoke(main, [*words, *extra])
         assert done.exit_code == 2
         assert "fixed point takes codes, whole numbers from -32768 to 32767" in done.stderr
+
+
+def test_no_entry_of_a_curve_passes_its_type() -> None:
+    """Branches so close that the inverse of one passes the end of the drive's range, the last code, by some codes."""
+    up, down = (3016.367098, 0.0009851513036, -0.04454608924, 134.2785509), (
+        3016.461353, 0.0009842729487, 0.04718115382, 131.2839223
+    )  # fmt: skip
+    pi = PI([0.0, 637.5, 1133.33], [158.9869585, 49.79632194, 302.9958729])
+    numbers, _ = built(Cascade(pi, (TanhEnvelope(up, down),), -68125.91212, (-3000.0, 3000.0)), "q31")
+    assert len(numbers.coefficient) > 100
+    assert np.abs(numbers.coefficient).max() <= 2**31 - 1
