@@ -1,0 +1,39 @@
+"""Hysteretic plants to compensate, other than Prandtl-Ishlinskii models: for examples and tests.
+
+All of them are rate-independent, so that `simulate(v)` takes the input samples alone and no time: between two samples
+the input moves straight, and how fast it does changes nothing. Every call starts anew from the start state that the
+plant was made with, and goes from there to the first sample in one move.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+PLANTS = {
+    "BoucWen": "bouc_wen",
+    "Dahl": "duhem",
+    "Duhem": "duhem",
+    "JilesAtherton": "jiles_atherton",
+    "KrasnoselskiiPokrovskii": "krasnoselskii_pokrovskii",
+    "MaxwellSlip": "maxwell_slip",
+    "Preisach": "preisach",
+}
+"""Plants by name, each with the module that it is imported from when it is first used."""
+
+__all__ = [*PLANTS, "PLANTS"]  # noqa: PLE0604, the keys are strings
+
+if TYPE_CHECKING:
+    from hystgen.plants.bouc_wen import BoucWen as BoucWen
+    from hystgen.plants.duhem import Dahl as Dahl
+    from hystgen.plants.duhem import Duhem as Duhem
+    from hystgen.plants.jiles_atherton import JilesAtherton as JilesAtherton
+    from hystgen.plants.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii as KrasnoselskiiPokrovskii
+    from hystgen.plants.maxwell_slip import MaxwellSlip as MaxwellSlip
+    from hystgen.plants.preisach import Preisach as Preisach
+
+
+def __getattr__(name: str) -> Any:
+    if name not in PLANTS:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{PLANTS[name]}"), name)

@@ -1,0 +1,83 @@
+"""Jiles-Atherton: magnetization of a ferromagnet over the field."""
+
+from __future__ import annotations
+
+import functools
+import math
+import types
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from hystgen import compiled
+from hystgen.plants import integration
+from hystgen.plants.checks import Array, positive, signal
+
+
+def langevin(x: float) -> float:
+    if abs(x) < 0.05:  # the difference loses digits, the series is exact to rounding
+        return x * (1.0 / 3.0 - x * x * (1.0 / 45.0 - x * x * (2.0 / 945.0 - x * x / 4725.0)))
+    return 1.0 / math.tanh(x) - 1.0 / x
+
+
+def langevin_slope(x: float) -> float:
+    if abs(x) < 0.05:
+        return 1.0 / 3.0 - x * x * (1.0 / 15.0 - x * x * (2.0 / 189.0 - x * x / 675.0))
+    if abs(x) > 40.0:  # the other term is below rounding, and further on it overflows
+        return 1.0 / (x * x)
+    return 1.0 / (x * x) - 1.0 / math.sinh(x) ** 2
+
+
+def rate(v: float, y: float, rising: bool, p: tuple[float, ...]) -> float:
+    saturation, a, coupling, k, c = p
+    argument = (v + coupling * y) / a
+    apart = saturation * langevin(argument) - y
+    reversible = c * saturation / a * langevin_slope(argument)
+    pinned = 0.0
+    if apart > 0.0 if rising else apart < 0.0:
+        pinned = (1.0 - c) * abs(apart) / ((1.0 - c) * k - coupling * abs(apart))
+    return (pinned + reversible) / (1.0 - coupling * reversible)
+
+
+@functools.cache
+def _compiled() -> types.SimpleNamespace:
+    return compiled.compile_together([langevin, langevin_slope, rate, integration.integrate])
+
+
+@dataclass(frozen=True)
+class JilesAtherton:
+    """Magnetization M over the field H, with `H_e = H + alpha M` and `M_an = M_s (coth(H_e/a) - a/H_e)`.
+
+    `dM/dH = (1 - c) dM_irr/dH + c dM_an/dH`, `dM_irr/dH = (M_an - M_irr) / (k sgn(dH) - alpha (M_an - M_irr))`,
+    `M = (1 - c) M_irr + c M_an`. `Ms`, `a`, `k` > 0 in the unit of the field (A/m); `alpha` >= 0 and 0 <= `c` < 1 plain
+    numbers. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which is not
+    physical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of nonlinear
+    inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, and for alpha M_s >= 3 a, with
+    which the anhysteretic curve is no function. In sub-steps of the tolerance in `integration`. Sources: D. C. Jiles,
+    D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn. Mater. 61, 1986; D. C. Jiles, J. B. Thoelke,
+    M. K. Devine, Numerical determination of hysteresis parameters, IEEE Trans. Magn. 28, 1992 (this form).
+    """
+
+    Ms: float
+    a: float
+    k: float
+    alpha: float = 0.0
+    c: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive(Ms=self.Ms, a=self.a, k=self.k)
+        if not 0.0 <= self.c < 1.0:
+            raise ValueError(f"c has to be at least 0 and below 1, not {self.c}")
+        if not 0.0 <= self.alpha * self.Ms < 3.0 * self.a:
+            raise ValueError(
+                f"alpha has to be at least 0 and below 3 a / Ms = {3.0 * self.a / self.Ms:.6g}, not {self.alpha}"
+            )
+
+    def simulate(self, v: ArrayLike) -> Array:
+        """Magnetization M (N,) at the fields `v` (N,), both in A/m; needs no time."""
+        samples = signal(v)
+        out = np.empty_like(samples)
+        p = tuple(float(x) for x in (self.Ms, self.a, self.alpha, self.k, self.c))
+        _compiled().integrate(samples, 0.0, 0.0, p, float(self.Ms), out)
+        return out
