@@ -85,14 +85,14 @@ def integrate(v: Array, v0: float, y0: float, p: tuple[Any, ...], scale: float, 
                 - k7 / 40.0
             )
             share = error / (RTOL * max(abs(y), abs(new)) + ATOL * scale)
+            if not share < np.inf and size <= least:  # it ran away
+                for rest in range(k, len(v)):
+                    out[rest] = np.nan
+                return
             if share <= 1.0 or size <= least:
                 y = new
                 left -= size
                 x = x + h if left > 0.0 else end
-            elif not share < np.inf and size <= 10.0 * least:  # it ran away
-                for rest in range(k, len(v)):
-                    out[rest] = np.nan
-                return
             # a share that is no number, after an overflow, has to shrink the step too
             factor = 0.1
             if share < 1e-5:

@@ -1,0 +1,530 @@
+"""The plants of `hystgen.plants`: against other integrators, brute force, and what their literature says of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+
+from hystgen import plants
+from hystgen.models import PI
+from hystgen.plants.jiles_atherton import langevin, langevin_slope
+from hystgen.plants.preisach import EverettTable
+
+Array = NDArray[np.float64]
+EPS = float(np.finfo(np.float64).eps)
+
+CORNERS = [0.0, 3.0, -2.0, 1.5, -0.5, 1.0, 0.2, 2.5, -4.0, 4.0, 0.0, 3.5, 3.5, 1.0, -1.0]
+
+
+def path(corners: list[float] = CORNERS, samples: int = 25) -> Array:
+    """Straight between the corners, each of which is a sample."""
+    return np.concatenate([np.linspace(a, b, samples, endpoint=False) for a, b in pairwise(corners)] + [corners[-1:]])
+
+
+def over_input(slope: Callable[[float, float, float], float], v: Array, start: float, atol: float) -> Array:
+    """State at the samples by scipy, one move between samples at a time; slope(v, y, direction)."""
+    states, y, last = [], start, 0.0
+    for x in v:
+        if x != last:
+            sign = math.copysign(1.0, x - last)
+            found = solve_ivp(
+                lambda u, s, sign=sign: [slope(u, s[0], sign)], (last, x), [y], method="DOP853", rtol=1e-11, atol=atol
+            )
+            y = float(found.y[0, -1])
+        states.append(y)
+        last = x
+    return np.array(states)
+
+
+# -- all of them -------------------------------------------------------------------------------------------------------
+
+SURFACE = EverettTable.of_density(np.linspace(-5.0, 5.0, 41).tolist(), lambda a, b: np.exp(b - a - (a + b) ** 2 / 20))
+EVERY: dict[str, Any] = {
+    "BoucWen": plants.BoucWen(1.5, 2.0, D=1.3),
+    "Dahl": plants.Dahl(2.0, 1.5),
+    "Duhem": plants.Duhem.coleman_hodgdon(0.7, lambda v: 2.0 * math.tanh(v), lambda v: 0.5),
+    "JilesAtherton": plants.JilesAtherton(2.0, 1.0, 0.8, 0.5, 0.2),
+    "KrasnoselskiiPokrovskii": plants.KrasnoselskiiPokrovskii.on_grid(-5.0, 5.0, 12, lambda p1, p2: np.exp(p1 - p2)),
+    "MaxwellSlip": plants.MaxwellSlip([1.0, 2.0], [0.5, 3.0], 0.5),
+    "Preisach": plants.Preisach(SURFACE, -5.0, 5.0),
+}
+
+
+def test_the_registry_holds_every_plant() -> None:
+    assert sorted(EVERY) == sorted(plants.PLANTS)
+    for name, plant in EVERY.items():
+        assert type(plant) is getattr(plants, name)
+    with pytest.raises(AttributeError, match="no attribute 'Ising'"):
+        plants.Ising  # noqa: B018
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_only_the_corners_of_the_input_matter(name: str) -> None:
+    """Rate independence: any sampling between the same corners gives the same output at them."""
+    coarse = EVERY[name].simulate(CORNERS)
+    fine = EVERY[name].simulate(path(samples=37))[::37]
+    repeated = EVERY[name].simulate(np.repeat(CORNERS, 3))[2::3]
+    # sub-steps of 1e-10, and fewer than 100 of them a move
+    np.testing.assert_allclose(fine, coarse, rtol=0, atol=1e-7 * np.ptp(coarse))
+    np.testing.assert_allclose(repeated, coarse, rtol=0, atol=1e-12 * np.ptp(coarse))
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_inputs_that_are_none_are_refused(name: str) -> None:
+    assert EVERY[name].simulate([]).shape == (0,)
+    with pytest.raises(ValueError, match="finite"):
+        EVERY[name].simulate([0.0, math.nan])
+    with pytest.raises(ValueError, match="one dimension"):
+        EVERY[name].simulate(np.zeros((2, 2)))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: plants.BoucWen(-0.1, 1.0), "alpha has to be at least 0"),
+        (lambda: plants.BoucWen(0.5, 0.0), "k has to be positive"),
+        (lambda: plants.BoucWen(0.5, 1.0, n=0.9), "n has to be at least 1"),
+        (lambda: plants.BoucWen(0.5, 1.0, beta=0.3, gamma=0.4), "gamma has to be above -beta"),
+        (lambda: plants.BoucWen(0.5, 1.0, beta=0.3, gamma=-0.3), "gamma has to be above -beta"),
+        (lambda: plants.BoucWen(0.5, 1.0, start=1.1), "within the bound 1 of z"),
+        (lambda: plants.BoucWen(math.nan, 1.0), "alpha has to be a finite number"),
+        (lambda: plants.Dahl(1.0, 0.0), "limit has to be positive"),
+        (lambda: plants.Dahl(1.0, 1.0, -0.5), "exponent has to be at least 0"),
+        (lambda: plants.Dahl(1.0, 1.0, start=1.5), "within the limit 1.0"),
+        (lambda: plants.Duhem(min, max, scale=0.0), "scale has to be positive"),
+        (lambda: plants.Duhem.coleman_hodgdon(-1.0, math.tanh, math.tanh), "alpha has to be positive"),
+        (lambda: plants.Duhem(lambda v, y: y * y, lambda v, y: y * y, 1.0).simulate([2.0]), "runs away"),
+        (lambda: plants.MaxwellSlip([1.0], [1.0, 2.0]), "1 stiffnesses but 2 slip forces"),
+        (lambda: plants.MaxwellSlip([1.0], [0.0]), "have to be positive"),
+        (lambda: plants.MaxwellSlip([], []), "at least one"),
+        (lambda: plants.MaxwellSlip([1.0], [1.0], -1.0), "the spring not negative"),
+        (lambda: plants.Preisach(SURFACE, 1.0, 1.0), "has to be below high"),
+        (lambda: plants.Preisach(lambda a, b: a - b + 1.0, 0.0, 1.0), "0 for alpha = beta"),
+        (lambda: plants.Preisach(lambda a, b: (a - b) * (1.5 - (a - b)), 0.0, 1.0), "rises in alpha"),
+        (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0]]), "2 edges but 1 rows"),
+        (lambda: EverettTable([0.0, 0.0], [[0.0, 0.0]] * 2), "rise strictly"),
+        (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [0.0]]), "every row has 2 values"),
+        (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0], 0.0), "ramp has to be positive"),
+        (lambda: plants.KrasnoselskiiPokrovskii([2.0], [1.0], [1.0], 1.0), "not above its upper one"),
+        (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0, 2.0], 1.0), "but 2 weights"),
+        (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0], 1.0, 2.0), "between -1 and 1"),
+        (lambda: plants.KrasnoselskiiPokrovskii.on_grid(1.0, 0.0, 5, np.minimum), "low is below high"),
+        (lambda: plants.JilesAtherton(1.0, 0.0, 1.0), "a has to be positive"),
+        (lambda: plants.JilesAtherton(1.0, 1.0, 1.0, 0.0, 1.0), "c has to be at least 0 and below 1"),
+        (lambda: plants.JilesAtherton(1.0, 1.0, 1.0, 3.0), "below 3 a / Ms = 3"),
+    ],
+)
+def test_parameters_that_are_wrong_are_refused(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+# -- Bouc-Wen ----------------------------------------------------------------------------------------------------------
+
+BOUC_WEN = [(1.0, 0.5, 0.5), (1.0, 0.6, -0.3), (2.0, 0.6, 0.3), (2.0, 0.5, 0.5), (2.0, 0.4, -0.2), (1.7, 0.6, 0.3),
+            (4.0, 0.7, 0.1)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("n", "beta", "gamma"), BOUC_WEN)
+@pytest.mark.parametrize("pace", [1.0, 3.0])
+def test_bouc_wen_is_its_equation_in_time(n: float, beta: float, gamma: float, pace: float) -> None:
+    """`D z' = A v' - beta |v'| |z|^(n-1) z - gamma v' |z|^n` (Wen 1976), by scipy, at two paces that vary."""
+    amplitude, distance = 0.9, 1.3
+    plant = plants.BoucWen(0.3, 2.0, D=distance, A=amplitude, beta=beta, gamma=gamma, n=n, start=0.2)
+    corners = [0.0, 3.0, -2.0, 1.5, -0.5, 2.0]
+    z, expected = 0.2, [0.2]
+    for a, b in pairwise(corners):
+
+        def slope(t: float, state: Array, a: float = a, b: float = b) -> list[float]:
+            v_dot = (b - a) * 2.0 * t * pace**2  # v = a + (b - a) (pace t)^2
+            z = state[0]
+            return [
+                (amplitude * v_dot - beta * abs(v_dot) * abs(z) ** (n - 1.0) * z - gamma * v_dot * abs(z) ** n)
+                / distance
+            ]
+
+        found = solve_ivp(slope, (0.0, 1.0 / pace), [z], rtol=1e-11, atol=1e-13)
+        z = float(found.y[0, -1])
+        expected.append(z)
+    np.testing.assert_allclose(plant.hysteretic(corners), expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(
+        plant.simulate(corners), 0.3 * 2.0 * np.array(corners) + 0.7 * 2.0 * distance * np.array(expected), atol=1e-7
+    )
+
+
+@pytest.mark.parametrize(("n", "beta", "gamma"), BOUC_WEN)
+def test_bouc_wen_stays_in_its_bound_and_ends_in_its_limit_cycle(n: float, beta: float, gamma: float) -> None:
+    """|z| <= (A / (beta + gamma))^(1/n), and under a periodic input z ends between -z_m and z_m, where the way from one
+    to the other is as long as the input's (Ikhouane and Rodellar 2007, chapter 3)."""
+    amplitude, distance, swing = 1.1, 0.8, 1.9
+    plant = plants.BoucWen(0.5, 1.0, D=distance, A=amplitude, beta=beta, gamma=gamma, n=n)
+    bound = (amplitude / (beta + gamma)) ** (1.0 / n)
+    assert plant.bound == pytest.approx(bound, rel=1e-15)
+    far = plant.hysteretic([100.0, -100.0])
+    np.testing.assert_allclose(np.abs(far), bound, rtol=1e-9)
+    assert np.max(np.abs(plant.hysteretic(path(samples=200)))) <= bound * (1.0 + 4.0 * EPS)
+
+    def way(z: float) -> float:
+        back = quad(lambda x: 1.0 / (amplitude - (gamma - beta) * x**n), 0.0, z)[0]
+        return float(back + quad(lambda x: 1.0 / (amplitude - (gamma + beta) * x**n), 0.0, z)[0])
+
+    limit = brentq(lambda z: way(z) - swing / distance, 0.0, bound * (1.0 - 1e-9), xtol=1e-13)
+    z = plant.hysteretic([5.0, 0.3, *[0.3 + swing, 0.3] * 60])
+    np.testing.assert_allclose(z[-2:], [limit, -limit], rtol=0, atol=1e-7)
+
+
+# -- Duhem and Dahl ----------------------------------------------------------------------------------------------------
+
+
+def test_dahl_is_an_exponential_for_exponent_one() -> None:
+    sigma, limit = 2.0, 1.5
+    force, last, expected = 0.3, 0.0, []
+    for x in path():
+        end = math.copysign(limit, x - last)
+        force = end + (force - end) * math.exp(-sigma * abs(x - last) / limit)
+        last = x
+        expected.append(force)
+    np.testing.assert_allclose(plants.Dahl(sigma, limit, 1.0, 0.3).simulate(path()), expected, rtol=0, atol=1e-12)
+
+
+def test_dahl_is_the_stop_operator_for_exponent_zero() -> None:
+    """Elastic up to the limit, then sliding: `F_k = clip(F_(k-1) + sigma dv, -F_c, F_c)`."""
+    force, last, expected = 0.0, 0.0, []
+    for x in path():
+        force = min(max(force + 2.0 * (x - last), -1.5), 1.5)
+        last = x
+        expected.append(force)
+    np.testing.assert_allclose(plants.Dahl(2.0, 1.5, 0.0).simulate(path()), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5, 2.0, 3.0])
+def test_dahl_is_a_duhem_model(exponent: float) -> None:
+    """The closed form against its equation, by the general integrator and by scipy."""
+    sigma, limit = 2.0, 1.5
+
+    def slope(force: float, sign: float) -> float:
+        return float(sigma * max(1.0 - sign * force / limit, 0.0) ** exponent)
+
+    v = path(samples=12)
+    exact = plants.Dahl(sigma, limit, exponent).simulate(v)
+    duhem = plants.Duhem(lambda _, f: slope(f, 1.0), lambda _, f: slope(f, -1.0), scale=limit)
+    np.testing.assert_allclose(duhem.simulate(v), exact, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(over_input(lambda _, f, s: slope(f, s), v, 0.0, 1e-13), exact, rtol=0, atol=1e-7)
+    assert np.max(np.abs(exact)) <= limit
+
+
+def test_duhem_is_its_equation() -> None:
+    v = path(samples=12)
+
+    def rising(x: float, y: float) -> float:
+        return 1.0 / (1.0 + x * x) + 0.5 * math.cos(x) - 0.4 * y
+
+    def falling(x: float, y: float) -> float:
+        return 0.8 + 0.3 * y - 0.1 * x
+
+    expected = over_input(lambda x, y, s: rising(x, y) if s > 0 else falling(x, y), v, 0.4, 1e-12)
+    found = plants.Duhem(rising, falling, 0.4).simulate(v)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
+
+
+def test_coleman_and_hodgdon_have_their_closed_form() -> None:
+    """With f = b v and g = c, `y = b v -/+ (b - c) / alpha` is what every long rise (-) or fall (+) ends in."""
+    alpha, b, c = 0.8, 1.5, 0.6
+    plant = plants.Duhem.coleman_hodgdon(alpha, lambda v: b * v, lambda v: c)
+    y, last, expected = 0.0, 0.0, []
+    for x in path():
+        sign = math.copysign(1.0, x - last)
+        gap = y - b * last + sign * (b - c) / alpha
+        y = b * x - sign * (b - c) / alpha + gap * math.exp(-alpha * abs(x - last))
+        last = x
+        expected.append(y)
+    np.testing.assert_allclose(plant.simulate(path()), expected, rtol=0, atol=1e-8)
+
+
+# -- Maxwell-slip ------------------------------------------------------------------------------------------------------
+
+
+def test_maxwell_slip_is_every_element_for_itself_and_a_play_sum() -> None:
+    """Elements as blocks dragged by springs; two share a yield way, so that the play sum has one play fewer."""
+    stiffnesses, slips, spring = [1.0, 0.5, 2.0, 0.7], [0.4, 0.9, 3.6, 2.0], 0.3
+    v = path(samples=60)
+    blocks, expected = np.zeros(4), []
+    for x in v:
+        for i in range(4):
+            reach = slips[i] / stiffnesses[i]
+            if x - blocks[i] > reach:
+                blocks[i] = x - reach
+            elif x - blocks[i] < -reach:
+                blocks[i] = x + reach
+        expected.append(spring * x + sum(k * (x - block) for k, block in zip(stiffnesses, blocks, strict=True)))
+    plant = plants.MaxwellSlip(stiffnesses, slips, spring)
+    pi = plant.play_sum()
+    assert pi.n == 3
+    assert pi.slopes[-1] == pytest.approx(spring, rel=1e-14)
+    # a stop adds up steps, each rounded once or twice at the size of the input and threshold
+    bound = len(v) * 2.0 * EPS * (np.max(np.abs(v)) + 2.0 / 0.7) * (sum(stiffnesses) + spring)
+    np.testing.assert_allclose(plant.simulate(v), expected, rtol=0, atol=bound)
+    np.testing.assert_allclose(pi.simulate(v), expected, rtol=0, atol=bound)
+
+
+# -- Preisach ----------------------------------------------------------------------------------------------------------
+
+
+def relays(v: Array, alpha: Array, beta: Array, weights: Array) -> Array:
+    """Relays one by one, all down before the first sample."""
+    up = np.zeros(len(alpha), dtype=bool)
+    found = []
+    for x in v:
+        up = (up | (x >= alpha)) & ~(x <= beta)
+        found.append(float(weights[up].sum()))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_preisach_is_a_sum_of_relays(seed: int) -> None:
+    """Exactly, for the Everett surface of relays at random places, along a random walk that also leaves the range."""
+    rng = np.random.default_rng(seed)
+    places = np.sort(rng.uniform(-3.0, 3.0, (400, 2)))
+    beta, alpha = places[:, 0], places[:, 1]
+    weights = rng.uniform(0.0, 1.0, 400)
+
+    def everett(a: Array, b: Array) -> Array:
+        return np.asarray(((alpha <= a[..., None]) & (beta >= b[..., None])) @ weights)
+
+    v = np.concatenate([rng.uniform(-3.5, 3.5, 300), np.cumsum(rng.normal(0.0, 0.4, 700)), path(), [9.0, 0.0, -9.0, 0.3]])
+    found = plants.Preisach(everett, -3.0, 3.0).simulate(v)
+    # every sum of a surface is rounded, and a corner stands on at most as many others as there are relays
+    np.testing.assert_allclose(found, relays(v, alpha, beta, weights), rtol=0, atol=400 * 400 * EPS)
+
+
+def test_preisach_is_a_play_sum_for_its_everett_surface() -> None:
+    """`E(a, b) = sum p_i max(a - b - 2 r_i, 0)`; all relays down are plays after a fall from far to the lowest input."""
+    r, p = [0.0, 0.5, 1.1, 2.3], [0.7, 0.5, 0.3, 0.9]
+
+    def everett(a: Array, b: Array) -> Array:
+        return np.asarray(sum(w * np.maximum(a - b - 2.0 * t, 0.0) for w, t in zip(p, r, strict=True)))
+
+    low = -6.0
+    start = [low + t for t in r]
+    plant = plants.Preisach(everett, low, 6.0, offset=sum(w * s for w, s in zip(p, start, strict=True)))
+    v = path(samples=40)
+    np.testing.assert_allclose(plant.simulate(v), PI(r, p, start).simulate(v), rtol=0, atol=100 * EPS * 6.0 * sum(p))
+
+
+def test_preisach_wipes_out_and_is_congruent() -> None:
+    """A passed extremum leaves nothing behind, and loops between the same inputs have the same shape whatever was
+    before, but not at another place (Mayergoyz 1991)."""
+    plant = EVERY["Preisach"]
+    tail = path([4.0, -2.0, 1.0], 20)
+    one, other = plant.simulate([3.0, -1.0, 2.0, 0.5, *tail]), plant.simulate([-4.5, 1.0, *tail])
+    np.testing.assert_allclose(one[-len(tail) :], other[-len(tail) :], rtol=0, atol=1e-14)
+
+    loop = path([0.5, 1.5, 0.5], 20)
+    shapes = [plant.simulate([*before, *loop])[-len(loop) :] for before in ([4.0], [4.0, -4.0, 1.5], [-1.0, 2.0, 0.0, 1.5])]
+    assert shapes[0][0] - shapes[1][0] > 0.1
+    for shape in shapes:
+        np.testing.assert_allclose(shape - shape[0], shapes[0] - shapes[0][0], rtol=0, atol=1e-14)
+    moved = plant.simulate([4.0, *(loop + 2.0)])[-len(loop) :]
+    assert np.ptp(moved) < 0.9 * np.ptp(shapes[0])
+
+
+def test_preisach_starts_after_its_history() -> None:
+    before = (3.0, -2.0, 1.0)
+    later = plants.Preisach(SURFACE, -5.0, 5.0, 0.7, before).simulate(path())
+    whole = plants.Preisach(SURFACE, -5.0, 5.0, 0.7).simulate([*before, *path()])
+    assert later.tolist() == whole[3:].tolist()
+
+
+def test_an_everett_table_is_the_integral_of_its_density() -> None:
+    """Exactly at the edges for a density that is constant in cells; bilinear between, and 0 on the diagonal."""
+    edges = [0.0, 1.0, 2.5, 3.0]
+
+    def density(alpha: Array, beta: Array) -> Array:
+        return np.where(alpha > 2.5, 2.0, 1.0) * np.where(beta < 1.0, 3.0, 1.0)
+
+    table = EverettTable.of_density(edges, density)
+
+    def at(alpha: float, beta: float) -> float:
+        return float(table(np.array([alpha]), np.array([beta]))[0])
+
+    assert at(1.0, 0.0) == pytest.approx(3.0 * 0.5)
+    assert at(2.5, 0.0) == pytest.approx(3.0 * 0.5 + 3.0 * 1.5 + 1.5**2 / 2.0)
+    assert at(3.0, 1.0) == pytest.approx(1.5**2 / 2.0 + 2.0 * 0.5 * 1.5 + 2.0 * 0.5**2 / 2.0)
+    assert at(2.0, 0.0) == pytest.approx(at(1.0, 0.0) + (at(2.5, 0.0) - at(1.0, 0.0)) / 1.5)
+    assert at(2.2, 2.2) == at(0.0, 0.0) == at(3.0, 3.0) == 0.0
+
+
+# -- Krasnosel'skii-Pokrovskii -----------------------------------------------------------------------------------------
+
+
+def kp_kernel(v: Array, p1: float, p2: float, ramp: float, start: float) -> Array:
+    """The definition (Banks, Kurdila and Webb 1997): what the last turn remembers against the ridge of the direction."""
+
+    def ridge(x: float) -> float:
+        return -1.0 if x < 0.0 else 1.0 if x > ramp else -1.0 + 2.0 * x / ramp
+
+    kept = min(max(start, ridge(v[0] - p2)), ridge(v[0] - p1))
+    found, rising, last = [kept], True, kept
+    for before, x in pairwise(v):
+        if x != before and (x > before) != rising:
+            rising, kept = x > before, last
+        last = max(kept, ridge(x - p2)) if rising else min(kept, ridge(x - p1))
+        found.append(last)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("start", [-1.0, 0.3])
+def test_kp_is_its_kernels(start: float) -> None:
+    rng = np.random.default_rng(5)
+    places = np.sort(rng.uniform(-4.0, 3.0, (60, 2)))
+    weights = rng.normal(size=60)
+    v = np.concatenate([path(), rng.uniform(-4.0, 4.0, 300)])
+    plant = plants.KrasnoselskiiPokrovskii(places[:, 0].tolist(), places[:, 1].tolist(), weights.tolist(), 0.8, start)
+    expected = sum(w * kp_kernel(v, a, b, 0.8, start) for w, (a, b) in zip(weights, places, strict=True))
+    np.testing.assert_allclose(plant.simulate(v), expected, rtol=0, atol=60 * 60 * EPS)
+
+
+def test_kp_with_narrow_ramps_is_preisach() -> None:
+    """Relays of -1 and 1; no sample lies in a ramp."""
+    rng = np.random.default_rng(6)
+    places = np.sort(rng.uniform(-3.0, 3.0, (80, 2)))
+    weights = rng.uniform(0.0, 1.0, 80)
+    ramp = 1e-6
+    v = rng.uniform(-3.2, 3.2, 1000)
+    assert np.min(np.abs(v[:, None] - places.ravel())) > ramp
+    plant = plants.KrasnoselskiiPokrovskii(places[:, 0].tolist(), places[:, 1].tolist(), weights.tolist(), ramp)
+    expected = 2.0 * relays(v, places[:, 1], places[:, 0], weights) - weights.sum()
+    np.testing.assert_allclose(plant.simulate(v), expected, rtol=0, atol=80 * 80 * EPS)
+
+
+def test_a_kp_kernel_with_a_wide_ramp_is_a_play() -> None:
+    """Inside its ramp: `2 / ramp` times the play of threshold (p_2 - p_1) / 2 about the middle."""
+    p1, p2, ramp = -6.0, -4.4, 12.0
+    v = path()
+    middle, r = (p1 + p2 + ramp) / 2.0, (p2 - p1) / 2.0
+    state, expected = -math.inf, []
+    for x in v - middle:
+        state = max(x - r, min(x + r, state))
+        expected.append(2.0 / ramp * state)
+    found = plants.KrasnoselskiiPokrovskii([p1], [p2], [1.0], ramp).simulate(v)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+
+
+def test_a_grid_of_kp_kernels() -> None:
+    plant = plants.KrasnoselskiiPokrovskii.on_grid(0.0, 4.0, 4, lambda p1, p2: p2 - p1 + 1.0)
+    assert plant.ramp == 1.0
+    pairs = list(zip(plant.lower, plant.upper, plant.weights, strict=True))
+    assert len(pairs) == 10
+    assert (0.0, 3.0, 4.0) in pairs
+    assert plant.simulate([-1.0, 4.0]).tolist() == [-sum(plant.weights), sum(plant.weights)]
+
+
+# -- Jiles-Atherton ----------------------------------------------------------------------------------------------------
+
+# Parameters of Jiles and Atherton 1986, in A/m
+MS, A, K, ALPHA, C = 1.6e6, 1100.0, 400.0, 1.6e-3, 0.2
+IRON = plants.JilesAtherton(MS, A, K, ALPHA, C)
+
+
+def anhysteretic(field: float, magnetization: float, ms: float = MS, a: float = A, alpha: float = ALPHA) -> float:
+    x = (field + alpha * magnetization) / a
+    return ms * (1.0 / math.tanh(x) - 1.0 / x) if abs(x) > 1e-3 else ms * x / 3.0
+
+
+def test_langevin_has_all_its_digits() -> None:
+    """Against mpmath with 40 digits, on both sides of where the series takes over."""
+    import mpmath
+
+    with mpmath.workdps(40):
+        for x in (1e-9, 1e-3, 0.02, 0.0499, 0.0501, 0.3, 2.0, 39.0, 41.0, 1e4):
+            exact = mpmath.coth(x) - 1 / mpmath.mpf(x)
+            slope = 1 / mpmath.mpf(x) ** 2 - 1 / mpmath.sinh(x) ** 2
+            # where the difference is taken it cancels to x / 3: 3 / x^2 roundings
+            slack = 4.0 * EPS * (1.0 + 3.0 / max(x, 0.05) ** 2)
+            for sign in (1.0, -1.0):
+                assert abs(langevin(sign * x) - sign * exact) <= slack * abs(exact)
+                assert abs(langevin_slope(sign * x) - slope) <= slack * slope
+    assert langevin(0.0) == 0.0
+    assert langevin_slope(0.0) == 1.0 / 3.0
+
+
+def test_jiles_atherton_is_its_equations() -> None:
+    """M_irr by scipy and M from `M = (1 - c) M_irr + c M_an(H + alpha M)` by root finding, instead of dM/dH."""
+
+    def total(field: float, irreversible: float) -> float:
+        return float(
+            brentq(
+                lambda m: (1.0 - C) * irreversible + C * anhysteretic(field, m) - m, -1.1 * MS, 1.1 * MS, xtol=1e-6
+            )
+        )
+
+    def slope(field: float, irreversible: float, sign: float) -> float:
+        apart = anhysteretic(field, total(field, irreversible)) - irreversible
+        return apart / (sign * K - ALPHA * apart) if sign * apart > 0.0 else 0.0
+
+    v = path([0.0, 2000.0, -3000.0, 1500.0, -200.0, 900.0, 0.0], 8)
+    irreversible = over_input(slope, v, 0.0, 1e-4)
+    expected = [total(x, m) for x, m in zip(v, irreversible, strict=True)]
+    # the root and its kink under the guard limit scipy here to about 1e-7 of M_s
+    np.testing.assert_allclose(IRON.simulate(v), expected, rtol=0, atol=1e-6 * MS)
+
+
+def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibility() -> None:
+    """The relations of Jiles, Thoelke and Devine 1992 between k and what is read from a loop.
+
+    At the coercive field, with its slope X: `k = M_an/(1-c) (alpha + (1-c) / (X - c dM_an/dH))`; at the remanence
+    `M_r = M_an + k / (alpha/(1-c) + 1 / (X - c dM_an/dH))`; at the origin dM/dH = c dM_an/dH, about c M_s / 3a.
+    """
+    field = np.concatenate([path([0.0, 20000.0, -20000.0], 40000), path([-20000.0, 20000.0], 40000)])
+    m = IRON.simulate(field)
+    rise, h = m[-40001:], field[-40001:]
+
+    def slopes(k: int) -> tuple[float, float]:
+        curve = [anhysteretic(float(h[j]), float(rise[j])) for j in (k - 1, k + 1)]
+        return (rise[k + 1] - rise[k - 1]) / (h[k + 1] - h[k - 1]), (curve[1] - curve[0]) / (h[k + 1] - h[k - 1])
+
+    at_zero = int(np.argmin(np.abs(rise)))
+    x, reversible = slopes(at_zero)
+    middle = float(rise[at_zero])
+    m_an = (anhysteretic(float(h[at_zero]), middle) - middle) / (1.0 - C)
+    assert m_an * (ALPHA + (1.0 - C) / (x - C * reversible)) == pytest.approx(K, rel=1e-3)
+    assert 0.0 < h[at_zero] < 1.5 * K
+
+    without = int(np.argmin(np.abs(h)))
+    x, reversible = slopes(without)
+    m_r = float(rise[without])
+    # rising through the field 0 the remanence is negative, and so are M_an and the term of k
+    expected = anhysteretic(0.0, m_r) - K / (ALPHA / (1.0 - C) + 1.0 / (x - C * reversible))
+    assert m_r < -0.1 * MS
+    assert m_r == pytest.approx(expected, rel=1e-3)
+
+    first = IRON.simulate([1e-3])[0] / 1e-3
+    reversible = C * MS / (3.0 * A)
+    assert first == pytest.approx(reversible / (1.0 - ALPHA * reversible), rel=1e-4)
+
+
+def test_jiles_atherton_without_pinning_is_anhysteretic() -> None:
+    """`|M - M_an| <= k dM/dH`, so nothing is left as k goes to 0; initial slope `M_s / (3 a - alpha M_s)` (1992)."""
+    k = 0.05
+    plant = plants.JilesAtherton(MS, A, k, ALPHA, C)
+    v = path([0.0, 4000.0, -4000.0, 1000.0], 400)
+    m = plant.simulate(v)
+    steepest = MS / (3.0 * A - ALPHA * MS)
+    gap = np.abs([anhysteretic(float(x), float(y)) - y for x, y in zip(v, m, strict=True)])
+    assert gap.max() > 0.0
+    assert np.all(gap <= k * steepest)
+    assert plant.simulate([20.0])[0] / 20.0 == pytest.approx(steepest, rel=3.0 * k / 20.0)
+
+
+def test_jiles_atherton_never_has_a_negative_slope() -> None:
+    """The guard of Deane 1994: without it M goes on rising after the field has turned."""
+    field = path([0.0, 1500.0, 800.0, 1500.0, -1500.0, 200.0], 300)
+    assert np.all(np.diff(IRON.simulate(field)) * np.diff(field) >= 0.0)
