@@ -1,4 +1,4 @@
-"""How well a PI or GPI inverse, as compiled C, linearises plants that are not PI models, and where it stops being enough.
+"""How well a PI or GPI inverse, as compiled C, linearises other hysteretic plants, and where it stops being enough.
 
 For every plant: a training and a held-out record are simulated, `hystgen.identify` chooses among its models, the
 compensator is emitted as C, compiled on this machine and run in front of the plant along a reference that is in
@@ -10,12 +10,14 @@ Usage: python examples/compensate_plants.py [-o FOLDER]
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
 import ctypes
+import itertools
 import tempfile
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,10 +41,12 @@ Array = NDArray[np.float64]
 
 SAMPLES = 1500  # of one part of a record
 
+PLAYS = np.array([[0.0, 4.0, 9.0, 16.0, 26.0], [0.10, 0.03, 0.025, 0.02, 0.015]])  # thresholds and weights
+
 
 @dataclass(frozen=True)
 class Case:
-    """A plant, the drive range it is used in, and whether it leads.
+    """A plant, the drive range it is used in, whether it leads, and the thresholds of a play sum where they are known.
 
     The output of a leading plant runs ahead of its input. As a play sum it would need negative weights, which
     `identify` does not give; but its inverse lags. So the records are handed over with input and output exchanged, and
@@ -52,13 +56,14 @@ class Case:
     name: str
     plant: Callable[[Array], Array]
     drive: tuple[float, float]
-    leads: bool
-    remark: str
+    leads: bool = False
+    thresholds: tuple[float, ...] | None = None
+    remark: str = ""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What was measured of a case; errors in % of the training record's output range."""
+    """What was measured of a case; errors in % of the training record's range of what is predicted or controlled."""
 
     case: Case
     model: str
@@ -76,7 +81,7 @@ class Result:
 
 def play_surface(alpha: Array, beta: Array) -> Array:
     """Everett surface of a play sum: it depends on alpha - beta alone."""
-    thresholds, weights = np.array([0.0, 4.0, 9.0, 16.0, 26.0]), np.array([0.10, 0.03, 0.025, 0.02, 0.015])
+    thresholds, weights = PLAYS
     return np.asarray(np.maximum((alpha - beta)[..., None] - 2.0 * thresholds, 0.0) @ weights)
 
 
@@ -97,26 +102,30 @@ def cases() -> list[Case]:
     ramps = KrasnoselskiiPokrovskii.on_grid(0.0, 100.0, 40, lambda p1, p2: bell(p2, p1))
     magnet = JilesAtherton(Ms=1.6e6, a=1100.0, k=400.0, alpha=1.6e-3, c=0.2)
     volts = (0.0, 100.0)
+    plays = Case("Preisach, surface of a play sum", Preisach(play_surface, *volts).simulate, volts)
+    blocks = Case("Maxwell-slip", slip.simulate, (-6.0, 6.0), leads=True)
+    inside = tuple(slip.play_sum().inverse().thresholds[1:])
+    apart = "minor loops stay open and depend on what was before"
+    place = "congruent, but loops depend on the place, for which the front stands"
     return [
-        Case("Preisach, Everett surface of a play sum", Preisach(play_surface, *volts).simulate, volts, False,
-             "is a PI model: left are the thresholds that identification chose"),
-        Case("Maxwell-slip", slip.simulate, (-6.0, 6.0), True, "is a PI model, by exchange of input and output"),
-        Case("Dahl friction in a positioner", lambda v: 0.1 * v - friction.simulate(v), volts, False,
-             "the slope falls off exponentially from where the drive turned, whatever was before"),
-        Case("Bouc-Wen, alpha = 1.6", hardening.simulate, volts, False,
-             "as Dahl; minor loops neither close nor forget"),
-        Case("Bouc-Wen, alpha = 0.4", softening.simulate, volts, True, "as above, by exchange of input and output"),
-        Case("Duhem, Coleman-Hodgdon", lagging.simulate, volts, False, "as Dahl, and its slope grows with the drive"),
-        Case("Preisach, bell-shaped density", relays.simulate, volts, False, "loops depend on the place"),
-        Case("Krasnosel'skii-Pokrovskii", ramps.simulate, volts, False, "loops depend on the place"),
-        Case("Jiles-Atherton", magnet.simulate, (-3000.0, 3000.0), False, "saturates"),
+        replace(plays, remark="a PI model, but for the thresholds that were chosen"),
+        replace(plays, thresholds=tuple(PLAYS[0][1:].tolist()), remark="a PI model, its thresholds given"),
+        replace(blocks, remark="a PI model by exchange of input and output, but for the thresholds"),
+        replace(blocks, thresholds=inside, remark="a PI model by exchange, its thresholds given"),
+        Case("Dahl friction in a positioner", lambda v: 0.1 * v - friction.simulate(v), volts, remark=apart),
+        Case("Bouc-Wen, alpha = 1.6", hardening.simulate, volts, remark=apart),
+        Case("Bouc-Wen, alpha = 0.4", softening.simulate, volts, leads=True, remark=apart + "; by exchange"),
+        Case("Duhem, Coleman-Hodgdon", lagging.simulate, volts, remark=apart),
+        Case("Preisach, bell-shaped density", relays.simulate, volts, remark=place),
+        Case("Krasnosel'skii-Pokrovskii", ramps.simulate, volts, remark=place),
+        Case("Jiles-Atherton", magnet.simulate, (-3000.0, 3000.0), remark="saturates, and minor loops stay open"),
     ]
 
 
 def moves(corners: list[float]) -> Array:
     """Half cosines from corner to corner, of shares of the drive range, as long as they go far."""
     parts = []
-    for start, stop in zip(corners, corners[1:], strict=False):
+    for start, stop in itertools.pairwise(corners):
         count = max(round(0.25 * SAMPLES * abs(stop - start)), 12)
         parts.append(start + (stop - start) * (0.5 - 0.5 * np.cos(np.pi * np.arange(count) / count)))
     return np.concatenate(parts)
@@ -124,8 +133,8 @@ def moves(corners: list[float]) -> Array:
 
 def training() -> Array:
     """Two full sweeps, loops of three sizes at three heights, and a sine that fades out, in shares of the range."""
-    loops = [0.5, 0.0, 1.0, 0.0, 1.0, 0.2, 0.8, 0.35, 0.65, 0.45, 0.55, 0.1, 0.4, 0.15, 0.35, 0.05, 0.95, 0.6, 0.9, 0.65,
-             0.85, 0.0, 1.0, 0.5]
+    loops = [0.5, 0.0, 1.0, 0.0, 1.0, 0.2, 0.8, 0.35, 0.65, 0.45, 0.55, 0.1, 0.4, 0.15, 0.35, 0.05, 0.95, 0.6, 0.9,
+             0.65, 0.85, 0.0, 1.0, 0.5]
     k = np.arange(3 * SAMPLES) / SAMPLES
     return np.concatenate([moves(loops), 0.5 + 0.5 * np.sin(2.0 * np.pi * 6.0 * k) * (1.0 - k / 3.0)])
 
@@ -143,7 +152,8 @@ def trajectory() -> tuple[Array, int]:
     The sweep forgets how plant and compensator started. What counts are three sines that swell and a staircase.
     """
     k = np.arange(3 * SAMPLES) / SAMPLES
-    sines = np.sin(2.0 * np.pi * 1.7 * k) + 0.6 * np.sin(2.0 * np.pi * 4.3 * k + 1.0) + 0.35 * np.sin(2.0 * np.pi * 9.7 * k)
+    turns = 2.0 * np.pi * k
+    sines = np.sin(1.7 * turns) + 0.6 * np.sin(4.3 * turns + 1.0) + 0.35 * np.sin(9.7 * turns)
     swelling = 0.5 + 0.45 * sines / np.max(np.abs(sines)) * (0.2 + 0.8 * k / 3.0)
     stairs = [float(swelling[-1]), 0.3, 0.4, 0.25, 0.7, 0.6, 0.85, 0.8, 0.9, 0.1, 0.2, 0.15, 0.5]
     before = moves([0.5, 1.0, 0.0, float(swelling[0])])
@@ -199,28 +209,25 @@ def in_c(model: hystgen.Model, operator: str, arithmetic: str, x: Array) -> Arra
 def memory(case: Case) -> tuple[float, float, float]:
     """Three things that are 0 for a play sum, of loops over a tenth of the drive range, in % of such a loop's height.
 
-    How much the height differs between three places; how much it differs with what was before, the approach from above
-    or from below; how far a loop's end is from its begin the first time.
+    How much the height differs between three places; how much in one place with what was before; how far a loop's end
+    is from its begin. The plants need no time, so that the corners are all of a drive.
     """
 
-    def cycle(before: list[float], centre: float) -> tuple[float, float]:
-        path = [0.5, *before, centre - 0.05, centre + 0.05, centre - 0.05]
-        y = case.plant(in_range(moves([*path, 0.5]), case.drive))
-        count = len(moves([0.0, 0.1]))
-        stop = len(y) - len(moves([path[-1], 0.5]))
-        return abs(float(y[stop - count] - y[stop])), float(y[stop] - y[stop - 2 * count])
+    def heights(corners: list[float]) -> tuple[float, float]:
+        y = case.plant(in_range(np.array([0.5, 0.0, *corners]), case.drive))
+        return abs(float(y[-1] - y[-2])), abs(float(y[-1] - y[-3]))
 
-    places = [cycle([0.0, 1.0, 0.0], centre)[0] for centre in (0.2, 0.5, 0.8)]
-    middle = places[1]
-    above, left_open = cycle([0.0, 1.0, 0.3, 0.5], 0.5)
+    places = [heights([1.0, centre - 0.05, centre + 0.05, centre - 0.05]) for centre in (0.2, 0.5, 0.8)]
+    others = [heights([*before, 0.45, 0.55, 0.45]) for before in ([1.0, 0.0, 0.6], [1.0, 0.3, 0.8])]
+    middle = places[1][0]
     return (
-        100.0 * (max(places) - min(places)) / middle,
-        100.0 * abs(above - middle) / middle,
-        100.0 * max(abs(left_open), abs(cycle([0.0, 1.0, 0.0], 0.5)[1])) / middle,
+        100.0 * (max(h for h, _ in places) - min(h for h, _ in places)) / middle,
+        100.0 * max(abs(h - middle) for h, _ in others) / middle,
+        100.0 * max(gap for _, gap in (*places, *others)) / middle,
     )
 
 
-def measure(case: Case, model: str = "auto") -> Result:
+def measure(case: Case) -> Result:
     """Identify, emit, compile and compensate one plant."""
 
     def record(name: str, shares: Array) -> Record:
@@ -229,10 +236,11 @@ def measure(case: Case, model: str = "auto") -> Result:
         return Record(name, np.arange(len(v)) * 1e-3, *((y, v) if case.leads else (v, y)), sample_time=1e-3)
 
     train, other = record("training", training()), record("held out", held_out())
-    fit = hystgen.identify(train, holdout=other, model=model, name="plant")
+    model = "pi" if case.thresholds else "auto"
+    fit = hystgen.identify(train, holdout=other, model=model, thresholds=case.thresholds, name="plant")
     identified = hystgen.Model(fit.parameters)
+    assert train.y is not None
     v, y = (train.y, train.v) if case.leads else (train.v, train.y)
-    assert v is not None and y is not None
     ends = float(np.min(y)), float(np.max(y))
     shares, first = trajectory()
     reference = in_range(shares, ends)
@@ -240,10 +248,8 @@ def measure(case: Case, model: str = "auto") -> Result:
     gain, offset = np.polyfit(v, y, 1)
     drives = {"scaled": np.clip((reference - offset) / gain, *case.drive)}
     drives["compensated"] = in_c(identified, operator, "float32", reference)
-    try:
+    with contextlib.suppress(hystgen.FormatError):
         drives["fixed point"] = in_c(identified, operator, "q31", reference)
-    except hystgen.FormatError:
-        pass
     outputs = {name: case.plant(np.clip(drive, *case.drive))[first:] for name, drive in drives.items()}
     wanted = reference[first:]
 
@@ -255,9 +261,9 @@ def measure(case: Case, model: str = "auto") -> Result:
     stages = fit.parameters.model.memoryless
     kind = {"dead_zone": "dead-zone front", "tanh": "tanh front"}[stages[0].kind] if stages else "PI"
     return Result(
-        case, kind, len(fit.parameters.model.pi.thresholds) - 1, 100.0 * seen.rms / (ends[1] - ends[0]), percent("scaled"),
-        percent("compensated"), percent("fixed point") if "fixed point" in outputs else None, *memory(case), wanted,
-        outputs,
+        case, kind, len(fit.parameters.model.pi.thresholds) - 1, 100.0 * seen.rms / float(np.ptp(train.y)),
+        percent("scaled"), percent("compensated"), percent("fixed point") if "fixed point" in outputs else None,
+        *memory(case), wanted, outputs,
     )  # fmt: skip
 
 
@@ -270,11 +276,11 @@ HEADER = (
 def row(result: Result) -> list[str]:
     """A result as text."""
     numbers = [result.held_out, *result.scaled, *result.compensated]
-    fixed = f"{result.fixed_point[0]:.3f}" if result.fixed_point else "refused"
+    fixed = f"{result.fixed_point[0]:.2g}" if result.fixed_point else "refused"
     traits = [result.place, result.history, result.open_loop]
     return [
-        result.case.name, result.model, str(result.plays), *(f"{x:.3f}" for x in numbers), fixed,
-        *(f"{x:.1f}" for x in traits), result.case.remark,
+        result.case.name, result.model, str(result.plays), *(f"{x:.2g}" for x in numbers), fixed,
+        *(f"{x:.2g}" if x >= 0.05 else "0" for x in traits), result.case.remark,
     ]  # fmt: skip
 
 
@@ -286,13 +292,14 @@ def table(results: list[Result]) -> str:
 
 
 def draw(results: list[Result], path: Path) -> None:
-    """Output over reference of every plant, without and with its compensator, with the errors below."""
+    """Output over reference of every plant, without and with its compensator."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
     columns = 3
+    results = [result for result in results if not result.case.thresholds]
     lines = -(-len(results) // columns)
     with pyplot.rc_context({"svg.hashsalt": "hystgen", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3}):
         figure, axes = pyplot.subplots(lines, columns, figsize=(10.0, 3.0 * lines), layout="constrained")
@@ -301,7 +308,7 @@ def draw(results: list[Result], path: Path) -> None:
             for name, colour, label in (("scaled", "#8a929c", "straight line"), ("compensated", "#c2410c", "C")):
                 shown = (np.array([result.reference, result.outputs[name]]) - span[0]) / (span[1] - span[0])
                 rms = result.scaled[0] if name == "scaled" else result.compensated[0]
-                axis.plot(*shown[:, ::4], color=colour, linewidth=0.8, label=f"{label}: {rms:.2g} % rms")
+                axis.plot(*shown[:, ::14], color=colour, linewidth=0.8, label=f"{label}: {rms:.2g} % rms")
             axis.set_title(result.case.name, loc="left")
             axis.legend(loc="upper left", frameon=False)
         for axis in axes.flat[len(results) :]:

@@ -21,7 +21,7 @@ PLANTS = {
 }
 """Plants by name, each with the module that it is imported from when it is first used."""
 
-__all__ = [*PLANTS, "PLANTS"]  # noqa: PLE0604, the keys are strings
+__all__ = [*PLANTS, "PLANTS"]
 
 if TYPE_CHECKING:
     from hystgen.plants.bouc_wen import BoucWen as BoucWen

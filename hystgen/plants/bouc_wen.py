@@ -18,11 +18,12 @@ from hystgen.plants.checks import Array, finite, positive, signal
 def rate(v: float, z: float, rising: bool, p: tuple[float, ...]) -> float:  # noqa: ARG001, the input does not enter
     amplitude, beta, gamma, exponent, distance = p
     along = z > 0.0 if rising else z < 0.0
-    return (amplitude - (gamma + (beta if along else -beta)) * abs(z) ** exponent) / distance
+    built: float = abs(z) ** exponent
+    return (amplitude - (gamma + (beta if along else -beta)) * built) / distance
 
 
 def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tuple[float, float]:
-    """The part of a move that undoes |z| = m > 0, `dm/ds = -A + c m^n` with c <= 0: |z| after it, and what is left of s.
+    """The part of a move that undoes |z| = m > 0, `dm/ds = -A + c m^n`, c <= 0: |z| after it, and what is left of s.
 
     n = 1 and 2 only.
     """

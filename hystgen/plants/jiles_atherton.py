@@ -53,8 +53,8 @@ class JilesAtherton:
     `M = (1 - c) M_irr + c M_an`. `Ms`, `a`, `k` > 0 in the unit of the field (A/m); `alpha` >= 0 and 0 <= `c` < 1 plain
     numbers. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which is not
     physical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of nonlinear
-    inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, and for alpha M_s >= 3 a, with
-    which the anhysteretic curve is no function. In sub-steps of the tolerance in `integration`. Sources: D. C. Jiles,
+    inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, also for alpha M_s >= 3 a:
+    then the anhysteretic curve is no function. In sub-steps of the tolerance in `integration`. Sources: D. C. Jiles,
     D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn. Mater. 61, 1986; D. C. Jiles, J. B. Thoelke,
     M. K. Devine, Numerical determination of hysteresis parameters, IEEE Trans. Magn. 28, 1992 (this form).
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import types
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -67,7 +68,7 @@ class EverettTable:
 
     def __post_init__(self) -> None:
         edges = numbers(self.edges, "edges")
-        if len(edges) < 2 or any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
+        if len(edges) < 2 or any(b <= a for a, b in itertools.pairwise(edges)):
             raise ValueError("edges rise strictly and are at least two")
         if len(self.values) != len(edges):
             raise ValueError(f"{len(edges)} edges but {len(self.values)} rows")
@@ -79,7 +80,7 @@ class EverettTable:
 
     @classmethod
     def of_density(cls, edges: Sequence[float], density: Everett) -> EverettTable:
-        """Table of a density `density(alpha, beta)` of relays, taken as constant in a cell; half a cell on the diagonal."""
+        """Table of a density `density(alpha, beta)` of relays, constant in a cell; half a cell on the diagonal."""
         ends = np.asarray(edges, dtype=np.float64)
         middle, size = (ends[1:] + ends[:-1]) / 2.0, np.diff(ends)
         alpha, beta = np.meshgrid(middle, middle, indexing="ij")
@@ -110,7 +111,7 @@ class Preisach:
     `everett(alpha, beta)`: change of the output when the input rises from beta to alpha, 0 for alpha = beta, rising in
     alpha and falling in beta, a function of two arrays; in output units. `low`, `high`: range of the relays, an input
     beyond changes nothing; `offset`: output with all relays down. Starts there, and visits `history` before the first
-    sample. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from the maximum M `y = y_M - E(M, v)`;
+    sample. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M `y = y_M - E(M, v)`;
     an input that passes an extremum wipes it out. Raises ValueError for wrong arguments or a surface that is no
     Everett surface on 33 x 33 points. Sources: D. H. Everett, A general approach to hysteresis, part 4, Trans. Faraday
     Soc. 51, 1955; I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer, 1991.
