@@ -12,9 +12,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import csv
-import ctypes
 import itertools
-import tempfile
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -24,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hystgen
+from hystgen.closed_loop import CompiledC
 from hystgen.plants import (
     BoucWen,
     Dahl,
@@ -35,7 +34,6 @@ from hystgen.plants import (
 )
 from hystgen.plants.preisach import EverettTable
 from hystgen.records import Record
-from hystgen.verification import compilers
 
 Array = NDArray[np.float64]
 
@@ -165,45 +163,11 @@ def in_range(shares: Array, ends: tuple[float, float]) -> Array:
     return ends[0] + (ends[1] - ends[0]) * shares
 
 
-WRAPPER = """#include <stddef.h>
-#include "{name}.h"
-#ifdef {upper}_DRIVE_LSB
-static {name}_real_t code(double x) {{ return ({name}_real_t)(x < 0.0 ? x - 0.5 : x + 0.5); }}
-#define TO(x) code((x) / {upper}_{into}_LSB)
-#define FROM(x) ((double)(x) * {upper}_{out}_LSB)
-#else
-#define TO(x) (({name}_real_t)(x))
-#define FROM(x) ((double)(x))
-#endif
-void run(const double *x, double *y, size_t count);
-void run(const double *x, double *y, size_t count) {{
-    {name}_{operator}_t axis;
-    {name}_{operator}_init(&axis);
-    for (size_t k = 0; k < count; k++) y[k] = FROM({name}_{operator}_step(&axis, TO(x[k])));
-}}
-"""
-
-
 def in_c(model: hystgen.Model, operator: str, arithmetic: str, x: Array) -> Array:
     """Answers (N,) of the emitted operator, compiled on this machine, to the samples `x` (N,) in physical units."""
-    found = compilers.available()
-    if not found:
-        raise RuntimeError("no C compiler found; install gcc or clang, or: pip install 'hystgen[zig]'")
-    into, out = ("OUTPUT", "DRIVE") if operator == "inverse" else ("DRIVE", "OUTPUT")
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        hystgen.emit(model, folder, operator=operator, arithmetic=arithmetic)
-        wrapper = folder / "wrapper.c"
-        wrapper.write_text(
-            WRAPPER.format(name=model.name, upper=model.name.upper(), operator=operator, into=into, out=out)
-        )
-        library = folder / "compensator.so"
-        found[0].shared_library([wrapper, folder / f"{model.name}.c"], library, compilers.STRICT)
-        run = ctypes.CDLL(str(library)).run
-    samples, answer = np.ascontiguousarray(x, dtype=np.float64), np.empty(len(x))
-    pointer = ctypes.POINTER(ctypes.c_double)
-    run(samples.ctypes.data_as(pointer), answer.ctypes.data_as(pointer), ctypes.c_size_t(len(samples)))
-    return answer
+    compensator = CompiledC(model, operator, arithmetic)
+    compensator.reset()
+    return np.array([compensator.step(sample) for sample in x.tolist()])
 
 
 def memory(case: Case) -> tuple[float, float, float]:
