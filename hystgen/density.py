@@ -1,9 +1,17 @@
 """Densities of the continuous model, and the thresholds and weights that stand for them.
 
 The continuous model is `y = p0 v + int_0^R p(r) play_r[v] dr` (18 of the note). `[0, R]` is cut into n equal
-cells; each becomes one play with the cell's mass as weight and its centroid as threshold. Mass and first moment
-being kept, the initial loading curve (19) is exact at every cell boundary, and inside a cell the play sum lies
-below it by at most `int_a^c (c - r) p(r) dr`, which is reached at the threshold c.
+cells; each becomes one play with the cell's mass as weight and its centroid as threshold.
+
+Error of the initial loading curve (19). Let D be the continuous curve less that of the play sum. Mass and first moment
+being kept, D and its slope vanish at every cell boundary. In a cell [a, b] with threshold c the slope of D grows by the
+density, `D'' = p >= 0`, except for a fall by the whole mass at c: D rises from 0 up to c and falls back to 0 behind it.
+So the play sum never lies above the curve, and below it by at most `D(c) = int_a^c (c - r) p(r) dr`.
+
+Error of the output, for every drive and history. The play of threshold r, `s(r)`, is a memory with
+`|s(r) - s(r')| <= |r - r'|`. In a cell of mass m that is wrong by `|int p s dr - m s(c)| <= int p |r - c| dr`, and that
+is `2 D(c)`: c being the centroid, both sides of it have the same moment. The sum of `2 D(c)` over the cells is a bound,
+and no smaller one holds: a history that turns at every threshold and every boundary reaches it.
 
 Everything is computed with 40 digits and rounded to double once at the end, so that every machine gets the same
 numbers. A formula is replaced by polynomials on panels that are halved until the polynomials agree with it; what
@@ -50,12 +58,14 @@ class Discretisation:
     """Play sum of a density: `thresholds` (r_0 = 0 first), `weights` (p_0 first), same length.
 
     `error` bounds the distance of the initial loading curve from the continuous one on `[0, R]`, in output
-    units; beyond R the two differ by rounding only.
+    units; beyond R the two differ by rounding only. `output_error` bounds that of the output, for every drive and
+    history that leave the plays within R of zero; further out the rounding of the weights grows with the plays.
     """
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
     error: float
+    output_error: float
 
 
 @cache
@@ -263,7 +273,7 @@ class Density:
     def discretise(self, p0: float, n: int) -> Discretisation:
         """Thresholds and weights of n equal cells behind `r_0 = 0` and `p0`."""
         thresholds, weights = [0.0], [p0]
-        worst = start = mass = moment = _context().mpf(0)
+        worst = total = start = mass = moment = _context().mpf(0)
         for i in range(1, n + 1):
             end = self.r_max * i / n
             mass_end, moment_end = self._moments(end)
@@ -271,7 +281,8 @@ class Density:
             if weight > self._noise:
                 threshold = min(max((moment_end - moment) / weight, start), end)
                 mass_there, moment_there = self._moments(threshold)
-                worst = max(worst, threshold * (mass_there - mass) - (moment_there - moment))
+                below = threshold * (mass_there - mass) - (moment_there - moment)
+                worst, total = max(worst, below), total + 2 * below
             else:
                 weight = 0
             thresholds.append(float(threshold))
@@ -282,8 +293,10 @@ class Density:
             start, mass, moment = end, mass_end, moment_end
         # Polynomials beside the formula, cells set to zero, weights and thresholds rounded to double.
         margin = 2 * ((n + 2) * self._noise + 2.0**-52 * self._total) * self.r_max
-        error = 0.0 if self._total == 0 else math.nextafter(float(worst + margin), math.inf)
-        return Discretisation(tuple(thresholds), tuple(weights), error)
+        errors = (
+            0.0 if self._total == 0 else math.nextafter(float(bound + margin), math.inf) for bound in (worst, total)
+        )
+        return Discretisation(tuple(thresholds), tuple(weights), *errors)
 
     def discretise_to(self, p0: float, tolerance: float) -> Discretisation:
         """The fewest equal cells, up to 4096, whose error bound is at most `tolerance`.

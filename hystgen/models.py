@@ -74,6 +74,24 @@ class PI:
         ):
             object.__setattr__(self, name, value)
 
+    @classmethod
+    def from_loading_curve(
+        cls, x: ArrayLike, phi: ArrayLike, initial_state: float | Sequence[float] = 0.0
+    ) -> PI:
+        """The play sum whose initial loading curve is the polygon through the points: `p_0 = phi'(0)`, and the weight
+        at each corner is by how much the slope changes there (22)(23), of which `p(r) = phi''(r)` is the limit.
+
+        `x`: N + 1 points from 0, strictly rising, in input units; `phi`: the curve there, from 0, in output units; the
+        last slope goes on beyond the last point. The thresholds are the first N points. Raises ValueError otherwise.
+        """
+        points, curve = np.asarray(x, dtype=np.float64), np.asarray(phi, dtype=np.float64)
+        if points.ndim != 1 or points.shape != curve.shape or len(points) < 2:
+            raise ValueError("a loading curve has as many values as points, at least two")
+        if points[0] != 0.0 or curve[0] != 0.0 or not np.all(np.diff(points) > 0.0):
+            raise ValueError("a loading curve starts at (0, 0) and its points rise strictly")
+        slopes = np.diff(curve) / np.diff(points)
+        return cls(points[:-1].tolist(), np.diff(slopes, prepend=0.0).tolist(), initial_state)
+
     @property
     def n(self) -> int:
         """Number of plays without r_0."""

@@ -44,7 +44,8 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
 COMPILED: list[Callable[..., Any]] = [_play_into, _stop_into]
 
 
-def _signal(v: ArrayLike) -> Array:
+def as_signal(v: ArrayLike) -> Array:
+    """Samples (N,) in double precision. Raises ValueError for another number of dimensions."""
     signal = np.ascontiguousarray(v, dtype=np.float64)
     if signal.ndim != 1:
         raise ValueError(f"a signal has one dimension, this one has {signal.ndim}")
@@ -58,7 +59,7 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """
     if threshold < 0:
         raise ValueError("a play threshold is not negative")
-    signal = _signal(v)
+    signal = as_signal(v)
     out = np.empty_like(signal)
     compiled.operators()._play_into(signal, float(threshold), float(start), out)
     return out
@@ -66,7 +67,7 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
 
 def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
     """All plays of a model: row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N)."""
-    signal = _signal(v)
+    signal = as_signal(v)
     r = np.asarray(thresholds, dtype=np.float64)
     states = np.broadcast_to(np.asarray(start, dtype=np.float64), r.shape)
     out = np.empty((len(r), len(signal)))
@@ -82,7 +83,7 @@ def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """
     if threshold < 0:
         raise ValueError("a stop threshold is not negative")
-    signal = _signal(v)
+    signal = as_signal(v)
     out = np.empty_like(signal)
     compiled.operators()._stop_into(signal, float(threshold), float(start), 0.0, out)
     return out

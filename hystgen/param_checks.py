@@ -88,7 +88,7 @@ def check(
     found = checker.discretisation
     if found is not None:
         pi = parameters.model.pi.model_copy(update={"thresholds": found.thresholds, "weights": found.weights})
-        pi._density_error = found.error
+        pi._density_errors = found.error, found.output_error
         parameters = parameters.model_copy(update={"model": parameters.model.model_copy(update={"pi": pi})})
     if checker.effects:
         model = parameters.model.model_copy(update={"effects": tuple(checker.effects)})

@@ -141,12 +141,17 @@ class PIParameters(_Part):
     ] = Field(default=0.0, description="start memory M0: one number, or one a threshold (the first is ignored)")
     density: DensityParameters | None = Field(default=None, description="density in place of thresholds and weights")
 
-    _density_error: float | None = PrivateAttr(default=None)
+    _density_errors: tuple[float, float] | None = PrivateAttr(default=None)
 
     @property
     def density_error(self) -> float | None:
         """Bound of the discretised density's error on the initial loading curve, output units; None without one."""
-        return self._density_error
+        return self._density_errors[0] if self._density_errors else None
+
+    @property
+    def density_output_error(self) -> float | None:
+        """Bound of the discretised density's error on the output, any drive and history; None without a density."""
+        return self._density_errors[1] if self._density_errors else None
 
 
 class DeadZoneParameters(_Part):

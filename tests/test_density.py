@@ -281,7 +281,7 @@ def test_tolerance_out_of_reach() -> None:
 
 def test_no_density_at_all() -> None:
     plays = from_formula(parse_formula("0*r"), 4.0).discretise(0.7, 2)
-    assert plays == Discretisation((0.0, 1.0, 3.0), (0.7, 0.0, 0.0), 0.0)
+    assert plays == Discretisation((0.0, 1.0, 3.0), (0.7, 0.0, 0.0), 0.0, 0.0)
 
 
 def test_thresholds_that_coincide() -> None:
@@ -317,6 +317,86 @@ def test_speed() -> None:
     assert time.perf_counter() - start < 1
 
 
+# Output, any history ------------------------------------------------------------------------------------
+
+knots = st.lists(st.floats(0.05, 2.0), min_size=1, max_size=6)
+heights = st.lists(st.floats(0.0, 3.0), min_size=7, max_size=7).filter(lambda p: max(p) > 0.1)
+
+
+def continuous_output(r: list[float], p: list[float], p0: float, v: list[float], start: float) -> float:
+    """(18) after the drives v: between its kinks the play is straight in r, so that Simpson's rule is exact."""
+    turns = [start, *v]
+    kinks = {abs(a - b) / 2 for a in v for b in turns} | {abs(a - start) for a in v} | set(r)
+    places = np.array(sorted(x for x in kinks if r[0] <= x <= r[-1]))
+    nodes = np.sort(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
+    state = np.full(len(nodes), start)
+    for x in v:
+        state = np.maximum(x - nodes, np.minimum(x + nodes, state))
+    value = state * np.interp(nodes, r, p)
+    simpson = np.diff(places) @ (value[:-2:2] + 4 * value[1:-1:2] + value[2::2]) / 6
+    return p0 * v[-1] + float(simpson)
+
+
+def discrete_output(plays: Discretisation, v: list[float], start: float) -> float:
+    r = np.array(plays.thresholds)
+    state = np.full(len(r), start)
+    for x in v:
+        state = np.maximum(x - r, np.minimum(x + r, state))
+    return float(np.array(plays.weights) @ state)
+
+
+@settings(max_examples=200)
+@given(
+    knots,
+    heights,
+    st.booleans(),
+    st.integers(1, 12),
+    st.lists(st.floats(-1, 1), min_size=1, max_size=12),
+    st.floats(-1, 1),
+)
+def test_output_of_any_history(
+    gaps: list[float], p: list[float], from_zero: bool, n: int, v: list[float], start: float
+) -> None:
+    r = np.cumsum([0.0, *gaps]).tolist()
+    r, p = (r if from_zero else [x + 0.3 for x in r]), p[: len(r)]
+    plays = from_table(r, p).discretise(0.7, n)
+    end = r[-1]
+    v, start = [x * end for x in v], start * end
+    gap = abs(continuous_output(r, p, 0.7, v, start) - discrete_output(plays, v, start))
+    assert gap <= plays.output_error + 1e-13 * (1 + max(p)) * end**2
+
+
+@settings(max_examples=50)
+@given(knots, heights, st.integers(1, 12))
+def test_some_history_reaches_the_bound_of_the_output(gaps: list[float], p: list[float], n: int) -> None:
+    """It turns at every threshold and every boundary of a cell, the outermost first."""
+    r = np.cumsum([0.0, *gaps]).tolist()
+    p = p[: len(r)]
+    plays = from_table(r, p).discretise(0.7, n)
+    end = r[-1]
+    v = [-end]
+    for i in range(n, 0, -1):
+        v.append(v[-1] + 2 * plays.thresholds[i])
+        v.append(v[-1] - 2 * end * (i - 1) / n)
+    gap = continuous_output(r, p, 0.7, v, 0.0) - discrete_output(plays, v, 0.0)
+    assert gap == pytest.approx(plays.output_error, rel=1e-9, abs=1e-12 * (1 + max(p)) * end**2)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.floats(0.0, 2.0), min_size=3, max_size=3), st.floats(0.1, 3.0), st.floats(0.5, 20.0), st.integers(1, 20))
+def test_random_formulas_against_the_exact_loading_curve(c: list[float], b: float, end: float, n: int) -> None:
+    """`a0 + a1 exp(-b r) + a2 r**2`, integrated twice by hand."""
+    text = f"{c[0]!r} + {c[1]!r}*exp(-{b!r}*r) + {c[2]!r}*r**2"
+    plays = from_formula(parse_formula(text), end).discretise(0.7, n)
+    x = np.unique(np.concatenate([np.linspace(0, end, 400), plays.thresholds]))
+    exact = 0.7 * x + c[0] * x**2 / 2 + c[1] * (x / b + np.expm1(-b * x) / b**2) + c[2] * x**4 / 12
+    gap = exact - loading_curve(plays, x)
+    rounding = 1e-13 * (1 + exact.max() + c[1] / b**2)
+    assert gap.min() >= -rounding
+    assert gap.max() <= plays.error + rounding
+    assert gap.max() >= 0.99 * plays.error - rounding
+
+
 # In parameter files --------------------------------------------------------------------------------------
 
 
@@ -324,7 +404,9 @@ def test_parameters_are_filled() -> None:
     head = "hystgen: 1\nname: a\ninput_range: [0, 10]\nmodel: {pi: {density: {formula: 0.8*exp(-0.3*r), p0: 0.7, r_max: 10, "
     pi = parse_parameters(head + "n: 12}}}").model.pi
     plays = from_formula(parse_formula("0.8*exp(-0.3*r)"), 10.0).discretise(0.7, 12)
-    assert (pi.thresholds, pi.weights, pi.density_error) == (plays.thresholds, plays.weights, plays.error)
+    assert (pi.thresholds, pi.weights, pi.density_error, pi.density_output_error) == (
+        plays.thresholds, plays.weights, plays.error, plays.output_error
+    )
     assert pi.density is not None
     assert pi.density.formula == "0.8*exp(-0.3*r)"
     pi = parse_parameters(head + "tolerance: 0.01}}}").model.pi

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
-from hypothesis import given
+import pytest
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hystgen import memory, operators
+from hystgen import elastoplastic, memory, operators
 
 numbers = st.floats(-10, 10)
 signals = st.lists(numbers, min_size=1, max_size=60)
@@ -34,9 +37,113 @@ def test_stop_and_play_add_up_to_the_input(v: list[float], r: float, start: floa
 
 
 @given(signals, radii, numbers)
-def test_rate_independence(v: list[float], r: float, start: float) -> None:
-    slow = np.repeat(v, 3)
-    assert operators.play(slow, r, start)[2::3].tolist() == operators.play(v, r, start).tolist()
+def test_play_stays_within_its_threshold_of_the_input(v: list[float], r: float, start: float) -> None:
+    """(27), and (28) which follows."""
+    s = operators.play(v, r, start)
+    assert np.all(np.abs(np.array(v) - s) <= r + 1e-14 * (10 + r))
+    assert np.max(np.abs(s)) <= np.max(np.abs(v)) + r + 1e-14 * (10 + r)
+
+
+@given(signals, radii, numbers, st.integers(0, 2**32 - 1))
+def test_rate_independence(v: list[float], r: float, start: float, seed: int) -> None:
+    """(24): any number of samples anywhere on the way from one sample to the next, in order, changes nothing."""
+    rng = np.random.default_rng(seed)
+    course, kept = [v[0]], [0]
+    for a, b in pairwise(v):
+        between = a + (b - a) * np.sort(rng.uniform(0, 1, rng.integers(0, 4)))
+        course += [*np.clip(between, min(a, b), max(a, b)), b]
+        kept.append(len(course) - 1)
+    for operator, atol in ((operators.play, 0.0), (operators.stop, 1e-12)):
+        np.testing.assert_allclose(operator(course, r, start)[kept], operator(v, r, start), rtol=0, atol=atol)
+
+
+@given(st.lists(st.tuples(numbers, numbers), min_size=1, max_size=60), radii, numbers, numbers)
+def test_play_is_lipschitz_in_input_and_start(
+    pairs: list[tuple[float, float]], r: float, start: float, other: float
+) -> None:
+    """(3), at every time with what has been up to it; a difference of the starts counts like one of the inputs."""
+    v, w = np.array(pairs).T
+    most = np.maximum.accumulate(np.maximum(np.abs(v - w), abs(start - other)))
+    assert np.all(np.abs(operators.play(v, r, start) - operators.play(w, r, other)) <= most + 1e-14 * 20)
+
+
+@given(signals, radii, radii, numbers)
+def test_play_is_lipschitz_in_the_threshold(v: list[float], r: float, other: float, start: float) -> None:
+    """With constant one: what makes a memory admissible."""
+    s, t = operators.plays(v, [r, other], start)
+    assert np.all(np.abs(s - t) <= abs(r - other) + 1e-14 * 20)
+
+
+@given(signals, st.floats(0.01, 5), numbers, numbers, st.floats(-1, 1))
+def test_the_start_is_forgotten_after_a_sweep_of_twice_the_threshold(
+    v: list[float], r: float, start: float, other: float, centre: float
+) -> None:
+    """From the first sample on at which the input's range so far is 2 r; a little less is not enough."""
+    swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2 * r
+    s, t = operators.play(v, r, start), operators.play(v, r, other)
+    np.testing.assert_allclose(s[swept], t[swept], rtol=0, atol=1e-14 * 20)
+    short = centre + 0.999 * np.array([-r, r, -r, r])
+    s, t = operators.play(short, r, centre - 9 * r), operators.play(short, r, centre + 9 * r)
+    assert np.all(t - s >= 0.0019 * r)
+
+
+positive = st.floats(0.05, 20)
+
+
+@given(signals, positive, radii, st.floats(-1, 1))
+def test_parallel_element(stress: list[float], modulus: float, r: float, strain: float) -> None:
+    """The relations (7)-(10) of every step, which have one solution, and the play that it is (12)."""
+    found = elastoplastic.parallel(stress, modulus, r, strain)
+    small = 1e-13 * (30 + modulus)
+    np.testing.assert_allclose(found.elastic_stress + found.plastic_stress, stress, rtol=0, atol=small)
+    np.testing.assert_allclose(found.elastic_stress, modulus * found.strain, rtol=0, atol=small)
+    assert np.all(np.abs(found.plastic_stress) <= r)
+    moved = np.diff(found.strain, prepend=strain)
+    np.testing.assert_array_equal(found.plastic_stress[moved != 0], r * np.sign(moved[moved != 0]))
+    play = brute_play(stress, r, modulus * strain)
+    np.testing.assert_allclose(modulus * found.strain, play, rtol=0, atol=small)
+    np.testing.assert_allclose(modulus * found.strain, operators.play(stress, r, modulus * strain), rtol=0, atol=small)
+
+
+@given(signals, positive, radii, st.floats(-1, 1))
+def test_series_element(strain: list[float], modulus: float, r: float, plastic: float) -> None:
+    """The relations (13)-(16) of every step, which have one solution, and the stop that it is (17)."""
+    found = elastoplastic.series(strain, modulus, r, plastic)
+    small = 1e-13 * (30 + 30 * modulus)
+    np.testing.assert_allclose(found.elastic_strain + found.plastic_strain, strain, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.stress, modulus * found.elastic_strain, rtol=0, atol=small)
+    assert np.all(np.abs(found.stress) <= r)
+    moved = np.diff(found.plastic_strain, prepend=plastic)
+    np.testing.assert_array_equal(found.stress[moved != 0], r * np.sign(moved[moved != 0]))
+    stop = operators.stop(modulus * np.array(strain), r, modulus * plastic)
+    np.testing.assert_allclose(found.stress, stop, rtol=0, atol=small)
+
+
+@settings(max_examples=50)
+@given(st.lists(numbers, min_size=1, max_size=8), positive, radii, st.floats(-1, 1))
+def test_elements_take_the_least_energy(load: list[float], modulus: float, r: float, plastic: float) -> None:
+    """Of all strains of the slider the one that costs least, stored in the spring and lost in the slider."""
+    under_stress = elastoplastic.parallel(load, modulus, r, plastic).strain
+    under_strain = elastoplastic.series(load, modulus, r, plastic).plastic_strain
+    before = plastic, plastic
+    for k, x in enumerate(load):
+        for found, energy, last in (
+            (under_stress[k], lambda e, x=x: modulus * e**2 / 2 - x * e, before[0]),
+            (under_strain[k], lambda e, x=x: modulus * (x - e) ** 2 / 2, before[1]),
+        ):
+            tried = np.concatenate([np.linspace(-250, 250, 2001), found + np.geomspace(1e-6, 1, 50), [last]])
+            tried = np.concatenate([tried, found - np.geomspace(1e-6, 1, 50)])
+            cost = energy(tried) + r * np.abs(tried - last)
+            assert energy(found) + r * abs(found - last) <= cost.min() + 1e-12 * (1 + modulus) * 200
+        before = under_stress[k], under_strain[k]
+
+
+def test_elements_that_cannot_be() -> None:
+    for element in (elastoplastic.parallel, elastoplastic.series):
+        with pytest.raises(ValueError, match="a modulus is a positive number"):
+            element([1.0], 0.0, 1.0)
+        with pytest.raises(ValueError, match="a yield stress is a number that is not negative"):
+            element([1.0], 1.0, -1.0)
 
 
 @given(st.lists(numbers, min_size=5, max_size=5))

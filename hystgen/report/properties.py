@@ -32,7 +32,10 @@ def properties(model: Model) -> str:
         f"start memory       {'projected to the admissible set' if pi.projected else 'as given'}",
     ]
     if p.model.pi.density is not None:
-        lines.append(f"density            loading curve within {p.model.pi.density_error:.3g}{output}")
+        lines.append(
+            f"density            loading curve within {p.model.pi.density_error:.3g}{output}, output of any history "
+            f"within {p.model.pi.density_output_error:.3g}{output}"
+        )
     problems = c.inverse_problems()
     if model.effects:
         lines += ["effects            the lines above are those of the model without them", *_effects(model)]
