@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from itertools import pairwise, permutations
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hystgen import memory
+from hystgen.bounds import largest_sum
 from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, TanhEnvelope
 from hystgen.simulation import Session
 
 EXAMPLE_1 = PI([0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7], [0.72, 0.6, 0.48, 0.36, 0.24, 0.12, 0.012])
+ESTIMATE_2 = PI(
+    [0, 0.4678, 0.9178, 1.3678, 1.8178, 2.2678, 2.7178], [0.7536, 0.6192, 0.4835, 0.3637, 0.2464, 0.1410, 0.0184]
+)
 R4 = [0.45 * i for i in range(7)]
 PI_4 = PI(R4, [0.65 * float(np.exp(-7.75e-4 * r)) for r in R4])
 RHO = [0.4, 0.75, 1, 1.25, 1.5, 1.75, 2, 2.25, 2.5, 2.75, 3]
@@ -76,6 +82,17 @@ def test_example_2_inverse_parameters() -> None:
     back = inverse.inverse()
     np.testing.assert_allclose(back.weights, EXAMPLE_1.weights, atol=1e-12)
     np.testing.assert_allclose(back.thresholds, EXAMPLE_1.thresholds, atol=1e-12)
+
+
+def test_example_2_inverse_of_wrong_parameters() -> None:
+    """The printed ones follow from estimates that are printed to four digits, each off by up to half of the last."""
+    inverse = ESTIMATE_2.inverse()
+    np.testing.assert_allclose(
+        inverse.thresholds, [0, 0.3525, 0.9703, 1.8056, 2.8045, 3.9144, 5.0877], rtol=0, atol=2e-4
+    )
+    np.testing.assert_allclose(
+        inverse.weights, [1.327, -0.5985, -0.1897, -0.0883, -0.0450, -0.0219, -0.0027], rtol=0, atol=1e-4
+    )
 
 
 def test_example_4_inverse_parameters() -> None:
@@ -161,6 +178,16 @@ def models(draw: st.DrawFn) -> Cascade:
     return Cascade(draw(play_sums()), draw(fronts()), draw(st.floats(-5, 5)), (low, high))  # type: ignore[arg-type]
 
 
+def brute_plays(pi: PI, v: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Output of a play sum from its states, sample by sample."""
+    r, p = np.array(pi.thresholds), np.array(pi.weights)
+    y = []
+    for x in v:
+        states = np.maximum(x - r, np.minimum(x + r, states))
+        y.append(p @ states)
+    return np.array(y)
+
+
 def reference_signal(model: Cascade, seed: int) -> np.ndarray:
     """A reference that some drive inside the range gives: the brute-force output of a wandering drive."""
     rng = np.random.default_rng(seed)
@@ -199,6 +226,206 @@ def test_after_saturation_the_composition_is_exact_again(model: Cascade, seed: i
     assert np.all(v <= model.input_range[1])
     free = status == 0
     assert np.max(np.abs(brute(model, v) - u)[free], initial=0) <= tolerance(model, u)
+
+
+virgins = play_sums().map(lambda pi: PI(pi.thresholds, pi.weights))
+turns = st.lists(st.floats(-1, 1), min_size=2, max_size=20)
+
+
+def reach(pi: PI) -> float:
+    """A drive beyond which every play of the model moves."""
+    return 1.5 * (pi.thresholds[-1] + 0.1)
+
+
+@given(virgins)
+def test_loading_curve_is_what_a_virgin_model_does(pi: PI) -> None:
+    """(22), and (23): its slope between two thresholds is a loop slope (33)."""
+    x = np.linspace(0, 2 * reach(pi), 200)
+    y = brute_plays(pi, x, np.zeros(pi.n + 1))
+    np.testing.assert_allclose(pi.loading_curve(x), y, rtol=0, atol=1e-13 * (1 + y[-1]))
+    ends, virgin = np.array([*pi.thresholds, 2 * reach(pi)]), np.zeros(pi.n + 1)
+    low = brute_plays(pi, 0.75 * ends[:-1] + 0.25 * ends[1:], virgin)
+    high = brute_plays(pi, 0.25 * ends[:-1] + 0.75 * ends[1:], virgin)
+    np.testing.assert_allclose((high - low) / np.diff(ends) * 2, pi.slopes, rtol=1e-10)
+
+
+@given(virgins)
+def test_a_loading_curve_gives_the_model_back(pi: PI) -> None:
+    x = np.array([*pi.thresholds, 2 * reach(pi)])
+    phi = [sum(p * max(a - r, 0) for p, r in zip(pi.weights, pi.thresholds, strict=True)) for a in x]
+    back = PI.from_loading_curve(x, phi)
+    np.testing.assert_allclose(back.weights, pi.weights, rtol=0, atol=1e-11)
+    assert back.thresholds == pi.thresholds
+
+
+def test_a_smooth_loading_curve_gives_the_density_back() -> None:
+    """`p_0 = phi'(0)` and `p(r) = phi''(r)` (19), for phi = 0.7 x + 2 (x - 1 + exp(-x)), that is p = 2 exp(-r)."""
+    x = np.linspace(0, 5, 501)
+    pi = PI.from_loading_curve(x, 0.7 * x + 2 * (x - 1 + np.exp(-x)))
+    assert pi.weights[0] == pytest.approx(0.7, abs=0.0101)  # half a step of p(0)
+    np.testing.assert_allclose(np.array(pi.weights[1:]) / 0.01, 2 * np.exp(-x[1:-1]), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("x", "phi", "message"),
+    [
+        ([0], [0], "as many values as points, at least two"),
+        ([0, 1], [0, 1, 2], "as many values as points, at least two"),
+        ([0.5, 1], [0, 1], r"starts at \(0, 0\)"),
+        ([0, 1], [0.5, 1], r"starts at \(0, 0\)"),
+        ([0, 1, 1], [0, 1, 2], "rise strictly"),
+        ([0, float("nan"), 1], [0, 1, 2], "rise strictly"),
+        ([0, 1], [0, float("nan")], "finite"),
+    ],
+)
+def test_loading_curves_that_are_none(x: list[float], phi: list[float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        PI.from_loading_curve(x, phi)
+
+
+@given(virgins, turns)
+def test_width_is_that_of_the_largest_loop(pi: PI, middle: list[float]) -> None:
+    """(32), corrected: how far apart rising and falling drives of one output lie on a loop that moves every play,
+    and no history spreads them farther."""
+    top = 4 * reach(pi) + 4 * pi.width
+    up, r = np.linspace(-top, top, 4001), np.array(pi.thresholds)
+    rising, falling = brute_plays(pi, up, r - top), brute_plays(pi, up[::-1], top - r)[::-1]
+    width = float(np.interp(0, rising, up) - np.interp(0, falling, up))
+    assert width == pytest.approx(pi.width, rel=1e-9, abs=1e-9 * top)
+    # every memory lies between the two
+    course = brute_plays(pi, top * np.array(middle), np.zeros(pi.n + 1))
+    earliest, latest = np.interp(course, falling, up), np.interp(course, rising, up)
+    inside = np.abs(course) < min(rising[-1], -falling[0])
+    drives = top * np.array(middle)
+    assert np.all((drives >= earliest - 1e-9 * top)[inside])
+    assert np.all((drives <= latest + 1e-9 * top)[inside])
+    assert np.all((latest - earliest <= pi.width + 1e-9 * top)[inside])
+
+
+@given(play_sums(), turns)
+def test_bounds_of_the_output(pi: PI, course: list[float]) -> None:
+    """Every output lies in `output_range`, that within (30), and that within (31)."""
+    v_max = reach(pi)
+    v = v_max * np.array(course)
+    model = Cascade(pi, (), 0.0, (-v_max, v_max))
+    low, high = model.output_range
+    y = brute_plays(pi, v, np.array(pi.start))
+    small = 1e-12 * (1 + abs(high) + abs(low))
+    assert low - small <= y.min()
+    assert y.max() <= high + small
+    ends = [brute_plays(pi, np.array([x]), np.array(pi.start))[0] for x in (-v_max, v_max)]
+    np.testing.assert_allclose(model.output_range, ends, rtol=0, atol=small)
+    largest = largest_sum(model)
+    assert max(-low, high) <= largest + small
+    p_max, r_max = max(pi.weights[1:], default=0.0), pi.thresholds[-1]
+    if max(map(abs, pi.start)) <= v_max:
+        assert largest <= (pi.weights[0] + pi.n * p_max) * v_max + pi.n * p_max * r_max + small
+
+
+@given(play_sums(), turns, st.integers(0, 2**32 - 1))
+def test_models_are_lipschitz_in_input_and_thresholds(pi: PI, course: list[float], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    v = reach(pi) * np.array(course)
+    w = v + 0.1 * reach(pi) * rng.uniform(-1, 1, len(v))
+    y = pi.simulate(v)
+    small = 1e-11 * (1 + np.max(np.abs(y)))
+    apart = np.maximum.accumulate(np.abs(v - w))
+    assert np.all(np.abs(pi.simulate(w) - y) <= pi.slopes[-1] * apart + small)
+    if pi.n:
+        factors = np.exp(np.cumsum(rng.uniform(0, 0.05, pi.n + 1)))
+        other = PI(np.array(pi.thresholds) * factors, pi.weights, pi.start[0])
+        same = PI(pi.thresholds, pi.weights, pi.start[0])
+        moved = np.abs(np.array(other.thresholds) - pi.thresholds)
+        assert np.all(np.abs(other.simulate(v) - same.simulate(v)) <= np.array(pi.weights) @ moved + small)
+
+
+@settings(max_examples=60)
+@given(models(), turns, st.integers(0, 2**32 - 1))
+def test_models_and_inverses_do_not_know_the_rate(model: Cascade, course: list[float], seed: int) -> None:
+    """(25), also of the inverse: samples on the way from one to the next, in order, change nothing.
+
+    Two branches make a front that jumps at each reversal, and where it lands depends on the first sample after it; the
+    samples put in there are plateaus.
+    """
+    rng = np.random.default_rng(seed)
+    low, high = model.input_range
+    v = low + (high - low) * (np.array(course) + 1) / 2
+
+    def slowed(x: np.ndarray) -> tuple[list[float], list[int]]:
+        course, kept = [x[0]], [0]
+        for a, b in pairwise(x):
+            share = np.sort(rng.uniform(0, 1, rng.integers(0, 4))) * (not model.branches_differ)
+            course += [*np.clip(a + (b - a) * share, min(a, b), max(a, b)), b]
+            kept.append(len(course) - 1)
+        return course, kept
+
+    y = brute(model, v)
+    slow, kept = slowed(v)
+    np.testing.assert_allclose(model.simulate(slow)[kept], y, rtol=0, atol=1e-12 * (1 + np.abs(y).max()))
+    slow, kept = slowed(y)
+    again = brute(model, model.inverse().simulate(slow))
+    np.testing.assert_allclose(again[kept], y, rtol=0, atol=tolerance(model, y) + 1e-14)
+
+
+@given(play_sums(), turns, turns)
+def test_a_larger_sweep_wipes_out_the_smaller(pi: PI, before: list[float], after: list[float]) -> None:
+    """What happened inside a range leaves no trace once the drive has run through the range."""
+    v = reach(pi)
+    inside = 0.9 * v * np.array(before)
+    end = v * np.array(after)
+    long = np.concatenate([[-v], inside, [v, -v], end])
+    short = np.concatenate([[-v, v, -v], end])
+    y = pi.simulate(long)
+    np.testing.assert_allclose(
+        y[-len(end) - 1 :], pi.simulate(short)[-len(end) - 1 :], rtol=0, atol=1e-12 * (1 + np.abs(y).max())
+    )
+
+
+@given(play_sums(), turns, turns, st.floats(-0.9, 0.8), st.floats(0.05, 1))
+def test_loops_between_the_same_extremes_are_congruent(
+    pi: PI, one: list[float], other: list[float], low: float, width: float
+) -> None:
+    """Whatever went before, they differ by a shift of the output."""
+    v = reach(pi)
+    loop = v * (low + min(width, 1 - low) * np.concatenate([[0, 1], np.linspace(1, 0, 9), np.linspace(0, 1, 9)]))
+    found = [pi.simulate(np.concatenate([v * np.array(course), loop]))[-18:] for course in (one, other)]
+    np.testing.assert_allclose(
+        found[0] - found[0][0], found[1] - found[1][0], rtol=0, atol=1e-12 * (1 + np.abs(found[0]).max())
+    )
+
+
+@given(virgins, virgins, turns)
+def test_compensation_with_a_wrong_inverse_is_a_play_sum(pi: PI, estimate: PI, course: list[float]) -> None:
+    """Play sums form a group whose product is that of the loading curves, so that what the wrong inverse leaves is
+    known: the play sum of the curve `phi o phi_hat^-1`, the polygon through its corners."""
+    corners = np.unique(np.concatenate([[0.0], pi.thresholds[1:], estimate.thresholds[1:]]))
+    corners = np.concatenate([corners, [2 * corners[-1] + 1]])
+
+    def curve(model: PI) -> np.ndarray:
+        return np.array(np.maximum(corners[:, None] - np.array(model.thresholds), 0) @ np.array(model.weights))
+
+    wanted, got = curve(estimate), curve(pi)
+    assume(np.all(np.diff(wanted) > 1e-9 * wanted[-1]))
+    left = PI.from_loading_curve(wanted, got)
+    u = 1.2 * wanted[-1] * np.array(course)
+    y = brute_plays(pi, estimate.inverse().simulate(u), np.zeros(pi.n + 1))
+    small = 1e-10 * (1 + np.abs(y).max()) * max(1.0, 1 / estimate.weights[0])
+    np.testing.assert_allclose(y, brute_plays(left, u, np.zeros(left.n + 1)), rtol=0, atol=small)
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+def test_cascades_of_three_stages(order: tuple[int, ...]) -> None:
+    stages = (
+        DeadZone([-1.5, -0.5, 0, 0.4, 1], [-0.3, 0.4, 1.0, -0.4, 0.5]),
+        TanhEnvelope((3.0, 0.3, 0.1, -0.2)),
+        TanhEnvelope((2.5, 0.4, -0.1, 0.1), (2.5, 0.4, -0.1, 0.25)),
+    )
+    model = Cascade(EXAMPLE_1, tuple(stages[i] for i in order), 0.3, (-2.0, 2.0))
+    assert model.inverse_problems() == []
+    u = reference_signal(model, 7)
+    v = model.inverse().simulate(u)
+    assert np.max(np.abs(model.simulate(v) - u)) <= tolerance(model, u)
+    assert np.max(np.abs(brute(model, v) - u)) <= tolerance(model, u)
 
 
 def test_refusals_name_the_reason_and_the_range() -> None:
