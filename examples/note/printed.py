@@ -1,0 +1,98 @@
+"""The note's examples with the numbers that it prints, and what the modules with its figures share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen import PI, Cascade, DeadZone, TanhEnvelope
+from hystgen.report import drawing
+
+Array = NDArray[np.float64]
+
+EXAMPLE_1 = PI([0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7], [0.72, 0.6, 0.48, 0.36, 0.24, 0.12, 0.012])
+ESTIMATE_2 = PI(
+    [0, 0.4678, 0.9178, 1.3678, 1.8178, 2.2678, 2.7178], [0.7536, 0.6192, 0.4835, 0.3637, 0.2464, 0.1410, 0.0184]
+)
+R_4 = 0.45 * np.arange(7)
+PI_4 = PI(R_4.tolist(), (0.65 * np.exp(-7.75e-4 * R_4)).tolist())
+RHO_4 = [0.4, 0.75, 1, 1.25, 1.5, 1.75, 2, 2.25, 2.5, 2.75, 3]
+ETA_4 = [-1.128, -1.116, -0.793, -0.598, -0.413, -0.271, -0.172, -0.106, -0.066, -0.041, -0.025]
+DEAD_ZONE_4 = DeadZone([*(-r for r in RHO_4[::-1]), 0, *RHO_4], [*ETA_4[::-1], 4.765, *ETA_4])
+ENVELOPE_6 = TanhEnvelope((6.0, 0.4, 0.0, 0.0))
+EXAMPLE_4 = Cascade(PI_4, (DEAD_ZONE_4,), 0.0, (-5.0, 5.0))
+EXAMPLE_6 = Cascade(PI_4, (ENVELOPE_6,), 0.0, (-5.0, 5.0))
+
+TIME = np.linspace(0.0, 2.0, 2001)
+"""Seconds; two periods of 1 Hz."""
+INPUT, OUTPUT = "input units", "output units"
+DRIVE, ANSWER, REFERENCE = f"input $v$ ({INPUT})", f"output $y$ ({OUTPUT})", f"reference $u$ ({OUTPUT})"
+FIRST, SECOND, THIRD, FOURTH, DIM = (
+    drawing.MEASURED, drawing.MODEL, drawing.RESIDUAL, drawing.OTHER, drawing.IGNORED
+)  # fmt: skip
+
+
+class MismatchError(AssertionError):
+    """A computed number is not the one it should be."""
+
+
+def sine(amplitude: float, frequency: float = 1.0) -> Array:
+    """`amplitude sin(2 pi f t)` at the times of all figures."""
+    return np.asarray(amplitude * np.sin(2.0 * np.pi * frequency * TIME))
+
+
+def check(what: str, values: ArrayLike, printed: str, off: ArrayLike = 0.0) -> None:
+    """Raise MismatchError unless every value rounds to the printed number (decimal text, separated by spaces).
+
+    `off`: by how much more it may differ, where the note computed from numbers of which it prints only some digits.
+    """
+    found, texts = np.atleast_1d(np.asarray(values, dtype=np.float64)), printed.split()
+    allowed = np.broadcast_to(np.asarray(off, dtype=np.float64), found.shape)
+    if len(found) != len(texts):
+        raise MismatchError(f"{what}: {len(found)} values, but {len(texts)} are printed")
+    for k, (value, text, more) in enumerate(zip(found.tolist(), texts, allowed.tolist(), strict=True)):
+        half = 0.5 * 10.0 ** -len(text.partition(".")[2])
+        if not abs(value - float(text)) <= half * (1.0 + 1e-9) + more:
+            raise MismatchError(f"{what}, entry {k}: {value:.6g} is computed, {text} is printed")
+
+
+def close(what: str, values: ArrayLike, expected: ArrayLike, tolerance: float) -> None:
+    """Raise MismatchError unless the values are the expected ones to the (absolute) tolerance."""
+    worst = float(np.max(np.abs(np.asarray(values) - np.asarray(expected))))
+    if not worst <= tolerance:
+        raise MismatchError(f"{what}: off by {worst:.3g}, {tolerance:.3g} is allowed")
+
+
+def spread(function: Callable[[Array], ArrayLike], numbers: Sequence[float], half: ArrayLike) -> Array:
+    """How far the results of `function` may move, to first order, while each number moves by up to its `half`."""
+    x = np.asarray(numbers, dtype=np.float64)
+    middle = np.asarray(function(x))
+    moved = np.broadcast_to(np.asarray(half, dtype=np.float64), x.shape)
+    return np.asarray(sum(np.abs(np.asarray(function(x + step)) - middle) for step in np.diag(moved)))
+
+
+def panels(count: int, columns: int = 2) -> tuple[Any, list[Any]]:
+    """A figure with `count` plot areas, lettered as in the note, `columns` in a row."""
+    rows = -(-count // columns)
+    drawn = drawing.figure(5.2 * columns, 3.7 * rows)
+    areas = [drawn.add_subplot(rows, columns, k + 1) for k in range(count)]
+    return drawn, areas
+
+
+def describe(axes: Any, letter: str, title: str, x: str, y: str, legend: bool = False) -> None:
+    """Title with the letter of the panel, axes with units, and the legend where nothing is hidden."""
+    axes.set(title=f"({letter}) {title}" if letter else title, xlabel=x, ylabel=y)
+    if legend:
+        axes.margins(y=0.12)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4, handlelength=1.6, columnspacing=1.4)
+
+
+def save(folder: Path, name: str, drawn: Any) -> Path:
+    """Write the figure as SVG; the file."""
+    path = folder / f"{name}.svg"
+    path.write_bytes(drawing.content(drawn, "svg"))
+    return path
