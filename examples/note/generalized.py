@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import inverse
+import models
 import numpy as np
 import printed as note
 
@@ -79,12 +80,12 @@ def _dead_zones(folder: Path) -> None:
     note.save(folder, "figure_18", drawn)
 
 
-def _over_time(axes: Any, letter: str, title: str, lines: list[tuple[note.Array, str]], y: str) -> None:
+def _over_time(axes: Any, letter: str, title: str, lines: list[tuple[note.Array, str]]) -> None:
     for (signal, name), colour, style in zip(
         lines, (note.FIRST, note.THIRD, note.SECOND), ("-", "-.", "--"), strict=True
     ):
         axes.plot(note.TIME, signal, style, color=colour, label=name)
-    note.describe(axes, letter, title, "time (s)", y, legend=True)
+    note.describe(axes, letter, title, "time (s)", "signals, each in its units", legend=True)
 
 
 def _example_4(folder: Path) -> None:
@@ -92,21 +93,15 @@ def _example_4(folder: Path) -> None:
     w, y = model.front(v), model.simulate(v)
     drawn, (time, zones, plays, loop) = note.panels(4)
     names = [(v, "input $v$"), (w, "dead-zone sum $w$"), (y, "output $y$")]
-    _over_time(time, "a", r"Example 4, $v = 5 \sin 2 \pi t$", names, "signals")
+    _over_time(time, "a", r"Example 4, $v = 5 \sin 2 \pi t$", names)
     for threshold in note.DEAD_ZONE_4.thresholds:
         colour = note.DIM if threshold == 0.0 else note.SECOND if threshold > 0.0 else note.FIRST
         zones.plot(v[:1001], operators.dead_zone(v[:1001], threshold), color=colour, linewidth=0.9)
-    zones.text(-4.6, -3.3, r"$\rho_j < 0$", color=note.FIRST, ha="right")
+    zones.text(-3.5, 0.4, r"$\rho_j < 0$", color=note.FIRST, ha="center")
     zones.text(3.2, 3.9, r"$\rho_0 = 0$", color=note.DIM, ha="right")
-    zones.text(4.2, 0.3, r"$\rho_j > 0$", color=note.SECOND)
+    zones.text(3.5, -0.8, r"$\rho_j > 0$", color=note.SECOND, ha="center")
     note.describe(zones, "b", "Dead zones", note.DRIVE, f"dead zones ({note.INPUT})")
-    for i, s in enumerate(operators.plays(w, note.PI_4.thresholds)[1:]):
-        plays.plot(w, s, color=note.FIRST, alpha=0.25 + 0.15 * i, linewidth=1.2)
-        plays.annotate(f"{note.PI_4.thresholds[i + 1]:.3g}", (w.max(), w.max() - note.PI_4.thresholds[i + 1]),
-                       xytext=(4, -3), textcoords="offset points", fontsize=8)  # fmt: skip
-    plays.margins(x=0.1)
-    title = "Plays, at their ends $r_i$"
-    note.describe(plays, "c", title, f"dead-zone sum $w$ ({note.INPUT})", f"plays ({note.INPUT})")
+    models.draw_plays(plays, "c", w, note.PI_4, "Plays of the dead-zone sum", note.INPUT)
     loop.plot(v, y, color=note.SECOND)
     note.describe(loop, "d", "Loop and first rise", note.DRIVE, note.ANSWER)
     note.save(folder, "figure_21", drawn)
@@ -120,7 +115,7 @@ def _compensation(folder: Path, name: str, model: Any, u: note.Array, title: str
     note.close(f"{title}, the inverses one after the other (48)", v, model.front_inverse(x), 1e-12 * np.ptp(v))
     drawn, (time, loop, *tracking) = note.panels(4)
     lines = [(u, "reference $u$"), (x, of_plays), (v, "input $v$")]
-    _over_time(time, "a", title, lines, "signals")
+    _over_time(time, "a", title, lines)
     loop.plot(u, v, color=note.SECOND)
     note.describe(loop, "b", "Inverse", note.REFERENCE, note.DRIVE)
     inverse.draw_tracking(tracking, "cd", u, y, note.TIME)
@@ -153,7 +148,7 @@ def _example_6(folder: Path) -> None:
     note.close("Example 6, envelope (46)", h, 6.0 * np.tanh(0.4 * v), 1e-14)
     drawn, (time, loop) = note.panels(2)
     names = [(v, "input $v$"), (h, "envelope $h$"), (y, "output $y$")]
-    _over_time(time, "a", r"Example 6, $v = 5 \sin 2 \pi t$", names, "signals")
+    _over_time(time, "a", r"Example 6, $v = 5 \sin 2 \pi t$", names)
     loop.plot(v, y, color=note.SECOND)
     note.describe(loop, "b", "Loop and first rise", note.DRIVE, note.ANSWER)
     note.save(folder, "figure_24", drawn)

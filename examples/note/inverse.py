@@ -31,7 +31,7 @@ def _inverse(folder: Path) -> None:
     time.plot(note.TIME, u, color=note.FIRST, label=note.REFERENCE)
     time.plot(note.TIME, v, color=note.SECOND, linestyle="--", label=note.DRIVE)
     note.describe(time, "a", r"Example 2, $u = 10 \sin 2 \pi t$", "time (s)", "reference, drive", legend=True)
-    models.draw_plays(plays, u, np.array(inverse.thresholds), "z_i", "inverse", note.OUTPUT)
+    models.draw_plays(plays, "b", u, inverse, "Plays of the inverse", note.OUTPUT)
     loop.plot(u, v, color=note.SECOND)
     note.describe(loop, "c", "Loop and first rise", note.REFERENCE, note.DRIVE)
     x = np.linspace(0.0, 10.0, 401)

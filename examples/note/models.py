@@ -90,17 +90,17 @@ def _width_and_slopes(folder: Path) -> None:
     note.save(folder, "figure_06", drawn)
 
 
-def draw_plays(axes: Any, v: note.Array, thresholds: note.Array, symbol: str, name: str, unit: str) -> None:
-    """Plays over their input, each with its threshold at its flat top."""
-    for i, s in enumerate(operators.plays(v, thresholds)[1:]):
-        shade = 0.25 + 0.75 * i / (len(thresholds) - 2)
-        axes.plot(v, s, color=note.FIRST, alpha=shade, linewidth=1.2)
-        axes.annotate(f"{thresholds[i + 1]:.4g}", (v.max(), v.max() - thresholds[i + 1]), xytext=(4, -3),
-                      textcoords="offset points", fontsize=8)  # fmt: skip
-    axes.margins(x=0.1)
-    top = (v.max(), v.max() - thresholds[1])
-    axes.annotate(f"${symbol}$ =", top, xytext=(4, 9), textcoords="offset points", fontsize=8)
-    note.describe(axes, "b", f"Plays of the {name}", f"their input ({unit})", f"plays ({unit})")
+def draw_plays(axes: Any, letter: str, v: note.Array, model: PI, title: str, unit: str) -> None:
+    """The plays of a model over their input `v`, each with its threshold beside its flat top."""
+    plays = operators.plays(v, model.thresholds)[1:]
+    place, step = -np.inf, 0.06 * np.ptp(plays)
+    for i in range(model.n - 1, -1, -1):
+        axes.plot(v, plays[i], color=note.FIRST, alpha=0.25 + 0.75 * i / (model.n - 1), linewidth=1.2)
+        place = max(place + step, v.max() - model.thresholds[i + 1])
+        axes.text(1.03 * v.max(), place, f"{model.thresholds[i + 1]:.4g}", va="center", fontsize=8)
+    axes.text(1.03 * v.max(), place + step, "threshold", va="center", fontsize=8)
+    axes.set_xlim(right=1.35 * v.max())
+    note.describe(axes, letter, title, f"their input ({unit})", f"plays ({unit})")
 
 
 def _example_1(folder: Path) -> None:
@@ -110,7 +110,7 @@ def _example_1(folder: Path) -> None:
     time.plot(note.TIME, v, color=note.FIRST, label=note.DRIVE)
     time.plot(note.TIME, y, color=note.SECOND, linestyle="--", label=note.ANSWER)
     note.describe(time, "a", r"Example 1, $v = 4 \sin 2 \pi t$", "time (s)", "input, output", legend=True)
-    draw_plays(plays, v, np.array(note.EXAMPLE_1.thresholds), "r_i", "model", note.INPUT)
+    draw_plays(plays, "b", v, note.EXAMPLE_1, "Plays of the model", note.INPUT)
     loop.plot(v, y, color=note.SECOND)
     note.describe(loop, "c", "Loop and first rise", note.DRIVE, note.ANSWER)
     x = np.linspace(0.0, 4.0, 401)

@@ -30,8 +30,9 @@ def _characteristics(folder: Path) -> None:
     for axes, y, colour in ((left, play, note.FIRST), (right, stop, note.SECOND)):
         axes.plot(v, y, color=colour)
         axes.plot(v[0], y[0], "o", color=colour, markersize=5)
-    left.annotate("start, $M_0 = 0.6$", (v[0], play[0]), (-2.7, 1.4), arrowprops={"arrowstyle": "-"}, fontsize=9)
-    right.annotate("start, $v_0 - M_0$", (v[0], stop[0]), (0.4, -0.72), arrowprops={"arrowstyle": "-"}, fontsize=9)
+    line = {"arrowstyle": "-", "color": note.DIM}
+    left.annotate("start, $M_0 = 0.6$", (v[0], play[0]), (-2.4, 1.6), arrowprops=line, fontsize=9)
+    right.annotate("start, $v_0 - M_0$", (v[0], stop[0]), (1.6, -0.4), arrowprops=line, fontsize=9)
     for offset in (-r, r):
         left.axline((0.0, offset), slope=1.0, color=note.DIM, linestyle="--", linewidth=0.9)
         right.axhline(offset, color=note.DIM, linestyle="--", linewidth=0.9)
@@ -57,8 +58,9 @@ def _masses(folder: Path) -> None:
     for x, name, colour in ((first, "mass A, $x_1$", note.FIRST), (second, "mass B, $x_2$", note.SECOND)):
         time.plot(t, x, color=colour, label=name)
     loop.plot(first, second, color=note.SECOND)
-    loop.annotate("", (2.0, 0.4), (1.0, 0.4), arrowprops={"arrowstyle": "<->"})
-    loop.text(1.5, 0.47, "2a", ha="center", va="bottom", fontsize=9)
+    ends = {"arrowstyle": "<->", "shrinkA": 0, "shrinkB": 0}
+    loop.annotate("", (0.8 + gap, 0.8), (0.8 - gap, 0.8), arrowprops=ends)
+    loop.text(0.8, 0.83, "2a", ha="center", va="bottom", fontsize=9)
     note.describe(time, "b", "Two masses with play a = 0.5", "time (s)", f"position ({note.INPUT})", legend=True)
     note.describe(loop, "c", "Loop between the positions", f"$x_1$ ({note.INPUT})", f"$x_2$ ({note.INPUT})")
     note.save(folder, "figure_02", drawn)
