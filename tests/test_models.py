@@ -315,11 +315,12 @@ def test_bounds_of_the_output(pi: PI, course: list[float]) -> None:
     assert y.max() <= high + small
     ends = [brute_plays(pi, np.array([x]), np.array(pi.start))[0] for x in (-v_max, v_max)]
     np.testing.assert_allclose(model.output_range, ends, rtol=0, atol=small)
-    largest = largest_sum(model)
-    assert max(-low, high) <= largest + small
-    p_max, r_max = max(pi.weights[1:], default=0.0), pi.thresholds[-1]
-    if max(map(abs, pi.start)) <= v_max:
-        assert largest <= (pi.weights[0] + pi.n * p_max) * v_max + pi.n * p_max * r_max + small
+    p, r = np.array(pi.weights), np.array(pi.thresholds)
+    thirty = p.sum() * v_max + p @ r
+    thirty_one = (p[0] + pi.n * p[1:].max(initial=0.0)) * v_max + pi.n * p[1:].max(initial=0.0) * r[-1]
+    assert max(-low, high) <= thirty + small
+    assert thirty <= largest_sum(model) + small, "which counts a start outside the range too"
+    assert thirty <= thirty_one + small
 
 
 @given(play_sums(), turns, st.integers(0, 2**32 - 1))
