@@ -87,6 +87,13 @@ def test_the_start_is_forgotten_after_a_sweep_of_twice_the_threshold(
     assert np.all(t - s >= 0.0019 * r)
 
 
+@given(signals, st.one_of(st.just(0.0), st.floats(-8, 8)))
+def test_dead_zone_is_what_lies_beyond_its_threshold(v: list[float], rho: float) -> None:
+    """(42), case by case."""
+    expected = [x if rho == 0 else x - rho if 0 < rho < x or x < rho < 0 else 0.0 for x in v]
+    assert operators.dead_zone(v, rho).tolist() == expected
+
+
 positive = st.floats(0.05, 20)
 
 
