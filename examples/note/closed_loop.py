@@ -17,19 +17,16 @@ import math
 from pathlib import Path
 
 import numpy as np
+from printed import ESTIMATE_2
 from scipy import signal
 
 import hystgen
-from hystgen import PI
 from hystgen.closed_loop import CompiledC, Loop, PIController, Response
 from hystgen.report import drawing
 
 HERE = Path(__file__).resolve().parent
 PLANT = ([8.8e16], [1.0, 1.6e4, 6.6e8, 5.3e12, 8.8e16])
 CONTROLLER = PIController(kp=0.185, ki=185.0)
-ESTIMATE = PI(
-    [0, 0.4678, 0.9178, 1.3678, 1.8178, 2.2678, 2.7178], [0.7536, 0.6192, 0.4835, 0.3637, 0.2464, 0.1410, 0.0184]
-)
 MEAN_GAIN = 2.05  # output over drive of Example 1's loop at a drive of +-4; in this control loop the drive is smaller
 PERIOD = 1.0  # s; the first one is left out, there the memory is still the start's
 BLOCK = 200  # samples of which the largest is drawn
@@ -53,7 +50,7 @@ def make(folder: Path) -> None:
     def run(compensator: object) -> Response:
         return Loop(PLANT, CONTROLLER, rate, stage, compensator).run(reference, 2 * PERIOD)
 
-    parts = (None, stage.inverse(), ESTIMATE.inverse(), 1.0 / MEAN_GAIN)
+    parts = (None, stage.inverse(), ESTIMATE_2.inverse(), 1.0 / MEAN_GAIN)
     cases = {name: run(part) for name, part in zip(EXPECTED, parts, strict=True)}
     alone = cases["no compensator"]
     cases[f"linear scale 1/{gain(alone):.2f}"] = run(1.0 / gain(alone))

@@ -65,8 +65,8 @@ SIMPLER = 0.02
 EXCHANGE = 0.03
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
 
-AT_FLOOR = 1.05
-"""A held-out error within this factor of the noise leaves nothing to explain."""
+AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
+"""A held-out error within this factor of the noise leaves nothing that would be enough for a name."""
 
 
 @dataclass(frozen=True)
