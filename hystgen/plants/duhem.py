@@ -7,7 +7,6 @@ import math
 import types
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,17 +14,7 @@ from numpy.typing import ArrayLike
 from hystgen import compiled
 from hystgen.plants import integration
 from hystgen.plants.checks import Array, finite, positive, signal
-
-Slope = Callable[[float, float], float]
-
-
-def rate(v: float, y: float, rising: bool, p: tuple[Any, ...]) -> Any:
-    return p[0](v, y) if rising else p[1](v, y)
-
-
-@functools.cache
-def _integrator() -> types.SimpleNamespace:
-    return compiled.bind_together([rate, integration.integrate])
+from hystgen.plants.integration import Slope
 
 
 @dataclass(frozen=True)
@@ -33,9 +22,9 @@ class Duhem:
     """General Duhem model: `dy/dv = rising(v, y)` where the input rises and `falling(v, y)` where it falls.
 
     `rising`, `falling`: functions of two floats, in output per input unit; `start`: y at the input 0; `scale` > 0: size
-    of y that near zero stands for it in the tolerance of `integration`. The functions are called as they are, seven
-    times a sub-step, so that 10^5 samples take seconds. Raises ValueError, also where the integration leaves the finite
-    numbers. Source: J. W. Macki, P. Nistri, P. Zecca, Mathematical models for hysteresis, SIAM Review 35, 1993.
+    of y that near zero stands for it in the tolerance of `integration`. Raises ValueError, also where the integration
+    leaves the finite numbers. Source: J. W. Macki, P. Nistri, P. Zecca, Mathematical models for hysteresis, SIAM
+    Review 35, 1993.
     """
 
     rising: Slope
@@ -65,14 +54,7 @@ class Duhem:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Output (N,) at the inputs `v` (N,); needs no time."""
-        samples = signal(v)
-        out = np.empty_like(samples)
-        # plain floats: numpy's are several times slower in the user's functions
-        found: Any = [0.0] * len(samples)
-        _integrator().integrate(
-            samples.tolist(), 0.0, float(self.start), (self.rising, self.falling), float(self.scale), found
-        )
-        out[:] = found
+        out = integration.integrate(signal(v), float(self.start), self.rising, self.falling, float(self.scale))
         if not np.all(np.isfinite(out)):
             raise ValueError("the output leaves the finite numbers: with these slopes it runs away")
         return out

@@ -1,103 +1,54 @@
-"""Rate-independent differential models `dy/dv = rate(v, y, direction)`, integrated over the input instead of time.
-
-`integrate` is bound to a plant's `rate` by `hystgen.compiled`, compiled or as plain Python.
-"""
+"""Rate-independent differential models `dy/dv = slope(v, y)`, one slope a direction, integrated over the input."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import functools
+import itertools
+import warnings
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hystgen.plants.checks import Array
 
-RTOL = 1e-10
-"""Error that a sub-step may add, as a share of the state."""
+Slope = Callable[[float, float], float]
 
-ATOL = 1e-12
+RTOL = 1e-11
+"""Error that a step may add, as a share of the state."""
+
+ATOL = 1e-13
 """The same as a share of the state's scale, for states near zero."""
 
-if TYPE_CHECKING:
+MOST_STEPS = 100_000
+"""Steps between two samples, beyond which the state has run away."""
 
-    def rate(v: float, y: float, rising: bool, p: tuple[Any, ...]) -> float: ...
 
+def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: float) -> Array:
+    """State (N,) at the input samples, from the state `start` at the input 0; NaN once it has run away.
 
-def integrate(v: Array, v0: float, y0: float, p: tuple[Any, ...], scale: float, out: Array) -> None:
-    """State (N,) at the input samples, from the state y0 at the input v0.
-
-    Dormand and Prince's pair of orders 5 and 4 (1980) in sub-steps of at most the distance between two samples, each of
-    which adds at most `RTOL |y| + ATOL scale`. Where the rate jumps, as at a guard, sub-steps shrink to a 1e-9 part of
-    the distance and are then taken as they are.
+    By LSODA (scipy), with a call for each move between two turning points, where the slope jumps.
     """
-    y = y0
-    x = v0
-    step = np.inf
-    for k in range(len(v)):
-        end = v[k]
-        distance = abs(end - x)
-        rising = end > x
-        least = 1e-9 * distance
-        left = distance
-        while left > 0.0:
-            size = min(step, left)
-            h = size if rising else -size
-            k1 = rate(x, y, rising, p)
-            k2 = rate(x + h / 5.0, y + h * k1 / 5.0, rising, p)
-            k3 = rate(x + 0.3 * h, y + h * (3.0 * k1 + 9.0 * k2) / 40.0, rising, p)
-            k4 = rate(x + 0.8 * h, y + h * (44.0 / 45.0 * k1 - 56.0 / 15.0 * k2 + 32.0 / 9.0 * k3), rising, p)
-            k5 = rate(
-                x + 8.0 / 9.0 * h,
-                y
-                + h
-                * (19372.0 / 6561.0 * k1 - 25360.0 / 2187.0 * k2 + 64448.0 / 6561.0 * k3 - 212.0 / 729.0 * k4),
-                rising,
-                p,
+    from scipy.integrate import ODEintWarning, odeint
+
+    path = np.concatenate([[0.0], v])
+    move = np.sign(np.diff(path))
+    turns = np.flatnonzero(np.diff(move[move != 0.0]))
+    ends = np.flatnonzero(move)[turns] + 1
+    y = np.full(len(path), np.nan)
+    y[0] = start
+    for first, last in itertools.pairwise([0, *ends.tolist(), len(path) - 1]):
+        places = path[first : last + 1]
+        slope = functools.partial(_at, rising if places[-1] > places[0] else falling)
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", ODEintWarning)  # what it says is looked at
+            found, told = odeint(
+                slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS, full_output=True
             )
-            k6 = rate(
-                x + h,
-                y
-                + h
-                * (
-                    9017.0 / 3168.0 * k1
-                    - 355.0 / 33.0 * k2
-                    + 46732.0 / 5247.0 * k3
-                    + 49.0 / 176.0 * k4
-                    - 5103.0 / 18656.0 * k5
-                ),
-                rising,
-                p,
-            )
-            new = y + h * (
-                35.0 / 384.0 * k1
-                + 500.0 / 1113.0 * k3
-                + 125.0 / 192.0 * k4
-                - 2187.0 / 6784.0 * k5
-                + 11.0 / 84.0 * k6
-            )
-            k7 = rate(x + h, new, rising, p)
-            error = size * abs(
-                71.0 / 57600.0 * k1
-                - 71.0 / 16695.0 * k3
-                + 71.0 / 1920.0 * k4
-                - 17253.0 / 339200.0 * k5
-                + 22.0 / 525.0 * k6
-                - k7 / 40.0
-            )
-            share = error / (RTOL * max(abs(y), abs(new)) + ATOL * scale)
-            if not share < np.inf and size <= least:  # it ran away
-                for rest in range(k, len(v)):
-                    out[rest] = np.nan
-                return
-            if share <= 1.0 or size <= least:
-                y = new
-                left -= size
-                x = x + h if left > 0.0 else end
-            # a share that is no number, after an overflow, has to shrink the step too
-            factor = 0.1
-            if share < 1e-5:
-                factor = 5.0
-            elif share < 1e5:
-                factor = min(max(0.9 * share**-0.2, 0.1), 5.0)
-            step = max(size * factor, least)
-        out[k] = y
+        if told["message"] != "Integration successful." or not np.all(np.isfinite(found)):
+            break
+        y[first : last + 1] = found[:, 0]
+    return y[1:]
+
+
+def _at(slope: Slope, v: float, y: Array) -> float:
+    return slope(v, float(y[0]))
