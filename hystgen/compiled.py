@@ -21,9 +21,8 @@ if TYPE_CHECKING:
 # Called once, before the first function is compiled that is not in the cache; a place for a word to the user
 announce: Callable[[], None] | None = None
 
-# The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out;
-# they touch no Python object, so that threads run side by side
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "_nrt": False}
+# The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 
 
 def bind_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNamespace:
@@ -42,7 +41,6 @@ def compile_together(
 
     _listen()
     sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions)
-    sources += repr(OPTIONS)
     mark = hashlib.sha256(sources.encode()).hexdigest()[:12]
 
     def compiled(function: Callable[..., Any], twin: types.FunctionType) -> Any:

@@ -30,6 +30,11 @@ def _play_into(v: Array, r: float, state: float, out: Array) -> float:
     return state
 
 
+def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
+    for i in range(len(r)):
+        _play_into(v, r[i], states[i], out[i])
+
+
 def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) -> None:
     for k in range(len(v)):
         state = state + v[k] - previous
@@ -41,7 +46,7 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED: list[Callable[..., Any]] = [_play_into, _stop_into]
+COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _stop_into]
 
 
 def as_signal(v: ArrayLike) -> Array:
@@ -68,11 +73,10 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
 def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
     """All plays of a model: row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N)."""
     signal = as_signal(v)
-    r = np.asarray(thresholds, dtype=np.float64)
-    states = np.broadcast_to(np.asarray(start, dtype=np.float64), r.shape)
+    r = np.ascontiguousarray(thresholds, dtype=np.float64)
+    states = np.full(r.shape, start, dtype=np.float64)
     out = np.empty((len(r), len(signal)))
-    for i in range(len(r)):
-        compiled.operators()._play_into(signal, float(r[i]), float(states[i]), out[i])
+    compiled.operators()._plays_into(signal, r, states, out)
     return out
 
 

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
-import threading
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +19,6 @@ from hystgen.identification.fronts import Kept
 from hystgen.identification.uncertainty import correlation_time
 
 Array = NDArray[np.float64]
-One = TypeVar("One")
-Made = TypeVar("Made")
 
 SCREENED = 12_000
 """Samples compared while the many shapes are told apart."""
@@ -138,30 +132,6 @@ class _Records:
         """rms error on held-out records."""
         return fits.rms(fitted.errors(self.held))
 
-    def side_by_side(
-        self, work: Callable[[One, Sequence[Item], Sequence[Item]], Made], several: Sequence[One], thin: bool = False
-    ) -> list[Made]:
-        """`work(one, fitted records, held-out ones)` for each of several, in their order, on all cores."""
-
-        def apart() -> tuple[list[Item], list[Item]]:
-            groups = (self.thin, self.thin_held) if thin else (self.to_fit, self.held)
-            fitted, held = ([replace(item, moved={}) for item in group] for group in groups)
-            return fitted, held
-
-        own = threading.local()
-
-        def one(given: One) -> Made:
-            if not hasattr(own, "records"):
-                own.records = apart()
-            return work(given, *own.records)
-
-        found = []
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            for made in pool.map(one, several):
-                found.append(made)
-                self.tick()
-        return found
-
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
     """The believed structure with its weights and the shape of its front, sought from `start`, fitted anew."""
@@ -268,20 +238,22 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
     simpler: dict[str, _Screened] = {}
 
-    def begin(option: Option, items: Sequence[Item], held: Sequence[Item]) -> _Screened:
+    def begin(option: Option) -> _Screened:
+        records.tick()
         starts = list(option.starts)
         if option.grown is not None:
             starts.append(option.grown(simpler[option.beyond].fitted.shape))
-        begun = [fits.fit(option.alone, items, start, now.weights, FIRST_STEPS) for start in starts]
+        begun = [fits.fit(option.alone, records.thin, start, now.weights, FIRST_STEPS) for start in starts]
         best = min(begun, key=lambda each: each.rms)
-        fitted = fits.fit(option.alone, items, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
-        return _Screened(option, fitted, fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf)
+        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
+        left = fits.rms(fitted.errors(records.thin_held)) if math.isfinite(fitted.rms) else math.inf
+        return _Screened(option, fitted, left)
 
-    tried = records.side_by_side(begin, [option for option in found if not option.beyond], thin=True)
+    tried = [begin(option) for option in found if not option.beyond]
     for each in tried:
         if any(left < (1.0 - SHARE) * b for left, b in zip((each.fitted.rms, each.left), without, strict=True)):
             simpler[each.option.label] = each
-    tried += records.side_by_side(begin, [option for option in found if option.beyond in simpler], thin=True)
+    tried += [begin(option) for option in found if option.beyond in simpler]
     tried = [each for each in tried if math.isfinite(each.left)]
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)
@@ -296,27 +268,26 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
 
 def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _Records) -> list[Tried]:
     """The options fitted to everything and run over the held-out records, the best one first."""
-
-    def begin(one: tuple[Option, Fitted], items: Sequence[Item], held: Sequence[Item]) -> _Screened:
-        option, screened = one
-        fitted = fits.fit(option.structure, items, option.joined(now, screened.shape), screened.weights, JOINT_STEPS)
-        return _Screened(option, fitted, fits.rms(fitted.errors(held)))
-
-    begun = records.side_by_side(begin, kept)
+    begun = []
+    for option, screened in kept:
+        records.tick()
+        shape = option.joined(now, screened.shape)
+        fitted = fits.fit(option.structure, records.to_fit, shape, screened.weights, JOINT_STEPS)
+        begun.append(_Screened(option, fitted, records.left(fitted)))
     hopeful = HOPEFUL * min((each.left for each in begun), default=0.0)
-
-    def finish(one: _Screened, items: Sequence[Item], held: Sequence[Item]) -> Tried:
-        option, fitted = one.option, one.fitted
-        if one.left <= hopeful:
-            fitted = fits.fit(option.structure, items, fitted.shape, fitted.weights)
-        errors = fitted.errors(held)
+    tried = []
+    for each in begun:
+        option, fitted = each.option, each.fitted
+        if each.left <= hopeful:
+            fitted = fits.fit(option.structure, records.to_fit, fitted.shape, fitted.weights)
+        if fitted.rms >= now.rms:
+            continue
+        errors = fitted.errors(records.held)
         name = option.name
         if option.front:
             shape, _ = fitted.structure.pieces(fitted.shape)
             name = front_name(fitted.structure.front, shape, records.known.drive)
-        return Tried(option, fitted, name, fits.rms(errors), errors)
-
-    tried = [each for each in records.side_by_side(finish, begun) if each.fitted.rms < now.rms]
+        tried.append(Tried(option, fitted, name, fits.rms(errors), errors))
     return sorted(tried, key=lambda each: each.held_out)
 
 
