@@ -162,6 +162,17 @@ def test_what_shows_in_held_out_records_alone(tmp_path: Path) -> None:
     assert not any("alone" in note for note in content.notes)
 
 
+def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) -> None:
+    """A single sweep tells nothing without a history; with one it does."""
+    v = np.concatenate([np.linspace(0.0, 100.0, 600), np.linspace(100.0, 90.0, 60)])
+    sweep = record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "sweep")
+    path = _model(tmp_path)
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"sweep: there is too little to fit.*--history"):
+        hystgen.diagnose(path, sweep, holdout=sweep)
+    content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
+    assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
+
+
 def test_no_records_to_judge_by(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="record"):
         hystgen.diagnose(hystgen.load(_model(tmp_path)), [])

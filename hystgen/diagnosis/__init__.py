@@ -38,7 +38,7 @@ ELSEWHERE = 3.0
 """What is missing shows in held-out records alone where these leave so many times what the fitted ones do."""
 
 ENOUGH = 100
-"""Samples that have to be left of a record when wrong ones are taken out."""
+"""More samples than this have to be left of some record, to fit and held out each."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +152,9 @@ def diagnose(
             for group in (usable[: len(several)], usable[len(several) :])
         )
         ready = believed.prepare(to_fit or read[: len(several)], to_hold, before, rest)
+        for group, what in ((ready.to_fit, "fit"), (ready.held, "judge by")):
+            if not _tells(group):
+                raise IdentificationError(_too_little(group, what))
         ready = _without_faults(ready)
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
@@ -175,9 +178,23 @@ def _without_faults(ready: believed.Prepared) -> believed.Prepared:
     number = len(ready.to_fit)
     items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
     to_fit, held = items[:number], items[number:]
-    if any(not any(np.count_nonzero(item.known) > ENOUGH for item in group) for group in (to_fit, held)):
+    if not (_tells(to_fit) and _tells(held)):
         return ready
     return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
+
+
+def _tells(group: Sequence[Item]) -> bool:
+    """Whether any of the records has enough samples to compare."""
+    return any(np.count_nonzero(item.known) > ENOUGH for item in group)
+
+
+def _too_little(group: Sequence[Item], what: str) -> str:
+    names = ", ".join(item.name for item in group)
+    most = max(int(np.count_nonzero(item.known)) for item in group)
+    return (
+        f"{names}: there is too little to {what}: {most} samples at most in a record behind the start, whose memory is "
+        f"not known, and more than {ENOUGH} are needed; give --history, or records that sweep their range again"
+    )
 
 
 def _shows_elsewhere(refitted: Fitted, ready: believed.Prepared, noise: float) -> bool:
