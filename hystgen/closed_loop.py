@@ -30,7 +30,7 @@ import numbers
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +40,10 @@ from hystgen import fixed_tables, tables
 from hystgen.api import InverseModel, Model, emit_options
 from hystgen.models import PI, Cascade, InverseCascade
 from hystgen.simulation import Session
+
+if TYPE_CHECKING:
+    from hystgen.emission import module
+    from hystgen.verification.instance import Instance
 
 Array = NDArray[np.float64]
 
@@ -295,43 +299,43 @@ class _Operator:
 
 
 class _InUnits:
-    """An operator of an arithmetic behind its converters: physical units in and out.
+    """An operator that speaks an arithmetic's numbers, behind its converters: physical units in and out.
 
     Fixed point gets the nearest code, ties away from zero, as far as codes go (the last one again for a NaN).
     """
 
-    def __init__(self, model: Model, operator: str, arithmetic: str | None, engine: str | None) -> None:
-        if operator not in ("inverse", "forward"):
-            raise ValueError(f"operator {operator!r} is neither inverse nor forward")
-        self._options = emit_options(model, operator, arithmetic, engine)
+    def __init__(self, operator: _Operator | Instance, model: Model, options: module.Options) -> None:
+        self._operator = operator
         self._lsb: tuple[float, float] | None = None
-        if self._options.arithmetic not in tables.FLOAT_ARITHMETICS:
+        if options.arithmetic not in tables.FLOAT_ARITHMETICS:
             emit = model.parameters.emit
-            about = (self._options.arithmetic, self._options.engine, emit.drive_lsb, emit.output_lsb)
+            about = (options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
             codes = fixed_tables.build(model.cascade, *about)[1]
             drive, output = float(codes.drive_lsb), float(codes.output_lsb)
-            self._lsb = (output, drive) if operator == "inverse" else (drive, output)
-            self._most = 2 ** fixed_tables.CODE_BITS[self._options.arithmetic] - 1
+            self._lsb = (output, drive) if options.operator == "inverse" else (drive, output)
+            self._most = 2 ** fixed_tables.CODE_BITS[options.arithmetic] - 1
         self._code = 0
 
     def reset(self) -> None:
+        """Back to the start memory of the parameter file."""
         self._code = 0
-        self._start()
+        self._operator.reset()
 
     def step(self, x: float, /) -> float:
+        """One sample."""
         if self._lsb is None:
-            return float(self._answer(x))
+            return float(self._operator.step(x))
         if not math.isnan(x):
             code = min(max(x / self._lsb[0], -self._most - 1.0), float(self._most))
             whole = math.floor(abs(code))
             self._code = int(math.copysign(whole + (abs(code) - whole >= 0.5), code))
-        return float(self._answer(self._code) * self._lsb[1])
+        return float(self._operator.step(self._code) * self._lsb[1])
 
-    def _start(self) -> None:
-        raise NotImplementedError
 
-    def _answer(self, x: Any) -> Any:
-        raise NotImplementedError
+def _one_operator(model: Model, operator: str, arithmetic: str | None, engine: str | None) -> module.Options:
+    if operator not in ("inverse", "forward"):
+        raise ValueError(f"operator {operator!r} is neither inverse nor forward")
+    return emit_options(model, operator, arithmetic, engine)
 
 
 class BitReference(_InUnits):
@@ -344,14 +348,8 @@ class BitReference(_InUnits):
     def __init__(
         self, model: Model, operator: str = "inverse", arithmetic: str | None = None, engine: str | None = None
     ) -> None:
-        super().__init__(model, operator, arithmetic, engine)
-        self._operator = _Operator(model.session(operator, self._options.arithmetic, self._options.engine))
-
-    def _start(self) -> None:
-        self._operator.reset()
-
-    def _answer(self, x: Any) -> Any:
-        return self._operator.step(x)
+        options = _one_operator(model, operator, arithmetic, engine)
+        super().__init__(_Operator(model.session(operator, options.arithmetic, options.engine)), model, options)
 
 
 class CompiledC(_InUnits):
@@ -371,11 +369,5 @@ class CompiledC(_InUnits):
     ) -> None:
         from hystgen.verification.instance import Instance
 
-        super().__init__(model, operator, arithmetic, engine)
-        self._instance = Instance(model, self._options, compiler)
-
-    def _start(self) -> None:
-        self._instance.init()
-
-    def _answer(self, x: Any) -> Any:
-        return self._instance.step(x)
+        options = _one_operator(model, operator, arithmetic, engine)
+        super().__init__(Instance(model, options, compiler), model, options)

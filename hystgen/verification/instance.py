@@ -42,9 +42,9 @@ class Instance:
         self._context = self._ffi.new("long long[]", size // 8 + 1)
         self._init = getattr(self._library, f"{name}_{op}_init")
         self._step = getattr(self._library, f"{name}_{op}_step")
-        self.init()
+        self.reset()
 
-    def init(self) -> None:
+    def reset(self) -> None:
         """Back to the start memory of the parameter file."""
         self._init(self._context)
 
