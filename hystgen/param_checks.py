@@ -104,6 +104,7 @@ class _Checker:
         self.problems: list[Problem] = []
         self.discretisation: Any = None
         self.effects: list[Effect] = []
+        self._mover: tuple[str, str] | None = None
         self._classes: dict[Path, type[Effect]] = {}
         self._seen: dict[str, str] = {}
         self._bad: set[Path] = set()
@@ -453,6 +454,11 @@ class _Checker:
                     self._structural(place, found["type"], found.get("ctx", {}), found["msg"])
         if made is None or len(self.problems) > before or not self.sound(path):
             return
+        if chosen.moves_plays():
+            first = self._mover = self._mover or (made.name, path_text(path))
+            if first != (made.name, path_text(path)):
+                said = f"says how the plays move, as {printable(first[0])} does (in {first[1]}); keep one of them"
+                self.add((*path, "name"), f"{printable(made.name)} {said}")
         for keys, message in made.problems(self._thresholds()):
             self.add((*path, *keys), message)
         self.effects.append(made)

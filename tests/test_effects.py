@@ -503,9 +503,9 @@ def brute_plays(w: Array) -> Array:
 
 
 def test_play_functions_against_sums() -> None:
-    t, w = drive()
+    _, w = drive()
     terms = ((0.1,), (0.05, 0.02), (-0.1, 0.0, 0.03))
-    found = make("noncongruent", coefficients=terms).plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    found = make("noncongruent", coefficients=terms).bent(brute_plays(w), THRESHOLDS)
     plain, scale = brute_plays(w), THRESHOLDS[-1]
     expected = plain.copy()
     for i, coefficients in enumerate(terms, 1):
@@ -517,9 +517,9 @@ def test_play_functions_against_sums() -> None:
 def test_loop_centre_against_a_sum_of_relays() -> None:
     """A play is half the sum of relays over all centres; their density is what the parameters say."""
     amplitude, centre, width = 0.6, 0.4, 0.7
-    t, w = drive(600)
+    _, w = drive(600)
     found = make("noncongruent", shape="centre", amplitude=amplitude, centre=centre, width=width)
-    rows = found.plays(w, Run(t, w), THRESHOLDS, np.zeros(4))
+    rows = found.bent(brute_plays(w), THRESHOLDS)
     spacing = 1e-3
     centres = np.arange(-8, 8, spacing) + spacing / 2
     density = 1.0 + amplitude / np.cosh((centres - centre) / width) ** 2
@@ -844,6 +844,46 @@ def test_an_own_effect_that_fails_is_named(tmp_path: Path, answer: str, said: st
     t, v = drive()
     with pytest.raises(EffectsError, match=re.escape(said)):
         of(own.model_validate({"name": "user:own", "height": 1.0}), t, v)
+
+
+MOVER = """from typing import ClassVar, Literal
+import numpy as np
+from hystgen import operators
+from hystgen.effects import Effect, Place
+
+class Own(Effect):
+    name: Literal["user:own"] = "user:own"
+    place: ClassVar[Place] = Place.PLAYS
+
+    def plays(self, w, run, thresholds, start):
+        return operators.plays(w, 2.0 * thresholds, start)
+"""
+
+
+def test_an_own_effect_may_move_the_plays_and_others_bend_them(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(MOVER)
+    path = tmp_path / "stage.yaml"
+    head = "hystgen: 1\nname: stage\ninput_range: [-4, 4]\nmodel:\n  pi: {thresholds: [0, 1], weights: [1.5, 0.75]}\n"
+    path.write_text(head + "  effects: [{name: noncongruent, coefficients: [[0.5]]}, {name: user:own}]\n")
+    model = hystgen.load(path, effects=[tmp_path / "own.py"])
+    v = 4.0 * np.sin(np.arange(500) / 40)
+    play = 0.0
+    for y, x in zip(model.simulate(v, t=np.arange(500.0)), v, strict=True):
+        play = min(max(play, x - 2.0), x + 2.0)
+        # six roundings on either side, of numbers no larger than these terms together
+        exact, size = 1.5 * x + 0.75 * (play + 0.5 * play * play), 1.5 * abs(x) + 0.75 * abs(play) * (1 + abs(play))
+        assert abs(y - exact) <= 12 * 2.0**-53 * size
+
+
+def test_one_effect_says_how_the_plays_move(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(MOVER)
+    path = tmp_path / "stage.yaml"
+    path.write_text(FILE + "    - {name: rate_dependence, betas: [0.1, 0.1, 0.1]}\n    - {name: user:own}\n")
+    from hystgen.params import ParameterError
+
+    with pytest.raises(ParameterError, match="user:own says how the plays move, as rate_dependence does") as caught:
+        hystgen.load(path, effects=[tmp_path / "own.py"])
+    assert [p.path for p in caught.value.problems] == ["model.effects[1].name"]
 
 
 # The command line -----------------------------------------------------------------------------------------

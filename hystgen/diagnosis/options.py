@@ -76,6 +76,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     """Every extension of a hypothesis by one effect."""
     structure, held = now.structure, now.structure.held(now.shape)
     there = [part.name for part in structure.parts]
+    moved = any(effect.moves_plays() for effect in structure.effects(now.shape))
     found = []
     if not held.front.stages(np.empty(0)):
         tanh = Tanh(known.drive)
@@ -93,6 +94,8 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
     for name, kind in kinds:
         if (name in there and not kind.repeatable) or not known.columns.issuperset(kind.columns):
+            continue
+        if moved and kind.moves_plays():
             continue
         for candidate in kind.candidates(known):
             part = Part(name, candidate)

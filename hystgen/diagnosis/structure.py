@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
+from hystgen.effects import chain
 from hystgen.effects.base import Candidate, Effect, Place, Run
 from hystgen.identification import joint, reduction, weights
 from hystgen.identification.constrained import root_mean_square
@@ -177,9 +177,7 @@ class Actuator:
         course = joint.through_front(course, self.stages)
         w = course.v
         start = reduction.start_states(w, course.history, self.thresholds)
-        plays = operators.plays(w, self.thresholds, start)
-        for k, effect in enumerate(memory):
-            plays = effect.bent(plays, self.thresholds) if k else effect.plays(w, item.run, self.thresholds, start)
+        plays = chain.plays(memory, w, item.run, self.thresholds, start)
         while len(item.moved) >= REMEMBERED:
             del item.moved[next(iter(item.moved))]
         if plays.nbytes <= MOST_BYTES:

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from hystgen import operators
+
 Array = NDArray[np.float64]
 
 
@@ -104,7 +106,10 @@ class Candidate:
 
 
 class Effect(BaseModel):
-    """An effect with its parameters; a subclass has a `place`, the matching method and the keys of the YAML entry."""
+    """An effect with its parameters; a subclass has a `place`, a method of that place and the keys of the YAML entry.
+
+    A method that is not overridden does nothing to what passes.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -136,19 +141,24 @@ class Effect(BaseModel):
 
     def drive(self, a: Array, run: Run) -> Array:
         """DRIVE: the drive (N,) behind the effect."""
-        raise NotImplementedError
+        return a
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """PLAYS: rows (n+1, N) that the weights sum, for the input `w` (N,) of the plays."""
-        raise NotImplementedError
+        """PLAYS: how the plays move, rows (n+1, N) for their input `w` (N,); one effect of a model may override it."""
+        return operators.plays(w, thresholds, start)
+
+    @classmethod
+    def moves_plays(cls) -> bool:
+        """Whether it says how the plays move."""
+        return cls.plays is not Effect.plays
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
-        """PLAYS of an order above 0: rows (n+1, N) in place of those of the effect before it."""
-        raise NotImplementedError
+        """PLAYS: what becomes of the plays' rows (n+1, N) before the weights sum them."""
+        return rows
 
     def filtered(self, h: Array, run: Run) -> Array:
         """LINEAR: every row of `h`, (N,) or (k, N), filtered by itself, from rest at its first sample."""
-        raise NotImplementedError
+        return h
 
     def gain(self, run: Run) -> Array:
         """GAIN: factor (N,)."""
@@ -160,11 +170,11 @@ class Effect(BaseModel):
 
     def mapped(self, y: Array, run: Run) -> Array:
         """OUTPUT: the output (N,) behind the effect."""
-        raise NotImplementedError
+        return y
 
     def added(self, run: Run) -> Array:
         """ADDED: what is added to the output (N,)."""
-        raise NotImplementedError
+        return np.zeros(len(run.t))
 
     def transients(self, run: Run) -> Array:
         """Responses (k, N) to an unknown start state, which a fit may add to a record with free factors."""

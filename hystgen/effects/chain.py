@@ -160,18 +160,26 @@ class Chain:
     def plays(self, w: Array, run: Run) -> Array:
         """Rows (n+1, N) that the weights sum, from the start memory."""
         pi = self.cascade.pi
-        thresholds, start = np.asarray(pi.thresholds), np.asarray(pi.start)
-        rows = None
-        for effect in self._of(Place.PLAYS):
-            expected = np.empty((len(thresholds), len(w)))
-            if rows is None:
-                rows = _answer(effect, "plays", expected, w, run, thresholds, start)
-            else:
-                rows = _answer(effect, "bent", expected, rows, thresholds)
-        return operators.plays(w, thresholds, start) if rows is None else rows
+        return plays(self._of(Place.PLAYS), w, run, np.asarray(pi.thresholds), np.asarray(pi.start))
 
     def _of(self, place: Place) -> list[Effect]:
         return [effect for effect in self.effects if effect.place is place]
+
+
+def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+    """Rows (n+1, N) that the weights sum: the plays as the one effect that moves them says, behind all that bend them.
+
+    `effects`: those of Place.PLAYS, in order.
+    """
+    expected = np.empty((len(thresholds), len(w)))
+    mover = next((effect for effect in effects if effect.moves_plays()), None)
+    if mover is None:
+        rows = operators.plays(w, thresholds, start)
+    else:
+        rows = _answer(mover, "plays", expected, w, run, thresholds, start)
+    for effect in effects:
+        rows = _answer(effect, "bent", expected, rows, thresholds)
+    return rows
 
 
 def _answer(effect: Effect, method: str, like: Array, *arguments: object) -> Array:

@@ -8,8 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen import operators
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, span
+from hystgen.effects.base import About, Array, Candidate, Effect, Place, span
 from hystgen.param_models import MAX_PLAYS, Number, Positive
 
 MAX_TERMS = 8
@@ -28,10 +27,6 @@ class _Noncongruent(Effect):
         """There are plays to bend."""
         if thresholds is not None and len(thresholds) < 2:
             yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
-
-    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """Plays behind their functions."""
-        return self.bent(operators.plays(w, thresholds, start), thresholds)
 
 
 class PlayFunctions(_Noncongruent):

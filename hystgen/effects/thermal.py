@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -25,9 +26,9 @@ class _Thermal(Effect):
     offset_per_degree: Number = Field(default=0.0, description="change of offset, output units/K")
     reference: Number = Field(default=20.0, description="temperature at which nothing changes, degC")
 
+    @abstractmethod
     def above(self, run: Run) -> Array:
         """Temperature above the reference (N,), K."""
-        raise NotImplementedError
 
     def gain(self, run: Run) -> Array:
         """`1 + gain_per_degree (T - reference)`."""

@@ -17,7 +17,7 @@ PREFIX = "user:"
 
 METHODS = {
     Place.DRIVE: ("drive",),
-    Place.PLAYS: ("plays",),
+    Place.PLAYS: ("plays", "bent"),
     Place.LINEAR: ("filtered",),
     Place.GAIN: ("gain", "offset"),
     Place.OUTPUT: ("mapped",),
