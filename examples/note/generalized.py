@@ -132,14 +132,7 @@ def _example_5(folder: Path) -> None:
     v = model.inverse().simulate(u)
     y = model.simulate(v)
     note.close("Example 5, compensation (49)", y, u, 1e-12 * np.ptp(u))
-    drawn, (forward, backward, both) = note.panels(3, 3)
-    forward.plot(v, y, color=note.FIRST)
-    backward.plot(u, v, color=note.SECOND)
-    both.plot(u, y, color=note.THIRD)
-    note.describe(forward, "a", "Example 5, model", note.DRIVE, note.ANSWER)
-    note.describe(backward, "b", "Inverse", note.REFERENCE, note.DRIVE)
-    note.describe(both, "c", "Compensated", note.REFERENCE, note.ANSWER)
-    note.save(folder, "figure_23", drawn)
+    inverse.save_compensation(folder, "figure_23", "Example 5", u, v, y)
 
 
 def _example_6(folder: Path) -> None:

@@ -56,6 +56,18 @@ def draw_tracking(areas: list[Any], letters: str, u: note.Array, y: note.Array, 
     note.describe(line, letters[1], "Output over reference", note.REFERENCE, note.ANSWER)
 
 
+def save_compensation(folder: Path, name: str, example: str, u: note.Array, v: note.Array, y: note.Array) -> None:
+    """Inverse, model and both in a row, each over its input: reference u, drive v, output y."""
+    drawn, (inverse, model, both) = note.panels(3, 3)
+    inverse.plot(u, v, color=note.SECOND)
+    model.plot(v, y, color=note.FIRST)
+    both.plot(u, y, color=note.THIRD)
+    note.describe(inverse, "a", f"{example}, inverse", note.REFERENCE, note.DRIVE)
+    note.describe(model, "b", "Model", note.DRIVE, note.ANSWER)
+    note.describe(both, "c", "Compensated", note.REFERENCE, note.ANSWER)
+    note.save(folder, name, drawn)
+
+
 def _exact(folder: Path) -> None:
     u = note.sine(10.0)
     y = note.EXAMPLE_1.simulate(note.EXAMPLE_1.inverse().simulate(u))
@@ -92,11 +104,4 @@ def _two_frequencies(folder: Path) -> None:
     v = note.EXAMPLE_1.inverse().simulate(u)
     y = note.EXAMPLE_1.simulate(v)
     note.close("Example 3, compensation by the exact inverse", y, u, 1e-13)
-    drawn, (inverse, model, both) = note.panels(3, 3)
-    inverse.plot(u, v, color=note.SECOND)
-    model.plot(v, y, color=note.FIRST)
-    both.plot(u, y, color=note.THIRD)
-    note.describe(inverse, "a", "Example 3, inverse", note.REFERENCE, note.DRIVE)
-    note.describe(model, "b", "Model", note.DRIVE, note.ANSWER)
-    note.describe(both, "c", "Compensated", note.REFERENCE, note.ANSWER)
-    note.save(folder, "figure_14", drawn)
+    save_compensation(folder, "figure_14", "Example 3", u, v, y)
