@@ -141,8 +141,8 @@ class TestNoise:
         assert selection.difference(less, before) > 0.9
 
 
-def test_what_shows_in_held_out_records_alone(tmp_path: Path) -> None:
-    """Only the steps of the held-out record are faster than the amplifier."""
+def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> None:
+    """Only the steps of one record are faster than the amplifier: held out, they are no ground for any number."""
     slow = [np.concatenate([np.linspace(0.0, v[0], 40), v]) for v in (wander(seed, turns=40) for seed in (1, 2))]
     steps = np.concatenate([np.zeros(40), np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
     records = []
@@ -152,14 +152,28 @@ def test_what_shows_in_held_out_records_alone(tmp_path: Path) -> None:
             a[k] = a[k - 1] + np.clip(v[k] - a[k - 1], -7.0, 7.0)  # 7000 a second
         y = noisy(brute_output(a, (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0), 0.05, number)
         records.append(record(v, y, f"record {number}"))
-    found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0])
-    assert [effect["name"] for effect in found.content["effects"]] == ["slew_limit"]
-    assert found.content["effects"][0]["parameters"]["rate"] == pytest.approx(7000.0, rel=1e-3)
-    gap = found.content["gap"]
-    assert gap["after"]["holdout"] < 0.05 * gap["refitted"]["holdout"]
-    assert any("shows in held-out records alone (record 2)" in note for note in found.notes)
-    content = hystgen.diagnose(_model(tmp_path), records[1:], holdout=records[:1], history=[0.0])
-    assert not any("alone" in note for note in content.notes)
+    found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0]).content
+    assert found["verdict"] == "unexplained"
+    assert any(advice.startswith("fit record 2 too and hold out others") for advice in found["advice"])
+    found = hystgen.diagnose(_model(tmp_path), records[1:], holdout=records[:1], history=[0.0]).content
+    assert [effect["name"] for effect in found["effects"]] == ["slew_limit"]
+    assert found["effects"][0]["parameters"]["rate"] == pytest.approx(7000.0, rel=1e-3)
+    assert not any("hold out others" in advice for advice in found["advice"])
+
+
+def test_held_out_records_take_no_part_in_the_fit(tmp_path: Path) -> None:
+    """Whatever a held-out record says, the refitted model stays as it is."""
+    records = []
+    for number in (1, 2, 3):
+        v = np.concatenate([np.linspace(0.0, 30.0, 40), 0.3 * wander(number, turns=40)])
+        records.append(record(v, noisy(brute_output(v, (0.0, 5.0), (1.0, 0.5), 0.0), 0.02, number), f"record {number}"))
+    wide = 3.0 * np.asarray(records[2].v)
+    other = record(wide, noisy(brute_output(wide, (0.0, 5.0, 40.0), (1.0, 0.5, 0.8), 0.0), 0.02, 4), "wide")
+    fits = [
+        hystgen.diagnose(_model(tmp_path), records[:2], holdout=held, history=[0.0]).content["gap"]["refitted"]["fit"]
+        for held in (records[2], other)
+    ]
+    assert fits[0] == fits[1]
 
 
 def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) -> None:

@@ -34,9 +34,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ELSEWHERE = 3.0
-"""What is missing shows in held-out records alone where these leave so many times what the fitted ones do."""
-
 ENOUGH = 100
 """More samples than this have to be left of some record, to fit and held out each."""
 
@@ -159,9 +156,6 @@ def diagnose(
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
         refitted = selection.refit(base, ready.to_fit, start)
-        if _shows_elsewhere(refitted, ready, noise.rms):
-            ready = believed.shared(ready)
-            refitted = selection.refit(base, ready.to_fit, start)
         found = selection.select(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
@@ -195,11 +189,6 @@ def _too_little(group: Sequence[Item], what: str) -> str:
         f"{names}: there is too little to {what}: {most} samples at most in a record behind the start, whose memory is "
         f"not known, and more than {ENOUGH} are needed; give --history, or records that sweep their range again"
     )
-
-
-def _shows_elsewhere(refitted: Fitted, ready: believed.Prepared, noise: float) -> bool:
-    """Whether the refitted model leaves far more on held-out records than where it was fitted, noise aside."""
-    return structure.rms(refitted.errors(ready.held)) > ELSEWHERE * max(refitted.rms, noise)
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:

@@ -27,10 +27,6 @@ SET_ASIDE = 0.3
 """Share of a single record, its end, that is held out where nothing else can be."""
 
 
-PARTS = 8
-"""Parts of a record that is fitted and held out by turns."""
-
-
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
     """The believed front as a family around it, and the shape that it has in that family."""
     if not stages:
@@ -162,19 +158,6 @@ def _ends(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
         fronts.append(replace(item, y=front))
         ends.append(replace(item, y=end))
     return fronts, ends
-
-
-def shared(found: Prepared) -> Prepared:
-    """With every other part of the held-out records fitted too: what shows in those alone cannot be found otherwise."""
-    fitted, held = [], []
-    for item in found.held:
-        place = np.cumsum(item.known) * PARTS // max(int(np.count_nonzero(item.known)), 1)
-        odd = place % 2 == 1
-        fitted.append(replace(item, y=np.where(odd, item.y, np.nan)))
-        held.append(replace(item, y=np.where(odd, np.nan, item.y)))
-    names = ", ".join(item.name for item in held)
-    note = f"what is missing shows in held-out records alone ({names}): every other one of {PARTS} parts was fitted too"
-    return replace(found, to_fit=[*found.to_fit, *fitted], held=held, notes=[*found.notes, note])
 
 
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:

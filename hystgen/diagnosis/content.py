@@ -11,7 +11,7 @@ from hystgen.diagnosis import bad_samples, description, intervals, periodic, sti
 from hystgen.diagnosis.believed import Prepared
 from hystgen.diagnosis.floor import Floor
 from hystgen.diagnosis.selection import Found, Outcome
-from hystgen.diagnosis.structure import Fitted
+from hystgen.diagnosis.structure import Array, Fitted
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -24,6 +24,9 @@ ABOVE_FLOOR = 1.25
 
 FAR_ABOVE = 2.0
 """One this much larger is, whatever it goes with: noise that is not white exceeds its floor by less."""
+
+ELSEWHERE = 3.0
+"""What is left shows in a held-out record alone where that leaves so many times what the fitted ones do."""
 
 
 def content_of(
@@ -51,7 +54,8 @@ def content_of(
     rest = structure.rms(errors[len(ready.to_fit) :])
     ratio = rest / noise.rms if noise.rms else float("inf")
     if ratio > FAR_ABOVE or (share > STRUCTURE and ratio > ABOVE_FLOOR):
-        left.append(description.described(everything, errors, noise.rms))
+        alone = _alone(ready, after[1], max(last[0], noise.rms))
+        left.append({**description.described(everything, errors, noise.rms), "held_out_alone": alone})
     verdict = "effects_found" if found.found else "unexplained" if left else "nothing_missing"
     effects = []
     sure = intervals.intervals(found.fitted, ready.to_fit) if found.found else intervals.Sure({}, ())
@@ -110,6 +114,11 @@ ADVICE: dict[frozenset[str], str] = {
 
 def _advice(one: str, other: str) -> str:
     return f"{one} and {other} cannot be told apart by these records; hystgen diagnose --plan writes drives that can"
+
+
+def _alone(ready: Prepared, errors: Sequence[Array], fitted: float) -> list[str]:
+    """Held-out records with an error that the fitted ones do not have."""
+    return [item.name for item, e in zip(ready.held, errors, strict=True) if structure.rms([e]) > ELSEWHERE * fitted]
 
 
 def _evidence(each: Found) -> str:

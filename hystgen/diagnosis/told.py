@@ -93,6 +93,8 @@ def advice(each: Mapping[str, Any]) -> list[str]:
     if each["kind"] != "structure":
         return []
     said = []
+    if alone := each["held_out_alone"]:  # never fitted, so that what they alone show cannot be found
+        said.append(f"fit {_several(alone)} too and hold out others: what is left shows in held-out records alone")
     if each["rate_free"] is None:
         said.append("record the same loops at two rates a decade apart: that tells whether what is left is rate-free")
     if each["repeatable"] is None:
