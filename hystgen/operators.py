@@ -37,7 +37,7 @@ def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
 
 def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) -> None:
     for k in range(len(v)):
-        state = state + v[k] - previous
+        state = state + (v[k] - previous)  # a repeated sample adds nothing
         previous = v[k]
         if state > r:
             state = r

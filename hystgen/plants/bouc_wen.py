@@ -49,16 +49,17 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
     z = z0
     last = v0
     for k in range(len(v)):
-        s = abs(v[k] - last) / distance
-        sign = 1.0 if v[k] >= last else -1.0
-        x = sign * z
-        if x < 0.0:
-            m, s = _back(-x, s, amplitude, gamma - beta, exponent)
-            x = -m
-        if x >= 0.0:
-            x = _on(x, s, amplitude, gamma + beta, exponent)
-        z = sign * x
-        last = v[k]
+        if v[k] != last:  # there and back by the formulas would not keep every bit
+            s = abs(v[k] - last) / distance
+            sign = 1.0 if v[k] > last else -1.0
+            x = sign * z
+            if x < 0.0:
+                m, s = _back(-x, s, amplitude, gamma - beta, exponent)
+                x = -m
+            if x >= 0.0:
+                x = _on(x, s, amplitude, gamma + beta, exponent)
+            z = sign * x
+            last = v[k]
         out[k] = z
 
 

@@ -64,16 +64,17 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
     force = start
     last = v0
     for k in range(len(v)):
-        sign = 1.0 if v[k] >= last else -1.0
-        s = sigma * abs(v[k] - last) / limit
-        rest = 1.0 - sign * force / limit  # 0 when fully developed in this direction, 2 in the other
-        if exponent == 1.0:
-            rest *= math.exp(-s)
-        elif rest > 0.0:
-            power = rest ** (1.0 - exponent) + (exponent - 1.0) * s
-            rest = power ** (1.0 / (1.0 - exponent)) if power > 0.0 else 0.0
-        force = sign * limit * (1.0 - rest)
-        last = v[k]
+        if v[k] != last:  # there and back by the formulas would not keep every bit
+            sign = 1.0 if v[k] > last else -1.0
+            s = sigma * abs(v[k] - last) / limit
+            rest = 1.0 - sign * force / limit  # 0 when fully developed in this direction, 2 in the other
+            if exponent == 1.0:
+                rest *= math.exp(-s)
+            elif rest > 0.0:
+                power = rest ** (1.0 - exponent) + (exponent - 1.0) * s
+                rest = power ** (1.0 / (1.0 - exponent)) if power > 0.0 else 0.0
+            force = sign * limit * (1.0 - rest)
+            last = v[k]
         out[k] = force
 
 
