@@ -36,7 +36,9 @@ def path(corners: list[float] = CORNERS, samples: int = 25) -> Array:
     return np.concatenate([np.linspace(a, b, samples, endpoint=False) for a, b in pairwise(corners)] + [corners[-1:]])
 
 
-def over_input(slope: Callable[[float, float, float], float], v: Array, start: float, atol: float) -> tuple[Array, float]:
+def over_input(
+    slope: Callable[[float, float, float], float], v: Array, start: float, atol: float
+) -> tuple[Array, float]:
     """State at the samples by scipy, one move between samples at a time; slope(v, y, direction).
 
     And the sum of what its steps were allowed, which is the error at the end where the moves bring states together.
@@ -576,7 +578,7 @@ def test_langevin_has_all_its_digits() -> None:
     assert langevin_slope(0.0) == 1.0 / 3.0
 
 
-def test_jiles_atherton_is_its_equations() -> None:
+def test_jiles_atherton_is_its_equations(allowed: list[float]) -> None:
     """M_irr by scipy and M from `M = (1 - c) M_irr + c M_an(H + alpha M)` by root finding, instead of dM/dH."""
 
     def total(field: float, irreversible: float) -> float:
@@ -591,13 +593,13 @@ def test_jiles_atherton_is_its_equations() -> None:
         return apart / (sign * K - ALPHA * apart) if sign * apart > 0.0 else 0.0
 
     v = path([0.0, 2000.0, -3000.0, 1500.0, -200.0, 900.0, 0.0], 8)
-    irreversible = over_input(slope, v, 0.0, 1e-4)
+    irreversible, error = over_input(slope, v, 0.0, 1e-4)
     expected = [total(x, m) for x, m in zip(v, irreversible, strict=True)]
-    # the root and its kink under the guard limit scipy here to about 1e-7 of M_s
-    np.testing.assert_allclose(IRON.simulate(v), expected, rtol=0, atol=1e-6 * MS)
+    found = IRON.simulate(v)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=(sum(allowed) + error) * spread(IRON) + 1e-6)
 
 
-def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibility() -> None:
+def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibility(allowed: list[float]) -> None:
     """The relations of Jiles, Thoelke and Devine 1992 between k and what is read from a loop.
 
     At the coercive field, with its slope X: `k = M_an/(1-c) (alpha + (1-c) / (X - c dM_an/dH))`; at the remanence
@@ -607,31 +609,41 @@ def test_jiles_atherton_has_the_published_coercivity_remanence_and_susceptibilit
     m = IRON.simulate(field)
     rise, h = m[-40001:], field[-40001:]
 
-    def slopes(k: int) -> tuple[float, float]:
-        curve = [anhysteretic(float(h[j]), float(rise[j])) for j in (k - 1, k + 1)]
-        return (rise[k + 1] - rise[k - 1]) / (h[k + 1] - h[k - 1]), (curve[1] - curve[0]) / (h[k + 1] - h[k - 1])
+    def at(k: int, step: int) -> tuple[float, float, float]:
+        """M_an - M, dM/dH and dM_an/dH at a sample, as differences over some steps to either side."""
+        near, far = (anhysteretic(float(h[j]), float(rise[j])) for j in (k - step, k + step))
+        here = anhysteretic(float(h[k]), float(rise[k])) - float(rise[k])
+        way = float(h[k + step] - h[k - step])
+        return here, float(rise[k + step] - rise[k - step]) / way, (far - near) / way
 
-    at_zero = int(np.argmin(np.abs(rise)))
-    x, reversible = slopes(at_zero)
-    middle = float(rise[at_zero])
-    m_an = (anhysteretic(float(h[at_zero]), middle) - middle) / (1.0 - C)
-    assert m_an * (ALPHA + (1.0 - C) / (x - C * reversible)) == pytest.approx(K, rel=1e-3)
-    assert 0.0 < h[at_zero] < 1.5 * K
+    def pinning(k: int, step: int) -> float:
+        apart, x, reversible = at(k, step)
+        return apart / (1.0 - C) * (ALPHA + (1.0 - C) / (x - C * reversible))
 
-    without = int(np.argmin(np.abs(h)))
-    x, reversible = slopes(without)
-    m_r = float(rise[without])
-    # rising through the field 0 the remanence is negative, and so are M_an and the term of k
-    expected = anhysteretic(0.0, m_r) - K / (ALPHA / (1.0 - C) + 1.0 / (x - C * reversible))
-    assert m_r < -0.1 * MS
-    assert m_r == pytest.approx(expected, rel=1e-3)
+    def remanence(k: int, step: int) -> float:
+        # rising through the field 0 the remanence is negative, and so are M_an and the term of k
+        _, x, reversible = at(k, step)
+        return anhysteretic(0.0, float(rise[k])) - K / (ALPHA / (1.0 - C) + 1.0 / (x - C * reversible))
 
-    first = IRON.simulate([1e-3])[0] / 1e-3
+    # differences over two steps are off by four times as much as those over one, those by a third of the change
+    coercive, without = int(np.argmin(np.abs(rise))), int(np.argmin(np.abs(h)))
+    assert 0.0 < h[coercive] < 1.5 * K
+    assert abs(pinning(coercive, 1) - K) <= 0.5 * abs(pinning(coercive, 2) - pinning(coercive, 1))
+    assert h[without] == 0.0
+    assert rise[without] < -0.1 * MS
+    assert abs(remanence(without, 1) - rise[without]) <= 0.5 * abs(remanence(without, 2) - remanence(without, 1))
+
+    allowed.clear()
+    step = 1e-3
+    first = IRON.simulate([step])[0] / step
     reversible = C * MS / (3.0 * A)
-    assert first == pytest.approx(reversible / (1.0 - ALPHA * reversible), rel=1e-4)
+    slope = reversible / (1.0 - ALPHA * reversible)
+    # M_irr lags behind M_an by all of it at most, and adds that over k to the slope
+    ahead = MS / (3.0 * A - ALPHA * MS) * step / K
+    assert -sum(allowed) / step <= first - slope <= ahead + sum(allowed) / step
 
 
-def test_jiles_atherton_without_pinning_is_anhysteretic() -> None:
+def test_jiles_atherton_without_pinning_is_anhysteretic(allowed: list[float]) -> None:
     """`|M - M_an| <= k dM/dH`, so nothing is left as k goes to 0; initial slope `M_s / (3 a - alpha M_s)` (1992)."""
     k = 0.05
     plant = plants.JilesAtherton(MS, A, k, ALPHA, C)
@@ -641,7 +653,12 @@ def test_jiles_atherton_without_pinning_is_anhysteretic() -> None:
     gap = np.abs([anhysteretic(float(x), float(y)) - y for x, y in zip(v, m, strict=True)])
     assert gap.max() > 0.0
     assert np.all(gap <= k * steepest)
-    assert plant.simulate([20.0])[0] / 20.0 == pytest.approx(steepest, rel=3.0 * k / 20.0)
+    # k off in the field, and the cubic term of M_an, a share x^2 / 15 of it
+    x = (20.0 + ALPHA * steepest * 20.0) / A
+    allowed.clear()
+    first = plant.simulate([20.0])[0]
+    least = steepest * (20.0 - k - A * x**3 / 15.0)
+    assert least - sum(allowed) <= first <= steepest * 20.0
 
 
 def test_jiles_atherton_never_has_a_negative_slope() -> None:
@@ -672,14 +689,16 @@ def test_plants_that_are_play_sums_are_linearised_to_the_rounding(example: Any, 
     """With their thresholds given, that is what identification finds: the rest is the arithmetic's.
 
     A float32 compensator rounds reference, sum and drive, and a plant's steepest slope is a few times its mean one:
-    8 units of the last place of full scale hold all of it.
+    8 units of the last place of full scale hold all of it. Weights are written with 10 digits, and found to them; the
+    plays, weighted, add up to less than twice the output's range, and exchanged they stand in front of that slope.
     """
     (case,) = (case for case in example.cases() if case.name == name and case.thresholds)
     result = example.measure(case)
-    assert result.held_out < 1e-6
+    written = 100.0 * 2.0 * 1e-9
+    assert result.held_out <= written
     assert result.compensated[1] <= 100.0 * 8.0 * 2.0**-23
     assert result.fixed_point is not None
-    assert result.fixed_point[1] <= 100.0 * 8.0 * 2.0**-31 + 1e3 * result.held_out
+    assert result.fixed_point[1] <= 100.0 * 8.0 * 2.0**-31 + 4.0 * written
     assert result.scaled[0] > 1.0
 
 
@@ -697,11 +716,22 @@ def test_other_plants_are_linearised_about_as_well_as_they_are_identified(exampl
 def test_what_a_play_sum_cannot_do_is_told_apart(example: Any) -> None:
     """Spread over places, dependence on history and openness of minor loops: 0 for a play sum, and each kind of plant
     shows those that its remark names."""
-    traits = {case.name: example.memory(case) for case in example.cases()}
-    for name in ("Preisach, surface of a play sum", "Maxwell-slip"):
-        assert max(traits[name]) < 1e-9
-    for name in ("Preisach, bell-shaped density", "Krasnosel'skii-Pokrovskii"):
+    cases = {case.name: case for case in example.cases()}
+    traits = {name: example.memory(case) for name, case in cases.items()}
+
+    def rounding(name: str, each: int) -> float:
+        """Of two heights, in %, where every output has at most so many roundings of the size of the largest."""
+        y = np.abs(cases[name].plant(example.in_range(np.array([0.5, 0.0, 1.0, 0.45, 0.55]), cases[name].drive)))
+        return float(100.0 * 4.0 * each * U * np.max(y) / abs(y[-1] - y[-2]))
+
+    # each output of a surface stands on 5 others at most, each with 8 roundings of a surface and two of an input
+    assert max(traits["Preisach, surface of a play sum"]) <= rounding("Preisach, surface of a play sum", 50)
+    # 6 samples with two roundings in each of 4 stops and two of an input, then a sum of 5 products
+    assert max(traits["Maxwell-slip"]) <= rounding("Maxwell-slip", 24)
+    for name, each in (("Preisach, bell-shaped density", 50), ("Krasnosel'skii-Pokrovskii", 820 + 2)):
         assert traits[name][0] > 10.0
-        assert max(traits[name][1:]) < 1e-9
+        assert traits[name][1] <= rounding(name, each)
+    for name in ("Preisach, surface of a play sum", "Preisach, bell-shaped density", "Krasnosel'skii-Pokrovskii"):
+        assert traits[name][2] == 0.0, "the corner that a loop returns to is the one that it left"
     for name in ("Dahl friction in a positioner", "Bouc-Wen, alpha = 1.6", "Duhem, Coleman-Hodgdon", "Jiles-Atherton"):
         assert min(traits[name]) > 1.0
