@@ -64,6 +64,7 @@ def allowed(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     odeint = scipy.integrate.odeint
 
     def counted(slope: Any, start: float, v: Array, *, rtol: float, atol: float, **kwargs: Any) -> Any:
+        assert rtol <= 1e-11
         y, told = odeint(slope, start, v, rtol=rtol, atol=atol, **kwargs)
         taken = np.where(v[1:] == v[0], 0, told["nst"])  # not set before the first step
         steps, size = np.diff(taken, prepend=0), np.max(np.abs([y[:-1, 0], y[1:, 0]]), axis=0)
@@ -482,6 +483,7 @@ def test_an_everett_table_is_the_integral_of_its_density() -> None:
     assert at(2.5, 0.0) == 3.0 * 0.5 + 3.0 * 1.5 + 1.5**2 / 2.0
     assert at(3.0, 1.0) == 1.5**2 / 2.0 + 2.0 * 0.5 * 1.5 + 2.0 * 0.5**2 / 2.0
     assert at(1.375, 0.0) == at(1.0, 0.0) + (at(2.5, 0.0) - at(1.0, 0.0)) / 4.0
+    assert at(1.75, 1.375) == (0.5 - 0.25) * at(2.5, 1.0)
     assert at(2.2, 2.2) == at(0.0, 0.0) == at(3.0, 3.0) == 0.0
 
 
