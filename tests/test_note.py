@@ -7,6 +7,7 @@ import importlib
 import re
 import subprocess
 import sys
+from decimal import Decimal
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,13 @@ from hypothesis import strategies as st
 from test_models import DEAD_ZONE_4, ETA, EXAMPLE_1, PI_4, R4, RHO
 
 from hystgen import elastoplastic, operators
+from hystgen.bounds import error_bounds
 from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
 
 ROOT = Path(__file__).resolve().parents[1]
 GALLERY = ROOT / "examples" / "note"
 PAGE = ROOT / "docs" / "note.md"
+U = 2.0**-53  # what one rounding may add, as a share of its result
 
 
 def rows(title: str, columns: int) -> list[list[str]]:
@@ -122,10 +125,10 @@ class TestGallery:
         copy.mkdir()
         for name in ("__main__.py", "printed.py", "operators.py"):
             text = (GALLERY / name).read_text(encoding="utf-8")
-            (copy / name).write_text(text.replace("2.0 - gap, 1e-12", "2.1 - gap, 1e-12"), encoding="utf-8")
+            (copy / name).write_text(text.replace("2.0 - gap, 0.0", "2.1 - gap, 0.0"), encoding="utf-8")
         done = draw(copy, tmp_path / "out")
         assert done.returncode == 1
-        assert done.stderr == "operators.py: mass B stays behind by the gap: off by 0.1, 1e-12 is allowed\n"
+        assert done.stderr == "operators.py: mass B stays behind by the gap: off by 0.1, 0 is allowed\n"
 
 
 @given(
@@ -158,8 +161,13 @@ def test_the_inverse_dead_zone_sum_undoes_the_sum(
 
     drives = np.array(v)
     w = summed(zone, drives)
-    np.testing.assert_allclose(summed(inverse, w), drives, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(zone.inverse(w), drives, rtol=0, atol=1e-10)
+    # sums of one term a dead zone, each of a few roundings: the sum's own, which the inverse scales by its slopes at
+    # most, those of tau, which are such sums too, and the inverse's
+    there = np.abs(zone.weights) @ (np.max(np.abs(drives)) + np.abs(zone.thresholds))
+    back = np.abs(inverse.weights) @ (np.max(np.abs(w)) + np.abs(inverse.thresholds))
+    small = (len(rho) + 8) * U * (2 * there * np.abs(inverse.weights).sum() + back)
+    np.testing.assert_allclose(summed(inverse, w), drives, rtol=0, atol=small)
+    np.testing.assert_allclose(zone.inverse(w), drives, rtol=0, atol=small)
 
 
 def off(found: object, expected: object) -> float:
@@ -170,30 +178,30 @@ class TestMisprints:
     """What is printed, computed as it is printed, and the numbers of docs/note.md."""
 
     T = np.linspace(0, 2, 2001)
-    v = 1 + 3 * np.sin(2 * np.pi * T)
+    v = np.round((1 + 3 * np.sin(2 * np.pi * T)) * 2**20) / 2**20  # whose sums are not rounded
 
     def test_stop_4(self) -> None:
-        play = operators.play(self.v, 1.0, 0.4)
-        printed = [np.clip(self.v[0] - 0.4, -1, 1)]
+        play = operators.play(self.v, 1.0, 0.375)
+        printed = [np.clip(self.v[0] - 0.375, -1, 1)]
         for x in self.v[1:]:
             printed.append(np.clip(x - self.v[0] + printed[-1], -1, 1))
         assert off(printed + play, self.v) == pytest.approx(2.0, abs=1e-2)
-        assert off(operators.stop(self.v, 1.0, 0.4) + play, self.v) < 1e-14
+        assert (operators.stop(self.v, 1.0, 0.375) + play).tolist() == self.v.tolist()
 
     def test_stop_5(self) -> None:
-        play, stop = operators.play(self.v, 1.0, 0.4)[0], operators.stop(self.v, 1.0, 0.4)[0]
-        assert np.clip(self.v[0] + 0.4, -1, 1) + play - self.v[0] == pytest.approx(0.4)
+        play, stop = operators.play(self.v, 1.0, 0.375)[0], operators.stop(self.v, 1.0, 0.375)[0]
+        assert np.clip(self.v[0] + 0.375, -1, 1) + play - self.v[0] == 0.375
         assert stop + play == self.v[0]
 
     def test_series_element_16(self) -> None:
-        strain, modulus, r = np.array([0.1, 0.2, 0.5]), 1.0, 1.0
+        strain, modulus, r = np.array([0.125, 0.25, 0.5]), 1.0, 1.0
         printed = r * np.sign(np.diff(strain, prepend=0.0))
         assert printed.tolist() == [1.0, 1.0, 1.0]
         plastic = strain - printed / modulus
         assert printed[0] * (plastic[0] - 0.0) < 0, "the slider gives energy"
         right = elastoplastic.series(strain, modulus, r)
-        np.testing.assert_allclose(right.stress, modulus * strain, rtol=1e-15)
-        np.testing.assert_allclose(operators.stop(modulus * strain, r), modulus * strain, rtol=1e-15)
+        assert right.stress.tolist() == (modulus * strain).tolist()
+        assert operators.stop(modulus * strain, r).tolist() == (modulus * strain).tolist()
 
     def test_width_32(self) -> None:
         p, r = np.array(EXAMPLE_1.weights), np.array(EXAMPLE_1.thresholds)
@@ -204,7 +212,8 @@ class TestMisprints:
         v = np.array([0.0, *[1.0, -1.0] * 10])
         assert np.abs(np.diff(v)).sum() > 7 * 2 * EXAMPLE_1.thresholds[-1]
         high, low = (PI(EXAMPLE_1.thresholds, EXAMPLE_1.weights, start).simulate(v)[-1] for start in (1.0, -1.0))
-        assert high - low == pytest.approx(0.9)
+        rounding = error_bounds(Cascade(EXAMPLE_1, (), 0.0, (-1.0, 1.0)), "float64", "corners").forward
+        assert high - low == pytest.approx(0.9, rel=0, abs=rounding)
 
     def test_start_of_the_inverse(self) -> None:
         model, u = PI(EXAMPLE_1.thresholds, EXAMPLE_1.weights, 1.0), 10 * np.sin(2 * np.pi * self.T)
@@ -232,16 +241,16 @@ class TestMisprints:
         assert inverse.weights[-1] == inverse.weights[0] == pytest.approx(11.384, abs=5e-4)
         assert abs(10.226 / inverse.weights[-1] - 1) < 0.12
         eta = np.array([4.765, *ETA])
-        assert eta.sum() == pytest.approx(0.036, abs=1e-12)
+        assert sum(Decimal(str(x)) for x in eta) == Decimal("0.036")
         moved = []
         for step in 0.5e-3 * np.eye(12):
             other = DeadZone([0, *RHO], (eta + step).tolist()).inverse_map()
             moved.append([other.weights[-1] / inverse.weights[-1], other.thresholds[-1] / inverse.thresholds[-1]])
         moved = np.array(moved) - 1
-        assert np.abs(moved).sum(axis=0) == pytest.approx([0.28, 0.002], rel=0.2)
+        assert np.abs(moved).sum(axis=0) == pytest.approx([0.272, 0.002], rel=0, abs=5e-4)
 
     def test_condition_43(self) -> None:
-        assert sum(DEAD_ZONE_4.weights[:11]) == pytest.approx(-4.729)
+        assert sum(Decimal(str(x)) for x in DEAD_ZONE_4.weights[:11]) == Decimal("-4.729")
         assert DEAD_ZONE_4.inverse_problems(-5, 5) == []
         w = DEAD_ZONE_4.forward(np.linspace(-5, 5, 1001))
         assert np.all(np.diff(w) > 0)
@@ -254,8 +263,9 @@ class TestMisprints:
         h = [a0 * np.tanh(a1 * x) + (0.0 if up else gap) for x, up in
              zip(v, np.diff(v, prepend=-9.0) >= 0, strict=True)]  # fmt: skip
         error = np.abs(h - u)
-        assert error.max() == pytest.approx(gap)
-        assert np.flatnonzero(error > 1e-12).tolist() == [4, 5, 8, 9, 10]
+        small = 20 * U * a0  # 6 operations and two functions of a few roundings, of numbers up to a0
+        assert error.max() == pytest.approx(gap, rel=0, abs=small)
+        assert np.flatnonzero(error > small).tolist() == [4, 5, 8, 9, 10]
         envelope = TanhEnvelope((a0, a1, 0.0, 0.0), (a0, a1, 0.0, gap))
         model = Cascade(PI([0.0], [1.0]), (envelope,), 0.0, (-2.0, 2.0))
-        assert off(model.simulate(model.inverse().simulate(u)), u) < 1e-14
+        assert off(model.simulate(model.inverse().simulate(u)), u) <= small

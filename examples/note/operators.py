@@ -52,8 +52,8 @@ def _masses(folder: Path) -> None:
     t = np.linspace(0.0, 6.0, 1201)
     first = np.interp(t, [0.0, 2.0, 4.0, 6.0], [0.0, 2.0, -2.0, 2.0])
     second = operators.play(first, gap)
-    note.close("mass B stays behind by the gap", second[400], 2.0 - gap, 1e-12)
-    note.close("and turns once mass A has crossed it", second[500], 2.0 - gap, 1e-12)
+    note.close("mass B stays behind by the gap", second[400], 2.0 - gap, 0.0)
+    note.close("and turns once mass A has crossed it", second[500], 2.0 - gap, 0.0)
     drawn, (time, loop) = note.panels(2)
     for x, name, colour in ((first, "mass A, $x_1$", note.FIRST), (second, "mass B, $x_2$", note.SECOND)):
         time.plot(t, x, color=colour, label=name)

@@ -29,6 +29,8 @@ EXAMPLE_6 = Cascade(PI_4, (ENVELOPE_6,), 0.0, (-5.0, 5.0))
 
 TIME = np.linspace(0.0, 2.0, 2001)
 """Seconds; two periods of 1 Hz."""
+ROUNDING = 2.0**-53
+"""What one rounding may add, as a share of its result."""
 INPUT, OUTPUT = "input units", "output units"
 DRIVE, ANSWER, REFERENCE = f"input $v$ ({INPUT})", f"output $y$ ({OUTPUT})", f"reference $u$ ({OUTPUT})"
 FIRST, SECOND, THIRD, FOURTH, DIM = (
@@ -56,7 +58,8 @@ def check(what: str, values: ArrayLike, printed: str, off: ArrayLike = 0.0) -> N
         raise MismatchError(f"{what}: {len(found)} values, but {len(texts)} are printed")
     for k, (value, text, more) in enumerate(zip(found.tolist(), texts, allowed.tolist(), strict=True)):
         half = 0.5 * 10.0 ** -len(text.partition(".")[2])
-        if not abs(value - float(text)) <= half * (1.0 + 1e-9) + more:
+        # the printed number and the difference are rounded, too
+        if not abs(value - float(text)) <= half + 2.0 * ROUNDING * abs(float(text)) + more:
             raise MismatchError(f"{what}, entry {k}: {value:.6g} is computed, {text} is printed")
 
 
