@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hystgen import effects
 from hystgen.diagnosis.structure import Fitted, Item, Part, Structure
 from hystgen.effects.base import About, Effect
-from hystgen.identification.fronts import DeadZones, Front, Tanh, even_breaks
+from hystgen.identification.fronts import DeadZones, Ends, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,16 @@ BREAKS, FINER = 4, 8
 BENT, ASIDE = 0.3, 2.0
 """Curvature and place of tanh envelopes from which a search starts too: bent one way all over the range."""
 
+LIMITED = tuple(np.array([share, share, -2.0]) for share in (0.03, 0.1))
+"""Limiters from which a search starts: places outside the range's ends do nothing, nor does a small change of them."""
+
 PLACES = 201
+
+STRAIGHT, NEAR = 0.6, 0.1
+"""A limiter is straight over this share of the range: its slope is the middle one but for that share."""
+
+LIMIT = 0.6
+"""Largest slope at an end of a limiter, over that in the middle."""
 
 
 @dataclass(frozen=True)
@@ -79,13 +88,14 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     moved = any(effect.moves_plays() for effect in structure.effects(now.shape))
     found = []
     if not held.front.stages(np.empty(0)):
-        tanh = Tanh(known.drive)
+        tanh, ends = Tanh(known.drive), Ends(known.drive)
         dead_zones, finer = (DeadZones(known.drive, even_breaks(known.drive, n)) for n in (BREAKS, FINER))
         bent = [np.array([BENT, side]) for side in (-ASIDE, ASIDE)]
         fronts: list[tuple[str, Front, tuple[Array, ...], str]] = [
             ("front of dead zones", dead_zones, (dead_zones.straight,), ""),
             ("front of more dead zones", finer, (finer.straight,), "front of dead zones"),
             ("front of one tanh", tanh, (tanh.straight, *bent), ""),
+            ("front with flatter ends", ends, LIMITED, ""),
         ]
         for label, front, starts, beyond in fronts:
             pair = replace(structure, front=front), replace(held, front=front)
@@ -106,7 +116,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
 
 
 def front_name(front: Front, shape: Array, drive: tuple[float, float]) -> str:
-    """`saturation` for a front that bends alike at both ends and flattens there, else `asymmetry`."""
+    """`saturation` for a front that is straight but for a flat end, or flattens alike at both, else `asymmetry`."""
     v = np.linspace(*drive, PLACES)
     w = v
     for stage in front.stages(shape):
@@ -114,6 +124,10 @@ def front_name(front: Front, shape: Array, drive: tuple[float, float]) -> str:
     bent = w - np.polyval(np.polyfit(v, w, 1), v)
     odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
     slopes = np.diff(w)
+    middle = float(np.median(slopes))
+    straight = np.mean(np.abs(slopes - middle) < NEAR * middle) >= STRAIGHT
+    if straight and min(slopes[: PLACES // 16].mean(), slopes[-PLACES // 16 :].mean()) < LIMIT * middle:
+        return "saturation"
     ends = 0.5 * (slopes[: PLACES // 8].mean() + slopes[-PLACES // 8 :].mean())
     odd_wins = np.sum(odd**2) > 2.0 * np.sum(even**2)
     return "saturation" if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else "asymmetry"
