@@ -28,6 +28,10 @@ REMEMBERED, MOST_BYTES = 3, 2**28
 """Movements of the plays that are remembered for a record, and the size of one that is."""
 
 
+SETTLED = 3
+"""Steps to the offset in front of a map; each takes away all but the map's share of curvature, some per cent."""
+
+
 @dataclass(frozen=True)
 class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
@@ -196,6 +200,13 @@ class Actuator:
                 h = effect.mapped(h, item.run)
         return h
 
+    def level(self, h: Array, item: Item) -> float:
+        """The offset in front of a sensor, and behind a limit, with which the measured output is right on average."""
+        level = float(np.nanmean(item.y - h))
+        for _ in range(SETTLED):
+            level += float(np.nanmean(item.y - self.mapped(h, level, item)))
+        return level
+
     def added(self, item: Item) -> Array:
         """What is added at the very end."""
         total = np.zeros(len(item.run.t))
@@ -223,8 +234,7 @@ class Actuator:
         rows, constant = self.columns(item, p)
         h = rows[0] + constant
         if self.bends:
-            level = float(np.nanmean(item.y - h))
-            h = self.mapped(h, level, item)
+            h = self.mapped(h, self.level(h, item), item)
         e = item.y - h - self.added(item)
         known = np.isfinite(e)
         free = (self.nuisances(item) if free is None else free)[:, known].T
@@ -254,7 +264,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         level = 0.0
         target = item.y - constant
         if here.bends:
-            level = float(np.nanmean(item.y - h))
+            level = here.level(h, item)
             bent = here.mapped(h, level, item)
             step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
             slope = (here.mapped(h + step, level, item) - bent) / step
