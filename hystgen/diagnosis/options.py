@@ -27,10 +27,10 @@ LIMITED = tuple(np.array([share, share, -2.0]) for share in (0.03, 0.1))
 PLACES = 201
 
 STRAIGHT, NEAR = 0.6, 0.1
-"""A limiter is straight over this share of the range: its slope is the middle one but for that share."""
+"""A limiter is straight over this share of the range: its slope is the middle one but for that share of its range."""
 
 LIMIT = 0.6
-"""Largest slope at an end of a limiter, over that in the middle."""
+"""A slope at an end that is less than so many times that in the middle is a limit's alone."""
 
 
 @dataclass(frozen=True)
@@ -115,19 +115,24 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     return found
 
 
-def front_name(front: Front, shape: Array, drive: tuple[float, float]) -> str:
-    """`saturation` for a front that is straight but for a flat end, or flattens alike at both, else `asymmetry`."""
+def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
+    """`saturation` for a front that is straight but for flatter ends, or bends alike at both; else `asymmetry`.
+
+    Both where one end alone is a little flatter: a soft limit there and a bent actuator are one and the same front.
+    """
     v = np.linspace(*drive, PLACES)
     w = v
     for stage in front.stages(shape):
         w = stage.forward(w)
+    slopes = np.diff(w) / np.diff(v)
+    middle, near = float(np.median(slopes)), NEAR * float(np.ptp(slopes))
+    flatter, other = sorted(float(end.mean()) for end in (slopes[: PLACES // 16], slopes[-PLACES // 16 :]))
+    straight = float(np.mean(np.abs(slopes - middle) <= near)) >= STRAIGHT
+    if straight and other <= middle + near and flatter < middle - near:
+        sure = flatter < LIMIT * middle or other < middle - near
+        return ("saturation",) if sure else ("saturation", "asymmetry")
     bent = w - np.polyval(np.polyfit(v, w, 1), v)
     odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
-    slopes = np.diff(w)
-    middle = float(np.median(slopes))
-    straight = np.mean(np.abs(slopes - middle) < NEAR * middle) >= STRAIGHT
-    if straight and min(slopes[: PLACES // 16].mean(), slopes[-PLACES // 16 :].mean()) < LIMIT * middle:
-        return "saturation"
     ends = 0.5 * (slopes[: PLACES // 8].mean() + slopes[-PLACES // 8 :].mean())
     odd_wins = np.sum(odd**2) > 2.0 * np.sum(even**2)
-    return "saturation" if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else "asymmetry"
+    return ("saturation",) if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else ("asymmetry",)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
-from hystgen.diagnosis.options import Option, about, front_name, options
+from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Structure
 from hystgen.effects.base import About, Effect
 from hystgen.identification.fronts import Kept
@@ -81,9 +81,15 @@ class Tried:
 
     option: Option
     fitted: Fitted
-    name: str
+    names: tuple[str, ...]
+    """the name, and others that the same numbers would bear as well"""
     held_out: float
     errors: list[Array]
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.names[0]
 
     @property
     def numbers(self) -> int:
@@ -206,8 +212,9 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
 
 
 def _found(best: Tried, tried: Sequence[Tried], before: float, merit: _Merit, records: _Records) -> Found:
-    rivals = dict.fromkeys(t.name for t in tried if t.name != best.name and _alike(t, best, records.noise))
-    return Found(best.name, best.option.label, before, best.held_out, merit.p_value, tuple(rivals))
+    alike = [t.name for t in tried if t.name != best.name and _alike(t, best, records.noise)]
+    rivals = tuple(dict.fromkeys([*best.names[1:], *alike]))
+    return Found(best.name, best.option.label, before, best.held_out, merit.p_value, rivals)
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
@@ -283,11 +290,11 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
         if fitted.rms >= now.rms:
             continue
         errors = fitted.errors(records.held)
-        name = option.name
+        names: tuple[str, ...] = (option.name,)
         if option.front:
             shape, _ = fitted.structure.pieces(fitted.shape)
-            name = front_name(fitted.structure.front, shape, records.known.drive)
-        tried.append(Tried(option, fitted, name, fits.rms(errors), errors))
+            names = front_names(fitted.structure.front, shape, records.known.drive)
+        tried.append(Tried(option, fitted, names, fits.rms(errors), errors))
     return sorted(tried, key=lambda each: each.held_out)
 
 
