@@ -162,9 +162,15 @@ def exponential_roundings(a: Array, b: Array) -> tuple[Array, Array]:
     return missed[:-1, :-1], missed[:-1, -1] * unit
 
 
+def balanced(exact: Plant) -> tuple[Array, Array, Array]:
+    """A, B and C in doubles, in states that cost an exponential the least of its digits."""
+    a, (scale, _) = linalg.matrix_balance(exact[0].astype(float), permute=False, separate=True)
+    return a, exact[1].astype(float) / scale, exact[2].astype(float) * scale
+
+
 def is_sampled(loop: Loop, exact: Plant) -> bool:
     """Whether the first samples after an impulse are those of the exact plant but for roundings of the exponential."""
-    a, b, c, _ = loop.sampled_plant
+    a, b, c = balanced(exact)
     impulse = decimals([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     found, expected = moved(in_decimals(loop), impulse), moved(exact, impulse)
     of_a, of_b = exponential_roundings(a, b)
@@ -177,13 +183,12 @@ def is_sampled(loop: Loop, exact: Plant) -> bool:
 def plant_roundings(loop: Loop, displacement: Array) -> tuple[Array, float]:
     """Of a sample of the plant, its state and its output: as many as terms are added up."""
     a, b, c, d = loop.sampled_plant
-    largest, h = largest_state(loop, displacement), float(np.max(np.abs(displacement)))
+    largest, h = largest_state(a, b, displacement), float(np.max(np.abs(displacement)))
     state = (len(b) + 1) * U * (np.abs(a) @ largest + np.abs(b) * h)
     return state, (len(b) + 1) * U * float(np.abs(c) @ largest + abs(d) * h)
 
 
-def largest_state(loop: Loop, displacement: Array) -> Array:
-    a, b, _, _ = loop.sampled_plant
+def largest_state(a: Array, b: Array, displacement: Array) -> Array:
     largest, x = np.zeros(len(b)), np.zeros(len(b))
     for h in displacement:
         x = a @ x + b * h
@@ -259,15 +264,15 @@ def test_the_plant_moves_as_the_differential_equation_says() -> None:
         # of every step the root mean square of the four states' errors is held to the tolerance
         missed = np.maximum(missed, 2.0 * np.sum(atol + rtol * np.abs(solved.y), axis=1))
         x = solved.y[:, -1]
-    a, b, c, _ = exponential(1e-4)
+    a, b, c = (x.astype(float) for x in exponential(1e-4)[:3])
     unit = rate ** np.arange(4)
-    plant = np.asarray(a, float) * unit / unit[:, None], np.asarray(b, float) / unit, np.asarray(c, float), 0.0
-    solver = accumulated(closed(plant, 0.185, 185.0 * 1e-4), np.concatenate([missed, [0.0, 0.0]]), 200)[0]
-    own_a, own_b, own_c, _ = loop.sampled_plant
-    of_a, of_b = exponential_roundings(own_a, own_b)
-    inexact = of_a @ largest_state(loop, response.displacement) + of_b * np.max(np.abs(response.displacement))
-    each = np.concatenate([inexact, [0.0, 0.0]])
-    sampling = np.abs(own_c) @ accumulated(closed(loop.sampled_plant, 0.185, 185.0 * 1e-4), each, 200)[:4]
+    step = closed((a * unit / unit[:, None], b / unit, c, 0.0), 0.185, 185.0 * 1e-4)
+    solver = accumulated(step, np.concatenate([missed, [0.0, 0.0]]), 200)[0]
+    a, b, c = balanced(exponential(1e-4))
+    of_a, of_b = exponential_roundings(a, b)
+    inexact = of_a @ largest_state(a, b, response.displacement) + of_b * np.max(np.abs(response.displacement))
+    step = closed((a, b, c, 0.0), 0.185, 185.0 * 1e-4)
+    sampling = np.abs(c) @ accumulated(step, np.concatenate([inexact, [0.0, 0.0]]), 200)[:4]
     assert np.max(np.abs(response.output)) > 0.2
     assert np.max(np.abs(response.output - output)) <= solver + sampling + 2.0 * allowed(loop, GAINS, response)
 
