@@ -10,10 +10,8 @@ Usage: python examples/compensate_plants.py [-o FOLDER]
 from __future__ import annotations
 
 import argparse
-import contextlib
 import csv
 import itertools
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -69,7 +67,7 @@ class Result:
     held_out: float
     scaled: tuple[float, float]
     compensated: tuple[float, float]
-    fixed_point: tuple[float, float] | None
+    fixed_point: tuple[float, float]
     place: float
     history: float
     open_loop: float
@@ -212,8 +210,7 @@ def measure(case: Case) -> Result:
     gain, offset = np.polyfit(v, y, 1)
     drives = {"scaled": np.clip((reference - offset) / gain, *case.drive)}
     drives["compensated"] = in_c(identified, operator, "float32", reference)
-    with contextlib.suppress(hystgen.FormatError):
-        drives["fixed point"] = in_c(identified, operator, "q31", reference)
+    drives["fixed point"] = in_c(identified, operator, "q31", reference)
     outputs = {name: case.plant(np.clip(drive, *case.drive))[first:] for name, drive in drives.items()}
     wanted = reference[first:]
 
@@ -226,8 +223,7 @@ def measure(case: Case) -> Result:
     kind = {"dead_zone": "dead-zone front", "tanh": "tanh front"}[stages[0].kind] if stages else "PI"
     return Result(
         case, kind, len(fit.parameters.model.pi.thresholds) - 1, 100.0 * seen.rms / float(np.ptp(train.y)),
-        percent("scaled"), percent("compensated"), percent("fixed point") if "fixed point" in outputs else None,
-        *memory(case), wanted, outputs,
+        percent("scaled"), percent("compensated"), percent("fixed point"), *memory(case), wanted, outputs,
     )  # fmt: skip
 
 
@@ -239,11 +235,10 @@ HEADER = (
 
 def row(result: Result) -> list[str]:
     """A result as text."""
-    numbers = [result.held_out, *result.scaled, *result.compensated]
-    fixed = f"{result.fixed_point[0]:.2g}" if result.fixed_point else "refused"
+    numbers = [result.held_out, *result.scaled, *result.compensated, result.fixed_point[0]]
     traits = [result.place, result.history, result.open_loop]
     return [
-        result.case.name, result.model, str(result.plays), *(f"{x:.2g}" for x in numbers), fixed,
+        result.case.name, result.model, str(result.plays), *(f"{x:.2g}" for x in numbers),
         *(f"{x:.2g}" if x >= 0.05 else "0" for x in traits), result.case.remark,
     ]  # fmt: skip
 
@@ -286,9 +281,7 @@ def draw(results: list[Result], path: Path) -> None:
 def make(folder: Path) -> list[Result]:
     """Write plants.csv and plants.svg into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        results = [measure(case) for case in cases()]
+    results = [measure(case) for case in cases()]
     with open(folder / "plants.csv", "w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([HEADER, *map(row, results)])
     draw(results, folder / "plants.svg")

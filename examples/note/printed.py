@@ -33,9 +33,7 @@ ROUNDING = 2.0**-53
 """What one rounding may add, as a share of its result."""
 INPUT, OUTPUT = "input units", "output units"
 DRIVE, ANSWER, REFERENCE = f"input $v$ ({INPUT})", f"output $y$ ({OUTPUT})", f"reference $u$ ({OUTPUT})"
-FIRST, SECOND, THIRD, FOURTH, DIM = (
-    drawing.MEASURED, drawing.MODEL, drawing.RESIDUAL, drawing.OTHER, drawing.IGNORED
-)  # fmt: skip
+FIRST, SECOND, THIRD, DIM = drawing.MEASURED, drawing.MODEL, drawing.RESIDUAL, drawing.IGNORED
 
 
 class MismatchError(AssertionError):
@@ -88,14 +86,12 @@ def panels(count: int, columns: int = 2) -> tuple[Any, list[Any]]:
 
 def describe(axes: Any, letter: str, title: str, x: str, y: str, legend: bool = False) -> None:
     """Title with the letter of the panel, axes with units, and the legend where nothing is hidden."""
-    axes.set(title=f"({letter}) {title}" if letter else title, xlabel=x, ylabel=y)
+    axes.set(title=f"({letter}) {title}", xlabel=x, ylabel=y)
     if legend:
         axes.margins(y=0.12)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4, handlelength=1.6, columnspacing=1.4)
 
 
-def save(folder: Path, name: str, drawn: Any) -> Path:
-    """Write the figure as SVG; the file."""
-    path = folder / f"{name}.svg"
-    path.write_bytes(drawing.content(drawn, "svg"))
-    return path
+def save(folder: Path, name: str, drawn: Any) -> None:
+    """Write the figure as SVG."""
+    (folder / f"{name}.svg").write_bytes(drawing.content(drawn, "svg"))
