@@ -15,6 +15,7 @@ import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from hystgen.plants import (
 )
 from hystgen.plants.preisach import EverettTable
 from hystgen.records import Record
+from hystgen.report import drawing
 
 Array = NDArray[np.float64]
 
@@ -250,32 +252,24 @@ def table(results: list[Result]) -> str:
     return "\n".join("  ".join(text.ljust(width) for text, width in zip(line, widths, strict=True)) for line in rows)
 
 
-def draw(results: list[Result], path: Path) -> None:
+def draw(results: list[Result]) -> Any:
     """Output over reference of every plant, without and with its compensator."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     columns = 3
     results = [result for result in results if not result.case.thresholds]
     lines = -(-len(results) // columns)
-    with pyplot.rc_context({"svg.hashsalt": "hystgen", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3}):
-        figure, axes = pyplot.subplots(lines, columns, figsize=(10.0, 3.0 * lines), layout="constrained")
-        for axis, result in zip(axes.flat, results, strict=False):
-            span = result.reference.min(), result.reference.max()
-            for name, colour, label in (("scaled", "#8a929c", "straight line"), ("compensated", "#c2410c", "C")):
-                shown = (np.array([result.reference, result.outputs[name]]) - span[0]) / (span[1] - span[0])
-                rms = result.scaled[0] if name == "scaled" else result.compensated[0]
-                axis.plot(*shown[:, ::14], color=colour, linewidth=0.8, label=f"{label}: {rms:.2g} % rms")
-            axis.set_title(result.case.name, loc="left")
-            axis.legend(loc="upper left", frameon=False)
-        for axis in axes.flat[len(results) :]:
-            axis.axis("off")
-        figure.supxlabel("reference, as a share of its range")
-        figure.supylabel("output")
-        figure.savefig(path, metadata={"Date": None})
-        pyplot.close(figure)
+    figure = drawing.figure(10.4, 3.2 * lines)
+    for k, result in enumerate(results, 1):
+        axis = figure.add_subplot(lines, columns, k)
+        span = result.reference.min(), result.reference.max()
+        for name, colour, label in (("scaled", drawing.IGNORED, "straight line"), ("compensated", drawing.MODEL, "C")):
+            shown = (np.array([result.reference, result.outputs[name]]) - span[0]) / (span[1] - span[0])
+            rms = result.scaled[0] if name == "scaled" else result.compensated[0]
+            axis.plot(*shown[:, ::14], color=colour, linewidth=0.8, label=f"{label}: {rms:.2g} % rms")
+        axis.set_title(result.case.name)
+        axis.legend(loc="upper left")
+    figure.supxlabel("reference, as a share of its range")
+    figure.supylabel("output")
+    return figure
 
 
 def make(folder: Path) -> list[Result]:
@@ -284,15 +278,17 @@ def make(folder: Path) -> list[Result]:
     results = [measure(case) for case in cases()]
     with open(folder / "plants.csv", "w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([HEADER, *map(row, results)])
-    draw(results, folder / "plants.svg")
+    with drawing.styled():
+        (folder / "plants.svg").write_bytes(drawing.content(draw(results), "svg"))
     return results
 
 
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("-o", dest="folder", type=Path, default=Path("plants"), help="where the table and figure go")
-    print(table(make(parser.parse_args().folder)))
+    out = Path(__file__).resolve().parent / "out"
+    parser.add_argument("-o", "--output", type=Path, default=out, help="folder of the table and the figure")
+    print(table(make(parser.parse_args().output)))
 
 
 if __name__ == "__main__":

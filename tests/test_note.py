@@ -123,7 +123,7 @@ class TestGallery:
     def test_a_failure_is_the_exit_code(self, tmp_path: Path) -> None:
         copy = tmp_path / "note"
         copy.mkdir()
-        for name in ("__main__.py", "printed.py", "operators.py"):
+        for name in ("__main__.py", "printed.py", "example_1.yaml", "operators.py"):
             text = (GALLERY / name).read_text(encoding="utf-8")
             (copy / name).write_text(text.replace("2.0 - gap, 0.0", "2.1 - gap, 0.0"), encoding="utf-8")
         done = draw(copy, tmp_path / "out")

@@ -17,10 +17,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-from printed import ESTIMATE_2
+from printed import ESTIMATE_2, STAGE_1, MismatchError, save
 from scipy import signal
 
-import hystgen
 from hystgen.closed_loop import CompiledC, Loop, PIController, Response
 from hystgen.report import drawing
 
@@ -42,19 +41,18 @@ def reference(t: float) -> float:
 
 
 def make(folder: Path) -> None:
-    """Run the loops, print their errors and draw the figures. Raises AssertionError where a figure has changed."""
-    stage = hystgen.load(HERE / "example_1.yaml")
-    rate = stage.parameters.sample_time
+    """Run the loops, print their errors and draw the figures. Raises MismatchError where a figure has changed."""
+    rate = STAGE_1.parameters.sample_time
     assert rate is not None
 
     def run(compensator: object) -> Response:
-        return Loop(PLANT, CONTROLLER, rate, stage, compensator).run(reference, 2 * PERIOD)
+        return Loop(PLANT, CONTROLLER, rate, STAGE_1, compensator).run(reference, 2 * PERIOD)
 
-    parts = (None, stage.inverse(), ESTIMATE_2.inverse(), 1.0 / MEAN_GAIN)
+    parts = (None, STAGE_1.inverse(), ESTIMATE_2.inverse(), 1.0 / MEAN_GAIN)
     cases = {name: run(part) for name, part in zip(EXPECTED, parts, strict=True)}
     alone = cases["no compensator"]
     cases[f"linear scale 1/{gain(alone):.2f}"] = run(1.0 / gain(alone))
-    emitted = {f"emitted C, {name}": run(CompiledC(stage, arithmetic=name)) for name in ("float32", "q15")}
+    emitted = {f"emitted C, {name}": run(CompiledC(STAGE_1, arithmetic=name)) for name in ("float32", "q15")}
 
     title = f"Error in the second period, {1 / rate:.0f} samples/s"
     print(f"{title:44}{'max':>7}{'rms':>9}{'> 1 kHz':>10}")
@@ -72,11 +70,11 @@ def make(folder: Path) -> None:
     for name, expected in EXPECTED.items():
         found = cases[name].max_error(PERIOD)
         if round(found, 3) != expected:
-            raise AssertionError(f"{name}: the largest error is {found:.4f}, {expected} is expected")
+            raise MismatchError(f"{name}: the largest error is {found:.4f}, {expected} is expected")
     folder.mkdir(parents=True, exist_ok=True)
     with drawing.styled():
-        for file, drawn in (("figure_15", paths(cases)), ("figure_16", tracking(cases, emitted))):
-            (folder / f"{file}.svg").write_bytes(drawing.content(drawn, "svg"))
+        save(folder, "figure_15", paths(cases))
+        save(folder, "figure_16", tracking(cases, emitted))
 
 
 def second(response: Response) -> slice:

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import hystgen
 from hystgen import PI, Cascade, DeadZone, TanhEnvelope
 from hystgen.report import drawing
 
 Array = NDArray[np.float64]
 
-EXAMPLE_1 = PI([0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7], [0.72, 0.6, 0.48, 0.36, 0.24, 0.12, 0.012])
+STAGE_1 = hystgen.load(Path(__file__).with_name("example_1.yaml"))
+EXAMPLE_1 = STAGE_1.cascade.pi
 ESTIMATE_2 = PI(
     [0, 0.4678, 0.9178, 1.3678, 1.8178, 2.2678, 2.7178], [0.7536, 0.6192, 0.4835, 0.3637, 0.2464, 0.1410, 0.0184]
 )
