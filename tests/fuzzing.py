@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -53,7 +54,8 @@ class Target:
     def run(self, corpus: Path, seconds: float) -> str:
         """Fuzz, keeping in `corpus` what reached something new. Returns libFuzzer's figures. Raises FuzzError."""
         artifacts = corpus.parent / "found"
-        artifacts.mkdir(exist_ok=True)
+        shutil.rmtree(artifacts, ignore_errors=True)
+        artifacts.mkdir()
         options = [
             f"-max_total_time={seconds}", f"-max_len={LONGEST}", "-len_control=0", "-use_value_profile=1",
             "-timeout=10", "-seed=1", "-print_final_stats=1", "-verbosity=0", f"-artifact_prefix={artifacts}{os.sep}",
@@ -85,11 +87,12 @@ class Target:
         )  # fmt: skip
 
     def _logged(self, *inputs: Path) -> tuple[subprocess.CompletedProcess[str], list[str]]:
-        """The calls of each input, of one that crashes those up to there."""
+        """The calls of each input, of one that crashes those up to there; none where it crashed before the first."""
         log = inputs[0].parent.parent / "calls.txt"
+        log.write_text("")
         done = self._called(*inputs, HYSTGEN_FUZZ_LOG=str(log))
         # before several inputs libFuzzer runs an empty one
-        return done, log.read_text().split("input ")[-len(inputs) :]
+        return done, log.read_text().split("input ")[1:][-len(inputs) :]
 
     def _compare(self, name: str, calls: str) -> int:
         """Raises FuzzError for the first answer, or bits that were read, other than the reference's."""

@@ -11,6 +11,7 @@ import fuzzing
 import numpy as np
 import pytest
 from fuzzing import FuzzError
+from modelfiles import FILES
 
 from hystgen.verification import compilers
 
@@ -98,6 +99,21 @@ def out_of_bounds(text: str) -> str:
 def test_a_defect_is_found(change: Callable[[str], str], said: str, tmp_path: Path) -> None:
     with pytest.raises(FuzzError, match=said):
         fuzz(tmp_path, 5, "plain", "float32", "corners", change=change)
+
+
+def test_a_crash_before_the_first_call_is_told(tmp_path: Path) -> None:
+    """By a program that leaves an artifact and writes no call, beside what an earlier run has found."""
+    binary = tmp_path / "fuzz"
+    artifact = "for each; do case $each in -artifact_prefix=*) : > ${each#*=}crash;; esac; done"
+    binary.write_text(f"#!/bin/sh\n{artifact}\necho crashed >&2\nexit 1\n")
+    binary.chmod(0o755)
+    earlier = tmp_path / "found" / "earlier"
+    earlier.parent.mkdir()
+    earlier.touch()
+    target = fuzzing.Target(fuzzing.Model(fuzzing.parse_parameters(FILES["plain"])), "float32", "corners", binary)
+    with pytest.raises(FuzzError, match=r"\Acrashed\n\Z"):
+        target.run(tmp_path / "corpus", 1)
+    assert [path.name for path in earlier.parent.iterdir()] == ["crash"]
 
 
 @needs_clang
