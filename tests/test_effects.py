@@ -517,9 +517,9 @@ def test_play_functions_against_sums() -> None:
 def test_loop_centre_against_a_sum_of_relays() -> None:
     """A play is half the sum of relays over all centres; their density is what the parameters say."""
     amplitude, centre, width = 0.6, 0.4, 0.7
-    _, w = drive(600)
+    t, w = drive(600)
     found = make("noncongruent", shape="centre", amplitude=amplitude, centre=centre, width=width)
-    rows = found.bent(brute_plays(w), THRESHOLDS)
+    rows, relays = found.bent(brute_plays(w), THRESHOLDS), np.array([w] * 4)
     spacing = 1e-3
     centres = np.arange(-8, 8, spacing) + spacing / 2
     density = 1.0 + amplitude / np.cosh((centres - centre) / width) ** 2
@@ -530,6 +530,9 @@ def test_loop_centre_against_a_sum_of_relays() -> None:
             relay = np.where(x >= centres + THRESHOLDS[i], 1.0, np.where(x <= centres - THRESHOLDS[i], -1.0, relay))
             expected.append(0.5 * spacing * np.sum(density * (relay - np.where(centres < 0.0, 1.0, -1.0))))
         assert np.max(np.abs(rows[i] - expected)) < 3e-3
+        relays[i] = expected
+    y = Chain(CASCADE, [found]).simulate([Run(t, w)])[0]
+    assert np.max(np.abs(y - CASCADE.output_offset - WEIGHTS @ relays)) < 3e-3 * WEIGHTS[1:].sum()
 
 
 @pytest.mark.parametrize("effect", [e for e in EVERY if e.name == "noncongruent"], ids=label)

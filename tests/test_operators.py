@@ -61,12 +61,14 @@ def test_play_stays_within_its_threshold_of_the_input(v: list[float], r: float, 
 
 @given(signals, radii, numbers, st.integers(0, 2**32 - 1))
 def test_rate_independence(v: list[float], r: float, start: float, seed: int) -> None:
-    """(24): any number of samples anywhere on the way from one sample to the next, in order, changes nothing."""
+    """(24): any number of samples anywhere on the way from one sample to the next, in order, or each of them several
+    times, changes nothing."""
     rng = np.random.default_rng(seed)
     course, kept = [v[0]], [0]
     for a, b in pairwise(v):
         between = a + (b - a) * np.sort(rng.uniform(0, 1, rng.integers(0, 4)))
-        course += [*np.clip(between, min(a, b), max(a, b)), b]
+        samples = [*np.clip(between, min(a, b), max(a, b)), b]
+        course += np.repeat(samples, rng.integers(1, 4, len(samples))).tolist()
         kept.append(len(course) - 1)
     np.testing.assert_array_equal(operators.play(course, r, start)[kept], operators.play(v, r, start))
     off = np.abs(operators.stop(course, r, start)[kept] - operators.stop(v, r, start))

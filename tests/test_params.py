@@ -527,6 +527,9 @@ REFUSED = [
         '4:134: model.effects[2].shape: unknown key; known here are name, time',
         '4:150: model.effects[2].time: must be a number, not the text "q"; write it like 0.45',
     ]),
+    case('effect_shape', eff("[{name: drift, shape: bent, rate: 1}]"), [
+        '4:83: model.effects[0].shape: must be linear or curved, not the text "bent"; choose one of them',
+    ]),
     case('effect_numbers', eff("[{name: lag, time_constant: -1}, {name: resonance, frequency: 0, damping: 11}, {name: drift, rate: .inf}]"), [
         '4:89: model.effects[0].time_constant: must be at least 0, not -1; correct the number',
         '4:123: model.effects[1].frequency: must be above 0, not 0; correct the number',
