@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -22,6 +22,7 @@ from scipy import integrate, interpolate, signal, special
 import hystgen
 from hystgen import effects
 from hystgen.effects import About, Chain, Effect, Place, Run
+from hystgen.effects.base import Compensated
 from hystgen.effects.chain import VISIT, in_order, join
 from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import EffectsError
@@ -106,7 +107,7 @@ def test_the_catalogue_is_complete() -> None:
         for key, field in type(effect).model_fields.items():
             assert field.description, (effect.name, key)
         assert effect.compensation
-        assert effect.compensated.startswith(("exact", "approximate", "needs a sensor", "none"))
+        assert effect.compensated in set(get_args(Compensated)) - {"not known"}
         assert (type(effect).__doc__ or "").strip()
 
 
@@ -887,6 +888,10 @@ def test_one_effect_says_how_the_plays_move(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="user:own says how the plays move, as rate_dependence does") as caught:
         hystgen.load(path, effects=[tmp_path / "own.py"])
     assert [p.path for p in caught.value.problems] == ["model.effects[1].name"]
+    (own,) = effects.load_user_effects(tmp_path / "own.py")
+    both = [make("rate_dependence", betas=(0.1, 0.1, 0.1)), own.model_validate({"name": "user:own"})]
+    with pytest.raises(EffectsError, match="one effect says how the plays move, not rate_dependence and user:own"):
+        Chain(CASCADE, both)
 
 
 # The command line -----------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.param_models import Number, Positive
 
 
@@ -15,7 +15,7 @@ class _Ageing(Effect):
     name: Literal["ageing"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.GAIN
-    compensated: ClassVar[str] = "needs a sensor"
+    compensated: ClassVar[Compensated] = "needs a sensor"
     compensation: ClassVar[str] = "a gain input to `step`"
     timed: ClassVar[bool] = False
 

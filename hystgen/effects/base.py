@@ -7,12 +7,11 @@ are; before the first sample everything is at rest at that sample.
 from __future__ import annotations
 
 import enum
-import functools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +33,8 @@ class Place(enum.Enum):
     ADDED = "added"
 
 
-REMEMBERED = 32
-"""Time constants of which a record remembers the factors."""
+MOST_BYTES = 2**25
+"""Size of the factors that a record remembers."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +55,19 @@ class Run:
         """Seconds from each sample to the next, N - 1 of them."""
         return np.diff(self.t)
 
-    @cached_property
-    def decays(self) -> Callable[[float], Array]:
+    def factors(self, time_constant: float) -> Array:
         """`decays` of the steps and a time constant, (3, N - 1); a search comes back to most of them."""
-        return functools.lru_cache(REMEMBERED)(lambda time_constant: np.stack(decays(self.steps, time_constant)))
+        found = self._factors.pop(time_constant, None)
+        if found is None:
+            found = np.stack(decays(self.steps, time_constant))
+        if found.nbytes * (len(self._factors) + 1) > MOST_BYTES and self._factors:
+            del self._factors[next(iter(self._factors))]
+        self._factors[time_constant] = found  # the latest one comes last
+        return found
+
+    @cached_property
+    def _factors(self) -> dict[float, Array]:
+        return {}
 
 
 @dataclass(frozen=True)
@@ -105,6 +113,11 @@ class Candidate:
     grown: Callable[[Array], Array] | None = None
 
 
+Compensated = Literal[
+    "exact", "approximate", "needs a sensor", "none needed", "none without preview", "none", "not known"
+]
+
+
 class Effect(BaseModel):
     """An effect with its parameters; a subclass has a `place`, a method of that place and the keys of the YAML entry.
 
@@ -126,8 +139,8 @@ class Effect(BaseModel):
     """further columns that a record needs"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
-    compensated: ClassVar[str] = "its own"
-    """how far a compensator can take the effect out: exact, approximate, needs a sensor, none"""
+    compensated: ClassVar[Compensated] = "not known"
+    """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
 

@@ -108,10 +108,13 @@ class Chain:
     """Static model and effects as one forward model.
 
     Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation behind,
-    output offset, sensor nonlinearity, drift.
+    output offset, sensor nonlinearity, drift. Raises EffectsError for two effects that say how the plays move.
     """
 
     def __init__(self, cascade: Cascade, effects: Sequence[Effect]) -> None:
+        movers = [effect.name for effect in effects if effect.moves_plays()]
+        if len(movers) > 1:
+            raise EffectsError(f"one effect says how the plays move, not {' and '.join(movers)}")
         self.cascade = cascade
         self.effects = in_order(effects)
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, span
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, span
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative, Positive
 
@@ -27,7 +27,7 @@ def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
     """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
     rows = np.ascontiguousarray(np.atleast_2d(h).T)
     total = np.empty_like(rows)
-    factors = np.stack([run.decays(float(tau)) for tau in time_constants], axis=1)
+    factors = np.stack([run.factors(float(tau)) for tau in time_constants], axis=1)
     code().creep(rows, *factors, np.ascontiguousarray(weights), np.tile(rows[0], (len(weights), 1)), total)
     return total.T.reshape(np.shape(h))
 
@@ -41,7 +41,7 @@ class _Creep(Effect):
     name: Literal["creep"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.LINEAR
-    compensated: ClassVar[str] = "exact"
+    compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact and causal: the plays are solved for with the states known"
 
 

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, from_zero
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 from hystgen.param_models import NotNegative
 
 
@@ -22,7 +22,7 @@ class Delay(Effect):
     time: NotNegative = Field(description="T, s", examples=[2.0e-4])
 
     place: ClassVar[Place] = Place.DRIVE
-    compensated: ClassVar[str] = "none without preview"
+    compensated: ClassVar[Compensated] = "none without preview"
     compensation: ClassVar[str] = "preview of a known reference; otherwise named, not inverted"
 
     def drive(self, a: Array, run: Run) -> Array:

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.param_models import Number
 
 
@@ -16,7 +16,7 @@ class _Drift(Effect):
     rate: Number = Field(description="output units per s, at the start of the session", examples=[1e-4])
 
     place: ClassVar[Place] = Place.ADDED
-    compensated: ClassVar[str] = "needs a sensor"
+    compensated: ClassVar[Compensated] = "needs a sensor"
     compensation: ClassVar[str] = "none without a sensor; an offset input to `step`"
 
 

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, from_zero
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative
 
@@ -24,13 +24,13 @@ class Lag(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 2
-    compensated: ClassVar[str] = "approximate"
+    compensated: ClassVar[Compensated] = "approximate"
     compensation: ClassVar[str] = "a lead with a pole that bounds the noise"
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""
         out = np.empty_like(a)
-        code().follow(a, *run.decays(self.time_constant), float(a[0]), out)
+        code().follow(a, *run.factors(self.time_constant), float(a[0]), out)
         return out
 
     @classmethod

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, span
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, span
 from hystgen.param_models import MAX_PLAYS, Number, Positive
 
 MAX_TERMS = 8
@@ -20,7 +20,7 @@ class _Noncongruent(Effect):
     place: ClassVar[Place] = Place.PLAYS
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
-    compensated: ClassVar[str] = "exact"
+    compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "a monotone scalar equation, solved every sample"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from hystgen import operators
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, from_zero
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 from hystgen.effects.recursions import code
 from hystgen.param_models import MAX_PLAYS, NotNegative, Positive
 
@@ -38,7 +38,7 @@ class ThresholdRate(_RateDependence):
         description="beta_1 .. beta_n, s, one for each threshold but r_0", examples=[[0.001, 0.002]]
     )
 
-    compensated: ClassVar[str] = "exact"
+    compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact while the thresholds stay ordered, else one implicit step a sample"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -107,7 +107,7 @@ class RelaxingPlays(_RateDependence):
         default=1.0, description="m, 1 for a linear dashpot; 0.1 to 10"
     )
 
-    compensated: ClassVar[str] = "exact"
+    compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "one implicit step a sample"
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.effects.recursions import code
 from hystgen.param_models import Positive
 
@@ -26,7 +26,7 @@ class Resonance(Effect):
     place: ClassVar[Place] = Place.LINEAR
     order: ClassVar[int] = 1
     repeatable: ClassVar[bool] = True
-    compensated: ClassVar[str] = "approximate"
+    compensated: ClassVar[Compensated] = "approximate"
     compensation: ClassVar[str] = "a reference filter: notch or zero-vibration shaper, or the second-order inverse"
 
     def _factors(self, times: Array) -> tuple[Array, Array, Array]:

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.param_models import Positive
 
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
@@ -20,7 +20,7 @@ class _Saturation(Effect):
     place: ClassVar[Place] = Place.OUTPUT
     timed: ClassVar[bool] = False
     hint: ClassVar[str] = "this is saturation behind the plays, one in front is a stage of model.memoryless"
-    compensated: ClassVar[str] = "exact"
+    compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact inside the range, clamped outside"
 
     @classmethod

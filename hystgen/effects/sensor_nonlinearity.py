@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.param_models import Number, Positive
 
 
@@ -24,7 +24,7 @@ class SensorPolynomial(Effect):
     place: ClassVar[Place] = Place.OUTPUT
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
-    compensated: ClassVar[str] = "none needed"
+    compensated: ClassVar[Compensated] = "none needed"
     compensation: ClassVar[str] = "corrected in the data, never inverted in the drive"
 
     def mapped(self, y: Array, run: Run) -> Array:

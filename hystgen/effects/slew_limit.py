@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, model_validator
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.effects.recursions import code
 from hystgen.param_models import Positive
 
@@ -23,7 +23,7 @@ class SlewLimit(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 1
-    compensated: ClassVar[str] = "none"
+    compensated: ClassVar[Compensated] = "none"
     compensation: ClassVar[str] = "the reference is limited, and what was applied is committed"
 
     @model_validator(mode="after")

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Effect, Place, Run, span
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, span
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative, Number, Positive
 
@@ -46,7 +46,7 @@ class LoggedThermal(_Thermal):
 
     timed: ClassVar[bool] = False
     columns: ClassVar[tuple[str, ...]] = (COLUMN,)
-    compensated: ClassVar[str] = "needs a sensor"
+    compensated: ClassVar[Compensated] = "needs a sensor"
     compensation: ClassVar[str] = "exact with a temperature input to `step`"
 
     def above(self, run: Run) -> Array:
@@ -83,7 +83,7 @@ class SelfHeating(_Thermal):
     time_constant: Positive = Field(description="tau, s", examples=[60.0])
     heating: NotNegative = Field(description="K s/input^2: heating f V^2 is the final rise", examples=[1.0e-5])
 
-    compensated: ClassVar[str] = "needs a sensor"
+    compensated: ClassVar[Compensated] = "needs a sensor"
     compensation: ClassVar[str] = "flagged: the temperature is not measured"
 
     def above(self, run: Run) -> Array:

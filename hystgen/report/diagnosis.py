@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
-from hystgen import __version__, effects
+from hystgen import __version__
 from hystgen.diagnosis import description, told
 from hystgen.report import drawing
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
@@ -15,6 +15,9 @@ from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, 
 if TYPE_CHECKING:
     from hystgen.diagnosis import Diagnosis
     from hystgen.effects.base import Effect
+
+FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
+"""How far and how a compensator takes out what is a stage in front of the plays."""
 
 AT_NOISE = 1.25
 """An error within this factor of the noise is called noise."""
@@ -30,7 +33,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
             figures[name] = Figure(name, wide, narrow, CAPTIONS[name], ALTERNATIVES[name])
     sections = [
         Section("How the gap shrinks", [figures["gap"]]),
-        Section("What was found", _found(content)),
+        Section("What was found", _found(content, found.parameters.model.effects)),
         Section("What is left", _left(content)),
         Section("Faults of the data", _faults(content)),
         Section("Before and after, on held-out records", [figures["overlay"]]),
@@ -45,7 +48,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence())], sections)
 
 
-def _found(content: Mapping[str, Any]) -> list[Text | Table]:
+def _found(content: Mapping[str, Any], there: Sequence[Effect]) -> list[Text | Table]:
     if not content["effects"]:
         return [Text("No effect of the catalogue removes enough of the held-out error to get a name.")]
     unit = content["unit"]
@@ -56,8 +59,10 @@ def _found(content: Mapping[str, Any]) -> list[Text | Table]:
         before, after = effect["holdout_before"], effect["holdout_after"]
         share = f"{100.0 * effect['share_of_gap']:.0f} %"
         rows.append([effect["name"], f"{before:.4g}", f"{after:.4g}", share, f"{effect['p_value']:.1g}"])
-        means.append([effect["name"], *_compensation(effect)])
-        said = _descriptions(effect)
+        kind = _kind(effect, there)
+        how = (kind.compensated, kind.compensation) if kind is not None else FRONT
+        means.append([effect["name"], *how])
+        said = {} if kind is None else {key: field.description or "" for key, field in kind.model_fields.items()}
         for key, value in effect["parameters"].items():
             several = _numbers(value, effect["intervals"].get(key), key.replace("_", " "))
             numbers += [[effect["name"], *row, said.get(key, "")] for row in several]
@@ -73,30 +78,11 @@ def _found(content: Mapping[str, Any]) -> list[Text | Table]:
     ]
 
 
-def _compensation(effect: Mapping[str, Any]) -> tuple[str, str]:
-    """How far a compensator can take an effect out, and how."""
+def _kind(effect: Mapping[str, Any], there: Sequence[Effect]) -> type[Effect] | None:
+    """The class of an entry, one of the effects that are there; None for a stage in front of the plays."""
     if effect["parameters"].get("kind"):
-        return "exact", "part of the inverse: the front is inverted behind the plays"
-    kind = _kind(effect)
-    return (kind.compensated, kind.compensation) if kind is not None else ("its own", "as the effect's own class says")
-
-
-def _descriptions(effect: Mapping[str, Any]) -> dict[str, str]:
-    """What each key of an effect is, with its unit."""
-    kind = _kind(effect)
-    return {key: field.description or "" for key, field in kind.model_fields.items()} if kind is not None else {}
-
-
-def _kind(effect: Mapping[str, Any]) -> type[Effect] | None:
-    """The shape of the catalogue that an entry is of; None for a front and for a user's own effect."""
-    if effect["name"] not in effects.CATALOGUE or effect["parameters"].get("kind"):
         return None
-    kinds = effects.shapes(effect["name"])
-    for kind in kinds:
-        chosen = effect["parameters"].get(kind.selector)
-        if chosen is not None and chosen in get_args(kind.model_fields[kind.selector].annotation):
-            return kind
-    return kinds[0] if kinds else None
+    return next(type(each) for each in reversed(there) if each.name == effect["name"])
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
