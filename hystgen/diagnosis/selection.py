@@ -53,9 +53,8 @@ UNSURE, DIFFERENT = 0.25, 0.01
 """Effects cannot be told apart within this share of the held-out rms, unless chance explains the difference with a
 lower probability than that."""
 
-SIMPLER, EACH = 0.02, 0.01
-"""A shape with fewer numbers is taken for one whose held-out rms is better by less than this share, or by less than
-that for each number: many numbers imitate any effect to a few per cent."""
+SIMPLER = 0.02
+"""A shape with fewer numbers is taken for one whose held-out rms is better by less than this share."""
 
 EXCHANGE = 0.03
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
@@ -91,11 +90,6 @@ class Tried:
     def name(self) -> str:
         """What it is called."""
         return self.names[0]
-
-    @property
-    def numbers(self) -> int:
-        """How many numbers it takes."""
-        return len(self.fitted.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,14 +294,19 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
 
 
 def _simplest(tried: Sequence[Tried], held: Sequence[Item]) -> Tried:
-    """The best, or one of fewer numbers that is about as good where both leave the same free in every record."""
+    """The best, or one of fewer numbers that is about as good where both leave the same free in every record.
+
+    What a shape leaves free in a record counts as its numbers: free responses to a start state alone may explain a
+    drift.
+    """
+
+    def numbers(each: Tried) -> int:
+        return len(each.fitted.shape) + max(len(each.fitted.actuator.nuisances(item)) for item in held)
+
     best = tried[0]
-
-    def enough(each: Tried) -> float:
-        return (1.0 + max(SIMPLER, EACH * (best.numbers - each.numbers))) * best.held_out
-
-    near = [each for each in tried if fits.rms(each.fitted.errors(held, best.fitted)) <= enough(each)]
-    return min(near or [best], key=lambda each: (each.numbers, each.held_out))
+    enough = (1.0 + SIMPLER) * best.held_out
+    near = [each for each in tried if fits.rms(each.fitted.errors(held, best.fitted)) <= enough]
+    return min(near or [best], key=lambda each: (numbers(each), each.held_out))
 
 
 def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
