@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.operators import as_signal
+from hystgen.checks import finite, signal
 
 Array = NDArray[np.float64]
 
@@ -47,11 +47,13 @@ def _check(modulus: float, yield_stress: float) -> None:
 def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: float = 0.0) -> Parallel:
     """Spring and slider side by side under a given stress (7)-(11); `strain` is that of both before the first sample.
 
-    `stress`: N samples in units of `yield_stress`. The strain is `play_r[stress] / E` (12), the play started at
-    `E strain`. Raises ValueError for a modulus that is not positive and for a negative yield stress.
+    `stress`: N samples in the unit of `yield_stress`, to which that of `modulus` times that of `strain` comes. The
+    strain is `play_r[stress] / E` (12), the play started at `E strain`. Raises ValueError for a modulus that is not
+    positive, a negative yield stress, and samples or a start that are not finite.
     """
     _check(modulus, yield_stress)
-    applied = as_signal(stress)
+    finite(strain=strain)
+    applied = signal(stress)
     strains, plastic = np.empty_like(applied), np.empty_like(applied)
     for k, sigma in enumerate(applied.tolist()):
         borne = sigma - modulus * strain
@@ -66,11 +68,12 @@ def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: flo
 def series(strain: ArrayLike, modulus: float, yield_stress: float, plastic_strain: float = 0.0) -> Series:
     """Spring and slider in a row under a given strain (13)-(16); `plastic_strain` is the slider's before sample 0.
 
-    `strain`: N samples. The stress is `stop_r[E strain]` (17), the stop started at `E plastic_strain`. Raises
-    ValueError for a modulus that is not positive and for a negative yield stress.
+    `strain`: N samples in the unit of `plastic_strain`, which times that of `modulus` is that of `yield_stress`. The
+    stress is `stop_r[E strain]` (17), the stop started at `E plastic_strain`. Raises ValueError as `parallel` does.
     """
     _check(modulus, yield_stress)
-    applied = as_signal(strain)
+    finite(plastic_strain=plastic_strain)
+    applied = signal(strain)
     stresses, plastic = np.empty_like(applied), np.empty_like(applied)
     for k, epsilon in enumerate(applied.tolist()):
         trial = modulus * (epsilon - plastic_strain)

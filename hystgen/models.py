@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen import kernels, memory
+from hystgen.checks import numbers
 
 Array = NDArray[np.float64]
 
@@ -28,13 +29,6 @@ class NotInvertibleError(ValueError):
     def __init__(self, reasons: Sequence[str]) -> None:
         super().__init__("the model has no inverse: " + "; ".join(reasons))
         self.reasons = list(reasons)
-
-
-def _numbers(values: Sequence[float], what: str) -> tuple[float, ...]:
-    numbers = tuple(float(x) for x in values)
-    if not numbers or not all(math.isfinite(x) for x in numbers):
-        raise ValueError(f"{what} are finite numbers, at least one")
-    return numbers
 
 
 @dataclass(frozen=True)
@@ -53,8 +47,8 @@ class PI:
     projected: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        thresholds = _numbers(self.thresholds, "thresholds")
-        weights = _numbers(self.weights, "weights")
+        thresholds = numbers(self.thresholds, "thresholds")
+        weights = numbers(self.weights, "weights")
         if thresholds[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(thresholds)):
             raise ValueError("thresholds start with 0 and rise strictly")
         if len(weights) != len(thresholds):
@@ -63,7 +57,7 @@ class PI:
         if isinstance(self.initial_state, int | float):
             requested = float(self.initial_state)
         else:
-            requested = _numbers(self.initial_state, "initial states")
+            requested = numbers(self.initial_state, "initial states")
         start, projected = memory.project(requested, thresholds)
         for name, value in (
             ("thresholds", thresholds),
@@ -84,13 +78,16 @@ class PI:
         `x`: N + 1 points from 0, strictly rising, in input units; `phi`: the curve there, from 0, in output units; the
         last slope goes on beyond the last point. The thresholds are the first N points. Raises ValueError otherwise.
         """
-        points, curve = np.asarray(x, dtype=np.float64), np.asarray(phi, dtype=np.float64)
-        if points.ndim != 1 or points.shape != curve.shape or len(points) < 2:
+        points, curve = numbers(np.asarray(x).tolist(), "x"), numbers(np.asarray(phi).tolist(), "phi")
+        if len(points) != len(curve) or len(points) < 2:
             raise ValueError("a loading curve has as many values as points, at least two")
         if points[0] != 0.0 or curve[0] != 0.0 or not np.all(np.diff(points) > 0.0):
             raise ValueError("a loading curve starts at (0, 0) and its points rise strictly")
-        slopes = np.diff(curve) / np.diff(points)
-        return cls(points[:-1].tolist(), np.diff(slopes, prepend=0.0).tolist(), initial_state)
+        with np.errstate(over="ignore", invalid="ignore"):
+            weights = np.diff(np.diff(curve) / np.diff(points), prepend=0.0)
+        if not np.all(np.isfinite(weights)):
+            raise ValueError("a slope between the points of a loading curve is too steep for a number")
+        return cls(points[:-1], weights.tolist(), initial_state)
 
     @property
     def n(self) -> int:
@@ -184,8 +181,8 @@ class DeadZone:
     weights: Sequence[float]
 
     def __post_init__(self) -> None:
-        thresholds = _numbers(self.thresholds, "thresholds")
-        weights = _numbers(self.weights, "weights")
+        thresholds = numbers(self.thresholds, "thresholds")
+        weights = numbers(self.weights, "weights")
         if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
             raise ValueError("dead-zone thresholds rise strictly and contain 0")
         if len(weights) != len(thresholds):
@@ -320,7 +317,7 @@ class TanhEnvelope:
 
     def __post_init__(self) -> None:
         for name, value in (("ascending", self.ascending), ("descending", self.descending or self.ascending)):
-            branch = _numbers(value, f"the {name} branch's a0 .. a3")
+            branch = numbers(value, f"the {name} branch's a0 .. a3")
             if len(branch) != 4 or not branch[0] * branch[1] > 0.0:
                 raise ValueError(f"the {name} branch has four numbers a0 .. a3 with a0 a1 > 0")
             object.__setattr__(self, name, branch)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen import compiled
+from hystgen.checks import samples
 
 Array = NDArray[np.float64]
 
@@ -49,14 +50,6 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
 COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _stop_into]
 
 
-def as_signal(v: ArrayLike) -> Array:
-    """Samples (N,) in double precision. Raises ValueError for another number of dimensions."""
-    signal = np.ascontiguousarray(v, dtype=np.float64)
-    if signal.ndim != 1:
-        raise ValueError(f"a signal has one dimension, this one has {signal.ndim}")
-    return signal
-
-
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """Play operator: `s_k = max(v_k - r, min(v_k + r, s_(k-1)))`, started at `start` (1)(2).
 
@@ -64,16 +57,22 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """
     if threshold < 0:
         raise ValueError("a play threshold is not negative")
-    signal = as_signal(v)
+    signal = samples(v)
     out = np.empty_like(signal)
     compiled.operators()._play_into(signal, float(threshold), float(start), out)
     return out
 
 
 def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
-    """All plays of a model: row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N)."""
-    signal = as_signal(v)
-    r = np.ascontiguousarray(thresholds, dtype=np.float64)
+    """All plays of a model (1)(2): row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N).
+
+    `v`: N samples; `thresholds`: n+1 numbers, and `start` as many or one for all, in the unit of the samples, as what
+    is returned. Raises ValueError for a negative threshold and for other shapes.
+    """
+    signal = samples(v)
+    r = np.asarray(thresholds, dtype=np.float64, order="C")
+    if r.ndim != 1 or (r < 0.0).any():
+        raise ValueError("play thresholds are a list of numbers that are not negative")
     states = np.full(r.shape, start, dtype=np.float64)
     out = np.empty((len(r), len(signal)))
     compiled.operators()._plays_into(signal, r, states, out)
@@ -87,7 +86,7 @@ def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """
     if threshold < 0:
         raise ValueError("a stop threshold is not negative")
-    signal = as_signal(v)
+    signal = samples(v)
     out = np.empty_like(signal)
     compiled.operators()._stop_into(signal, float(threshold), float(start), 0.0, out)
     return out

@@ -294,8 +294,11 @@ def test_a_smooth_loading_curve_gives_the_density_back() -> None:
         ([0.5, 1], [0, 1], r"starts at \(0, 0\)"),
         ([0, 1], [0.5, 1], r"starts at \(0, 0\)"),
         ([0, 1, 1], [0, 1, 2], "rise strictly"),
-        ([0, float("nan"), 1], [0, 1, 2], "rise strictly"),
-        ([0, 1], [0, float("nan")], "finite"),
+        ([0, float("nan"), 1], [0, 1, 2], "give x as finite numbers"),
+        ([0, 1, float("inf")], [0, 1, 2], "give x as finite numbers"),
+        ([0, 1], [0, float("nan")], "give phi as finite numbers"),
+        ([0, 1e-320], [0, 1], "too steep"),
+        ([0, 1e-300, 2e-300], [0, 1e8, -1e8], "too steep"),
     ],
 )
 def test_loading_curves_that_are_none(x: list[float], phi: list[float], message: str) -> None:

@@ -181,6 +181,16 @@ def test_elements_that_cannot_be() -> None:
             element([1.0], 0.0, 1.0)
         with pytest.raises(ValueError, match="a yield stress is a number that is not negative"):
             element([1.0], 1.0, -1.0)
+        with pytest.raises(ValueError, match="an input has to be finite"):
+            element([0.0, float("nan")], 1.0, 1.0)
+        with pytest.raises(ValueError, match="strain has to be a finite number, not nan"):
+            element([1.0], 1.0, 1.0, float("nan"))
+
+
+@pytest.mark.parametrize("thresholds", [[0.0, -1.0], 1.0, [[1.0]]])
+def test_thresholds_that_plays_cannot_have(thresholds: object) -> None:
+    with pytest.raises(ValueError, match="play thresholds are a list of numbers that are not negative"):
+        operators.plays([0.0, 1.0], thresholds)  # type: ignore[arg-type]
 
 
 @given(st.lists(numbers, min_size=5, max_size=5))

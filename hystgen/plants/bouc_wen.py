@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hystgen import compiled
+from hystgen.checks import Array, finite, positive, signal
 from hystgen.plants import integration
-from hystgen.plants.checks import Array, finite, positive, signal
 
 
 def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tuple[float, float]:

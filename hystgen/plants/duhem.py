@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hystgen import compiled
+from hystgen.checks import Array, finite, positive, signal
 from hystgen.plants import integration
-from hystgen.plants.checks import Array, finite, positive, signal
 from hystgen.plants.integration import Slope
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hystgen.plants.checks import Array
+from hystgen.checks import Array
 
 Slope = Callable[[float, float], float]
 

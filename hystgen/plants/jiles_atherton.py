@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from hystgen.checks import Array, positive, signal
 from hystgen.plants import integration
-from hystgen.plants.checks import Array, positive, signal
 
 
 def langevin(x: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hystgen import compiled
-from hystgen.plants.checks import Array, finite, numbers, positive, signal
+from hystgen.checks import Array, finite, numbers, positive, signal
 
 
 def _add_kernel(v: Array, p1: float, p2: float, ramp: float, weight: float, state: float, out: Array) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hystgen import operators
+from hystgen.checks import Array, finite, numbers, signal
 from hystgen.models import PI
-from hystgen.plants.checks import Array, finite, numbers, signal
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen import compiled
-from hystgen.plants.checks import Array, finite, numbers, signal
+from hystgen.checks import Array, finite, numbers, signal
 
 Places = NDArray[np.int64]
 Everett = Callable[[Array, Array], Array]
