@@ -26,12 +26,12 @@ from hystgen.plants import (
     BoucWen,
     Dahl,
     Duhem,
+    EverettTable,
     JilesAtherton,
     KrasnoselskiiPokrovskii,
     MaxwellSlip,
     Preisach,
 )
-from hystgen.plants.preisach import EverettTable
 from hystgen.records import Record
 from hystgen.report import drawing
 

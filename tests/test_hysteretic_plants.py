@@ -21,8 +21,8 @@ from scipy.optimize import brentq
 
 from hystgen import plants
 from hystgen.models import PI
+from hystgen.plants import EverettTable, integration
 from hystgen.plants.jiles_atherton import langevin, langevin_slope
-from hystgen.plants.preisach import EverettTable
 
 Array = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
@@ -194,14 +194,24 @@ def test_inputs_that_are_none_are_refused(name: str) -> None:
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0]]), "2 edges but 1 rows"),
         (lambda: EverettTable([0.0, 0.0], [[0.0, 0.0]] * 2), "rise strictly"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [0.0]]), "every row has 2 values"),
+        (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [1.0, 0.5]]), "0 on the diagonal"),
+        (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [math.nan, 0.0]]), "values up to the diagonal as finite"),
+        (lambda: plants.Preisach(SURFACE, -5.0, 9.0), "from -5 to 5 knows no place beyond"),
+        (lambda: plants.Preisach(SURFACE, -5.1, 5.0), "from -5 to 5 knows no place beyond"),
+        (lambda: SURFACE(np.array([0.0]), np.array([0.1])), "nor alpha < beta"),
         (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0], 0.0), "ramp has to be positive"),
         (lambda: plants.KrasnoselskiiPokrovskii([2.0], [1.0], [1.0], 1.0), "not above its upper one"),
         (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0, 2.0], 1.0), "but 2 weights"),
         (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0], 1.0, 2.0), "between -1 and 1"),
-        (lambda: plants.KrasnoselskiiPokrovskii.on_grid(1.0, 0.0, 5, np.minimum), "low is below high"),
+        (lambda: plants.KrasnoselskiiPokrovskii.on_grid(1.0, 0.0, 5, np.minimum), "low = 1.0 has to be below high"),
+        (lambda: plants.KrasnoselskiiPokrovskii.on_grid(0.0, 1.0, 1, np.minimum), "divisions has to be a whole number"),
+        (lambda: plants.KrasnoselskiiPokrovskii.on_grid(0.0, 1.0, 2.5, np.minimum), "from 2 on, not 2.5"),  # type: ignore[arg-type]
+        (lambda: plants.KrasnoselskiiPokrovskii.on_grid(0.0, 1.0, 2, lambda *_: [1.0]), "3 upper places but 1 weights"),
         (lambda: plants.JilesAtherton(1.0, 0.0, 1.0), "a has to be positive"),
         (lambda: plants.JilesAtherton(1.0, 1.0, 1.0, 0.0, 1.0), "c has to be at least 0 and below 1"),
         (lambda: plants.JilesAtherton(1.0, 1.0, 1.0, 3.0), "below 3 a / Ms = 3"),
+        (lambda: plants.JilesAtherton(1.0, 1.0, 1.0, "a"), "alpha has to be a finite number, not 'a'"),  # type: ignore[arg-type]
+        (lambda: plants.MaxwellSlip(1.0, 1.0), "give stiffnesses as finite numbers"),  # type: ignore[arg-type]
     ],
 )
 def test_parameters_that_are_wrong_are_refused(make: Callable[[], object], message: str) -> None:
@@ -285,6 +295,16 @@ def test_bouc_wen_stays_in_its_bound_and_ends_in_its_limit_cycle(
     np.testing.assert_allclose(z[-2:], [limit, -limit], rtol=0, atol=own / (1.0 - kept) + found_to)
 
 
+@pytest.mark.parametrize("n", [30.0, 2000.0])
+def test_bouc_wen_of_a_large_exponent(n: float) -> None:
+    """A rise from rest takes z to `v = int_0^z dx / (1 - x^n)`; long moves end at the bound, here 1."""
+    plant = plants.BoucWen(0.5, 1.0, n=n)
+    for v in (0.5, 0.95):
+        (z,) = plant.hysteretic([v])
+        assert quad(lambda x: 1.0 / (1.0 - x**n), 0.0, z, epsabs=1e-12)[0] == pytest.approx(v, abs=1e-8)
+    np.testing.assert_allclose(plant.hysteretic([3.0, -3.0]), [1.0, -1.0], rtol=0, atol=1e-9)
+
+
 # -- Duhem and Dahl ----------------------------------------------------------------------------------------------------
 
 
@@ -366,6 +386,55 @@ def test_coleman_and_hodgdon_have_their_closed_form(allowed: list[float]) -> Non
         expected.append(y)
     off = np.abs(plant.simulate(v) - expected)
     assert np.all(off <= added_up(np.array(allowed), np.exp(-alpha * np.abs(np.diff(v, prepend=0.0)))))
+
+
+@pytest.mark.parametrize("apart", [1e-12, 1e-15, -1e-12, -1e-15])
+def test_dahl_goes_over_into_the_exponential(apart: float) -> None:
+    """dF / d(exponent) is below 1 along these moves, so what is left is `apart` and the rounding."""
+    v = [0.3, -0.4, 1.0]
+    near, at = (plants.Dahl(1.0, 1.0, exponent).simulate(v) for exponent in (1.0 + apart, 1.0))
+    np.testing.assert_allclose(near, at, rtol=0, atol=abs(apart) + 40.0 * U)
+
+
+def test_dahl_of_a_large_exponent() -> None:
+    """Beyond what its powers can be in double precision, with mpmath instead."""
+    import mpmath
+
+    exponent, v, force, expected = 2000, [0.3, -0.4, 1.0], mpmath.mpf(0), []
+    for last, x in pairwise([0.0, *v]):
+        sign = 1 if x > last else -1
+        power = (1 - sign * force) ** (1 - exponent) + (exponent - 1) * abs(mpmath.mpf(x) - last)
+        force = sign * (1 - power ** (mpmath.mpf(1) / (1 - exponent)))
+        expected.append(float(force))
+    np.testing.assert_allclose(plants.Dahl(1.0, 1.0, exponent).simulate(v), expected, rtol=0, atol=40.0 * U)
+
+
+def test_duhem_asks_for_its_slope_along_the_input_alone(allowed: list[float]) -> None:
+    """The roots exist there and nowhere else."""
+    plant = plants.Duhem(lambda v, y: math.sqrt(1.0 - v) - y, lambda v, y: math.sqrt(v + 1.0) + y)
+    found = plant.simulate([0.4, 1.0, 1.0, 0.2, -1.0, -1.0])[[1, 4]]
+    turns = np.array([1.0, -1.0])
+    exact, error = over_input(lambda v, y, s: math.sqrt(max(1.0 - s * v, 0.0)) - s * y, turns, 0.0, 1e-12)
+    np.testing.assert_allclose(found, exact, rtol=0, atol=error + sum(allowed))
+
+
+def test_coleman_and_hodgdon_of_a_small_output() -> None:
+    """In other units of the output, told as its scale, every digit of the tolerance is the same."""
+    size = 2.0**-30
+    whole, small = (
+        plants.Duhem.coleman_hodgdon(0.8, lambda v, s=s: s * 1.5 * v, lambda _, s=s: s * 0.6, scale=s)
+        for s in (1.0, size)
+    )
+    assert (small.simulate(path()) / size).tolist() == whole.simulate(path()).tolist()
+
+
+@pytest.mark.parametrize("name", ["BoucWen", "Duhem", "JilesAtherton"])
+def test_an_integration_that_fails_says_so(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = plants.BoucWen(1.5, 2.0, n=3.0) if name == "BoucWen" else EVERY[name]
+    assert plant.simulate([0.0, 0.0]).tolist() == [0.0, 0.0]
+    monkeypatch.setattr(integration, "MOST_STEPS", 2)
+    with pytest.raises(ValueError, match="the integration fails between the inputs 0 and 3"):
+        plant.simulate([1.0, 3.0, -1.0])
 
 
 # -- Maxwell-slip ------------------------------------------------------------------------------------------------------
@@ -464,6 +533,8 @@ def test_preisach_starts_after_its_history() -> None:
     later = plants.Preisach(SURFACE, -5.0, 5.0, 0.7, before).simulate(path())
     whole = plants.Preisach(SURFACE, -5.0, 5.0, 0.7).simulate([*before, *path()])
     assert later.tolist() == whole[3:].tolist()
+    of_array = plants.Preisach(SURFACE, -5.0, 5.0, 0.7, np.array(before))  # type: ignore[arg-type]
+    assert of_array.simulate(path()).tolist() == later.tolist()
 
 
 def test_an_everett_table_is_the_integral_of_its_density() -> None:
@@ -485,6 +556,7 @@ def test_an_everett_table_is_the_integral_of_its_density() -> None:
     assert at(1.375, 0.0) == at(1.0, 0.0) + (at(2.5, 0.0) - at(1.0, 0.0)) / 4.0
     assert at(1.75, 1.375) == (0.5 - 0.25) * at(2.5, 1.0)
     assert at(2.2, 2.2) == at(0.0, 0.0) == at(3.0, 3.0) == 0.0
+    assert EverettTable([0.0, 2.0], [[0.0, math.nan], [3.0, 0.0]])(np.array([2.0]), np.array([0.0])) == 3.0
 
 
 # -- Krasnosel'skii-Pokrovskii -----------------------------------------------------------------------------------------
@@ -551,6 +623,7 @@ def test_a_grid_of_kp_kernels() -> None:
     assert len(pairs) == 10
     assert (0.0, 3.0, 4.0) in pairs
     assert plant.simulate([-1.0, 4.0]).tolist() == [-sum(plant.weights), sum(plant.weights)]
+    assert plants.KrasnoselskiiPokrovskii.on_grid(0.0, 4.0, 4, lambda *_: 0.5).weights == (0.5,) * 10
 
 
 # -- Jiles-Atherton ----------------------------------------------------------------------------------------------------

@@ -21,7 +21,9 @@ PLANTS = {
 }
 """Plants by name, each with the module that it is imported from when it is first used."""
 
-__all__ = [*PLANTS, "PLANTS"]
+_PLACES = {**PLANTS, "EverettTable": "preisach"}
+
+__all__ = [*_PLACES, "PLANTS"]
 
 if TYPE_CHECKING:
     from hystgen.plants.bouc_wen import BoucWen as BoucWen
@@ -30,10 +32,11 @@ if TYPE_CHECKING:
     from hystgen.plants.jiles_atherton import JilesAtherton as JilesAtherton
     from hystgen.plants.krasnoselskii_pokrovskii import KrasnoselskiiPokrovskii as KrasnoselskiiPokrovskii
     from hystgen.plants.maxwell_slip import MaxwellSlip as MaxwellSlip
+    from hystgen.plants.preisach import EverettTable as EverettTable
     from hystgen.plants.preisach import Preisach as Preisach
 
 
 def __getattr__(name: str) -> Any:
-    if name not in PLANTS:
+    if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(importlib.import_module(f"{__name__}.{PLANTS[name]}"), name)
+    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

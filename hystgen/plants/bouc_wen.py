@@ -125,5 +125,6 @@ class BoucWen:
         return np.clip(z, -self.bound, self.bound)  # which the tolerance may pass
 
     def _slope(self, sign: float, v: float, z: float) -> float:  # noqa: ARG002, the input does not enter
-        built: float = abs(z) ** self.n
+        # A / (beta + gamma) at the bound; a trial step far beyond may not leave the numbers
+        built: float = self.A / (self.beta + self.gamma) * min(abs(z) / self.bound, 2.0 ** (1.0 / self.n)) ** self.n
         return (self.A - (self.gamma + math.copysign(self.beta, sign * z)) * built) / self.D

@@ -24,9 +24,10 @@ MOST_STEPS = 100_000
 
 
 def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: float) -> Array:
-    """State (N,) at the input samples, from the state `start` at the input 0; NaN once it has run away.
+    """State (N,) at the input samples, from the state `start` at the input 0.
 
-    By LSODA (scipy), with a call for each move between two turning points, where the slope jumps.
+    By LSODA (scipy), with a call for each move between two turning points, where the slope jumps; the slope is asked at
+    inputs of the move alone. Raises ValueError where the integration fails.
     """
     from scipy.integrate import ODEintWarning, odeint
 
@@ -34,21 +35,31 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
     move = np.sign(np.diff(path))
     turns = np.flatnonzero(np.diff(move[move != 0.0]))
     ends = np.flatnonzero(move)[turns] + 1
-    y = np.full(len(path), np.nan)
-    y[0] = start
+    y, reach = np.full(len(path), start), float(np.max(np.abs(path)))
     for first, last in itertools.pairwise([0, *ends.tolist(), len(path) - 1]):
-        places = path[first : last + 1]
-        slope = functools.partial(_at, rising if places[-1] > places[0] else falling)
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            warnings.simplefilter("ignore", ODEintWarning)  # what it says is looked at
-            found, told = odeint(
-                slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS, full_output=True
+        sign = 1.0 if path[last] > path[first] else -1.0
+        slope = functools.partial(_at, rising if sign > 0.0 else falling, sign)
+        places = sign * path[first : last + 1]
+        try:
+            with np.errstate(all="ignore"), warnings.catch_warnings():
+                warnings.simplefilter("error", ODEintWarning)
+                found, told = odeint(
+                    slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS,
+                    tcrit=places[-1:], full_output=True,
+                )  # fmt: skip
+            # with tcrit LSODA does not say that its steps became too small to move on
+            done = places[-1] == places[0] or np.isclose(told["tcur"][-1], places[-1], rtol=0.0, atol=1e-12 * reach)
+        except (ODEintWarning, OverflowError):
+            done = False
+        if not (done and np.all(np.isfinite(found))):
+            raise ValueError(
+                f"the integration fails between the inputs {path[first]:g} and {path[last]:g}: with this slope the "
+                "output runs away, or it needs a finer step than there is"
             )
-        if told["message"] != "Integration successful." or not np.all(np.isfinite(found)):
-            break
         y[first : last + 1] = found[:, 0]
     return y[1:]
 
 
-def _at(slope: Slope, v: float, y: Array) -> float:
-    return slope(v, float(y[0]))
+def _at(slope: Slope, sign: float, along: float, y: Array) -> float:
+    """Along a variable that always rises: odeint heeds tcrit, beyond which no slope is asked for, only there."""
+    return sign * slope(sign * along, float(y[0]))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from hystgen.checks import Array, positive, signal
+from hystgen.checks import Array, finite, positive, signal
 from hystgen.plants import integration
 
 
@@ -35,9 +35,10 @@ class JilesAtherton:
     numbers. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which is not
     physical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of nonlinear
     inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, also for alpha M_s >= 3 a:
-    then the anhysteretic curve is no function. Integrated to the tolerance in `integration`. Sources: D. C. Jiles,
-    D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn. Mater. 61, 1986; D. C. Jiles, J. B. Thoelke,
-    M. K. Devine, Numerical determination of hysteresis parameters, IEEE Trans. Magn. 28, 1992 (this form).
+    then the anhysteretic curve is no function; and where the integration fails. Integrated to the tolerance in
+    `integration`. Sources: D. C. Jiles, D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn. Mater. 61,
+    1986; D. C. Jiles, J. B. Thoelke, M. K. Devine, Numerical determination of hysteresis parameters, IEEE Trans. Magn.
+    28, 1992 (this form).
     """
 
     Ms: float
@@ -48,6 +49,7 @@ class JilesAtherton:
 
     def __post_init__(self) -> None:
         positive(Ms=self.Ms, a=self.a, k=self.k)
+        finite(alpha=self.alpha, c=self.c)
         if not 0.0 <= self.c < 1.0:
             raise ValueError(f"c has to be at least 0 and below 1, not {self.c}")
         if not 0.0 <= self.alpha * self.Ms < 3.0 * self.a:

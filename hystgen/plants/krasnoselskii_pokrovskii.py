@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hystgen import compiled
-from hystgen.checks import Array, finite, numbers, positive, signal
+from hystgen.checks import Array, finite, numbers, positive, signal, whole
 
 
 def _add_kernel(v: Array, p1: float, p2: float, ramp: float, weight: float, state: float, out: Array) -> None:
@@ -60,19 +60,22 @@ class KrasnoselskiiPokrovskii:
 
     @classmethod
     def on_grid(
-        cls, low: float, high: float, divisions: int, density: Callable[[Array, Array], Array]
+        cls, low: float, high: float, divisions: int, weights: Callable[[Array, Array], ArrayLike]
     ) -> KrasnoselskiiPokrovskii:
         """Kernels at all p_1 <= p_2 of a grid over [low, high - ramp], the ramp as wide as the grid's step.
 
-        `density(p1, p2)`: the weights, of arrays of places.
+        `low`, `high`: input units; `divisions`: steps between them, at least 2; `weights(p1, p2)`: of arrays of places
+        an array of as many weights, or one for all, in output units. Raises ValueError.
         """
         finite(low=low, high=high)
-        if divisions < 2 or not low < high:
-            raise ValueError("a grid has at least two divisions, and low is below high")
+        whole(2, divisions=divisions)
+        if not low < high:
+            raise ValueError(f"low = {low} has to be below high = {high}")
         places = np.linspace(low, high, divisions + 1)[:-1]
         i, j = np.triu_indices(divisions)
-        weights = np.asarray(density(places[i], places[j]), dtype=np.float64)
-        return cls(places[i].tolist(), places[j].tolist(), weights.tolist(), (high - low) / divisions)
+        found = np.asarray(weights(places[i], places[j]), dtype=np.float64)
+        each = found if found.ndim else np.full(len(i), found)
+        return cls(places[i].tolist(), places[j].tolist(), each.tolist(), (high - low) / divisions)
 
     def simulate(self, v: ArrayLike) -> Array:
         """Output (N,) at the inputs `v` (N,); needs no time."""

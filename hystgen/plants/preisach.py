@@ -19,9 +19,10 @@ Everett = Callable[[Array, Array], Array]
 
 
 def _staircase(v: Array, stack: Places, corner: Places) -> None:
-    """The corner that each sample's move began at, as a place in v; the stack holds a minimum, maximum, minimum, ...
+    """The corner that each sample's move began at, as a place in v, negative for a fall.
 
-    v[0] is the lowest input there is, the minimum below all others.
+    The stack holds a minimum, maximum, minimum, ...; v[0] is the lowest input there is, the minimum below all others,
+    and no fall begins at it.
     """
     depth = 1
     stack[0] = 0
@@ -60,7 +61,8 @@ class EverettTable:
     """Everett surface between grid points: `values[i][j]` is E at alpha = `edges[i]`, beta = `edges[j]`, j <= i.
 
     `edges`: rising inputs, at least two; `values`: square, in output units, 0 on the diagonal, those above it are not
-    read. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other shapes.
+    read. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other tables, and for
+    places that are not between the edges.
     """
 
     edges: Sequence[float]
@@ -72,9 +74,12 @@ class EverettTable:
             raise ValueError("edges rise strictly and are at least two")
         if len(self.values) != len(edges):
             raise ValueError(f"{len(edges)} edges but {len(self.values)} rows")
-        rows = tuple(numbers(row, "values") for row in self.values)
-        if any(len(row) != len(edges) for row in rows):
+        if any(np.shape(row) != (len(edges),) for row in self.values):
             raise ValueError(f"every row has {len(edges)} values")
+        below = [numbers(row[: i + 1], "values up to the diagonal") for i, row in enumerate(self.values)]
+        if any(row[-1] != 0.0 for row in below):
+            raise ValueError("an Everett table is 0 on the diagonal, where alpha = beta")
+        rows = tuple((*row, *[0.0] * (len(edges) - len(row))) for row in below)
         object.__setattr__(self, "edges", edges)
         object.__setattr__(self, "values", rows)
 
@@ -94,6 +99,9 @@ class EverettTable:
     def __call__(self, alpha: Array, beta: Array) -> Array:
         """E at arrays of places within the edges, alpha >= beta."""
         edges, table = np.array(self.edges), np.array(self.values)
+        if not np.all((edges[0] <= beta) & (beta <= alpha) & (alpha <= edges[-1])):
+            span = f"{edges[0]:g} to {edges[-1]:g}"
+            raise ValueError(f"an Everett table from {span} knows no place beyond, nor alpha < beta")
         last = len(edges) - 2
         i = np.clip(np.searchsorted(edges, alpha, side="right") - 1, 0, last)
         j = np.clip(np.searchsorted(edges, beta, side="right") - 1, 0, last)
@@ -127,7 +135,7 @@ class Preisach:
         finite(low=self.low, high=self.high, offset=self.offset)
         if not self.low < self.high:
             raise ValueError(f"low = {self.low} has to be below high = {self.high}")
-        object.__setattr__(self, "history", numbers(self.history, "history") if self.history else ())
+        object.__setattr__(self, "history", numbers(self.history, "history") if len(self.history) else ())
         places = np.linspace(self.low, self.high, 33)
         alpha, beta = np.meshgrid(places, places, indexing="ij")
         inside = alpha >= beta
