@@ -213,7 +213,8 @@ def check_arithmetic(arithmetic: str) -> None:
         raise tables.FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(tables.ARITHMETICS)}")
 
 
-def _model(source: Model | str | os.PathLike[str]) -> Model:
+def as_model(source: Model | str | os.PathLike[str]) -> Model:
+    """The model, or that of a parameter file. Raises ParameterError, and TypeError for what is neither."""
     return source if isinstance(source, Model) else load(source)
 
 
@@ -245,7 +246,7 @@ def emitted_files(source: Model | str | os.PathLike[str], **options: str | None)
     """Names and text of the C files of a model; options as for `emit`. Nothing is written."""
     from hystgen.emission import module
 
-    model = _model(source)
+    model = as_model(source)
     return module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
 
 
@@ -276,7 +277,7 @@ def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:
     """Compile a model's C, run it and compare it with the bit reference; see `hystgen.verification.verify_model`."""
     from hystgen import verification
 
-    return verification.verify_model(_model(source), **options)
+    return verification.verify_model(as_model(source), **options)
 
 
 def diagnose(source: Model | str | os.PathLike[str], records: Any, **options: Any) -> Any:

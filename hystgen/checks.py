@@ -56,7 +56,7 @@ def whole(least: int, **values: int) -> None:
 def numbers(values: Sequence[float], name: str) -> tuple[float, ...]:
     """At least one finite number, as plain floats. Raises ValueError."""
     try:
-        found = tuple(float(x) for x in values)
+        found = () if isinstance(values, str) else tuple(float(x) for x in values)
     except (TypeError, ValueError, OverflowError):
         found = ()
     if not found or not all(map(math.isfinite, found)):

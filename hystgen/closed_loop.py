@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,7 +38,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, signal
 
 from hystgen import fixed_tables, tables
-from hystgen.api import InverseModel, Model, emit_options
+from hystgen.api import InverseModel, Model, as_model, emit_options
+from hystgen.checks import finite
 from hystgen.models import PI, Cascade, InverseCascade
 from hystgen.simulation import Session
 
@@ -50,7 +52,11 @@ Array = NDArray[np.float64]
 
 @runtime_checkable
 class Block(Protocol):
-    """A part of the loop that remembers: a controller (error in), a compensator or an actuator (drive out)."""
+    """A part of the loop that remembers.
+
+    A controller (error in, demand out), a compensator (demand in, drive out) or an actuator (drive in, displacement
+    out).
+    """
 
     def reset(self) -> None:
         """Back to the start; called before every run."""
@@ -63,11 +69,15 @@ class Block(Protocol):
 class PIController:
     """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, T the loop's sample time.
 
-    `kp` in controller output per error unit, `ki` in the same per second. Nothing is limited.
+    `kp` in controller output per error unit, `ki` in the same per second. Nothing is limited. Raises ValueError for
+    gains that are no finite numbers.
     """
 
     kp: float
     ki: float
+
+    def __post_init__(self) -> None:
+        finite(kp=self.kp, ki=self.ki)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +113,7 @@ class Response:
         return kept
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Loop:
     """A closed loop, sampled every `sample_time` seconds.
 
@@ -119,8 +129,9 @@ class Loop:
     - a `Block`, such as `BitReference` and `CompiledC`, or any object with `step` and `reset`;
     - a function of one number, without memory.
 
-    Raises ValueError for a plant or sample time that cannot be used, TypeError for a part that is none of these,
-    UnsupportedEffectsError for a model with effects: what is linear there belongs into the plant.
+    Raises ValueError for a plant, gain or sample time that cannot be used and for one block in two places, TypeError
+    for a part that is none of these, UnsupportedEffectsError for a model with effects: what is linear there belongs
+    into the plant.
     """
 
     plant: Any
@@ -130,11 +141,14 @@ class Loop:
     compensator: object = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.sample_time) and self.sample_time > 0.0):
+        given = self.sample_time
+        if not (isinstance(given, numbers.Real) and math.isfinite(given) and given > 0.0):
             raise ValueError(f"the sample time {self.sample_time!r} is not positive; give seconds per sample")
         if self.controller is None:
             raise TypeError("a loop needs a controller")
-        _ = self.sampled_plant, self._blocks
+        _ = self.sampled_plant
+        if len(set(map(id, self._blocks))) < len(self._blocks):
+            raise ValueError("one block, with one memory, stands in two places of the loop; give each place its own")
 
     @cached_property
     def sampled_plant(self) -> tuple[Array, Array, Array, float]:
@@ -182,7 +196,10 @@ class Loop:
             reference = [reference(k * self.sample_time) for k in range(count)]
         elif duration is not None:
             raise ValueError("a reference given as samples has its own duration")
-        r = np.array(reference, dtype=np.float64)
+        try:
+            r = np.array([] if np.iscomplexobj(reference) else reference, dtype=np.float64)
+        except (TypeError, ValueError):
+            r = np.empty(0)
         if r.ndim != 1 or not len(r) or not np.all(np.isfinite(r)):
             raise ValueError("a reference is one finite number a sample, at least one")
         return r
@@ -201,7 +218,10 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
         space = system.to_ss()
     except ValueError as error:
         raise ValueError(f"{what} is not proper, it has more zeros than poles: {error}") from None
-    a, b, c, d = (np.array(m, dtype=np.float64) for m in (space.A, space.B, space.C, space.D))
+    matrices = [np.asarray(m) for m in (space.A, space.B, space.C, space.D)]
+    if any(np.any(m.imag) for m in matrices):
+        raise ValueError(f"{what} has complex coefficients; poles and zeros that are complex come in conjugate pairs")
+    a, b, c, d = (np.array(m.real, dtype=np.float64) for m in matrices)
     if d.shape != (1, 1):
         raise ValueError(f"{what} has {d.shape[1]} inputs and {d.shape[0]} outputs, a loop needs one of each")
     if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
@@ -210,6 +230,8 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
         # A companion matrix has entries of many magnitudes, which cost the exponential up to half its digits
         a, (scale, _) = linalg.matrix_balance(a, permute=False, separate=True)
         a, b, c, d, _ = signal.cont2discrete((a, b / scale[:, None], c * scale, d), sample_time, "zoh")
+    elif space.dt is True:
+        raise ValueError(f"{what} has no sample time; give its dt")
     elif not math.isclose(float(space.dt), sample_time, rel_tol=1e-9):
         raise ValueError(f"{what} has a sample time of {space.dt} s, the loop {sample_time:g} s")
     return a, b[:, 0], c[0], float(d[0, 0])
@@ -232,6 +254,7 @@ def _block(part: object, sample_time: float, what: str) -> Block:
         return _Operator(part.forward.session("inverse", clamp=True))
     if isinstance(part, numbers.Real):
         gain = float(part)
+        finite(**{what: gain})
         return _Function(lambda x: gain * x)
     if isinstance(part, signal.lti):
         discrete = f"to_discrete({sample_time:g})"
@@ -309,9 +332,8 @@ class _InUnits:
         self._lsb: tuple[float, float] | None = None
         if options.arithmetic not in tables.FLOAT_ARITHMETICS:
             emit = model.parameters.emit
-            about = (options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
-            codes = fixed_tables.build(model.cascade, *about)[1]
-            drive, output = float(codes.drive_lsb), float(codes.output_lsb)
+            lsbs = fixed_tables.lsbs(model.cascade, options.arithmetic, emit.drive_lsb, emit.output_lsb)
+            drive, output = map(float, lsbs)
             self._lsb = (output, drive) if options.operator == "inverse" else (drive, output)
             self._most = 2 ** fixed_tables.CODE_BITS[options.arithmetic] - 1
         self._code = 0
@@ -327,8 +349,7 @@ class _InUnits:
             return float(self._operator.step(x))
         if not math.isnan(x):
             code = min(max(x / self._lsb[0], -self._most - 1.0), float(self._most))
-            whole = math.floor(abs(code))
-            self._code = int(math.copysign(whole + (abs(code) - whole >= 0.5), code))
+            self._code = fixed_tables.nearest(code)
         return float(self._operator.step(self._code) * self._lsb[1])
 
 
@@ -341,13 +362,18 @@ def _one_operator(model: Model, operator: str, arithmetic: str | None, engine: s
 class BitReference(_InUnits):
     """A model's `inverse` or `forward` operator with the emitted C's bits, computed in Python; in physical units.
 
-    `arithmetic` and `engine` default to the parameter file's. Raises NotInvertibleError, FormatError, ValueError and
-    UnsupportedEffectsError.
+    `source`: a model or a parameter file; `arithmetic` and `engine` default to the parameter file's. Raises
+    ParameterError, NotInvertibleError, FormatError, ValueError and UnsupportedEffectsError.
     """
 
     def __init__(
-        self, model: Model, operator: str = "inverse", arithmetic: str | None = None, engine: str | None = None
+        self,
+        source: Model | str | os.PathLike[str],
+        operator: str = "inverse",
+        arithmetic: str | None = None,
+        engine: str | None = None,
     ) -> None:
+        model = as_model(source)
         options = _one_operator(model, operator, arithmetic, engine)
         super().__init__(_Operator(model.session(operator, options.arithmetic, options.engine)), model, options)
 
@@ -355,13 +381,14 @@ class BitReference(_InUnits):
 class CompiledC(_InUnits):
     """The emitted C of a model's `inverse` or `forward` operator, compiled for this machine; in physical units.
 
-    `arithmetic` and `engine` default to the parameter file's, `compiler` (gcc, clang or zig) to the first that is
-    installed. Raises CompileError, NotInvertibleError, FormatError, ValueError and UnsupportedEffectsError.
+    `source`: a model or a parameter file; `arithmetic` and `engine` default to the parameter file's, `compiler` (gcc,
+    clang or zig) to the first that is installed. Raises CompileError, ParameterError, NotInvertibleError, FormatError,
+    ValueError and UnsupportedEffectsError.
     """
 
     def __init__(
         self,
-        model: Model,
+        source: Model | str | os.PathLike[str],
         operator: str = "inverse",
         arithmetic: str | None = None,
         engine: str | None = None,
@@ -369,5 +396,6 @@ class CompiledC(_InUnits):
     ) -> None:
         from hystgen.verification.instance import Instance
 
+        model = as_model(source)
         options = _one_operator(model, operator, arithmetic, engine)
         super().__init__(Instance(model, options, compiler), model, options)

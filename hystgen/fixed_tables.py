@@ -67,9 +67,27 @@ def build(
     return _Builder(cascade, arithmetic, engine, drive_lsb, output_lsb).build()
 
 
-def nearest(x: Fraction) -> int:
-    """Nearest whole number, ties away from zero."""
-    return math.floor(x + Fraction(1, 2)) if x >= 0 else -math.floor(-x + Fraction(1, 2))
+def nearest(x: Fraction | float) -> int:
+    """Nearest whole number, ties away from zero; exact for floats too."""
+    size: Fraction | float = -x if x < 0 else x
+    whole = math.floor(size)
+    if 2 * (size - whole) >= 1:
+        whole += 1
+    return whole if x >= 0 else -whole
+
+
+def lsbs(
+    cascade: Cascade, arithmetic: str, drive_lsb: float | None = None, output_lsb: float | None = None
+) -> tuple[Fraction, Fraction]:
+    """Physical units a drive code and an output code: those given, else the finest that reach the ends of the ranges.
+
+    Raises FormatError for one that is too small.
+    """
+    code_max = 2 ** CODE_BITS[arithmetic] - 1
+    return (
+        _lsb(drive_lsb, cascade.input_range, code_max, "input_range", "drive_lsb"),
+        _lsb(output_lsb, cascade.output_range, code_max, "the output range", "output_lsb"),
+    )
 
 
 def decimal(x: float) -> Fraction:
@@ -97,8 +115,7 @@ class _Builder:
     ) -> None:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
         self.code_max = 2 ** CODE_BITS[arithmetic] - 1
-        self.drive_lsb = _lsb(drive_lsb, cascade.input_range, self.code_max, "input_range", "drive_lsb")
-        self.output_lsb = _lsb(output_lsb, cascade.output_range, self.code_max, "the output range", "output_lsb")
+        self.drive_lsb, self.output_lsb = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
         self.invertible = not cascade.inverse_problems()
 
     def build(self) -> tuple[FixedTables, Format]:

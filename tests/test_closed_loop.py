@@ -562,16 +562,25 @@ def test_a_loop_that_diverges_says_so_in_its_numbers() -> None:
     assert not np.isfinite(response.output[-1])
 
 
+TWICE = Bang()
+
+
 @pytest.mark.parametrize(
     ("change", "error", "said"),
     [
         ({"sample_time": 0.0}, ValueError, "the sample time 0.0 is not positive; give seconds per sample"),
         ({"sample_time": math.nan}, ValueError, "not positive"),
+        ({"sample_time": "a"}, ValueError, "the sample time 'a' is not positive"),
         ({"plant": ([1.0, 0.0, 0.0], [1.0, 1.0])}, ValueError, "the plant is not proper"),
         ({"plant": 5.0}, ValueError, "the plant is no system of scipy.signal; give one, or"),
         ({"plant": (np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))}, ValueError, "2 inputs and 2 outputs"),
         ({"plant": ([math.inf], [1.0, 1.0])}, ValueError, "coefficients that are not finite"),
+        ({"plant": ([], [-1.0, -1.0 + 1.0j], 1.0)}, ValueError, "the plant has complex coefficients"),
+        ({"plant": ([1j], [1.0, 1.0])}, ValueError, "the plant has complex coefficients"),
         ({"plant": signal.dlti([1.0], [1.0, 0.5], dt=0.2)}, ValueError, "sample time of 0.2 s, the loop 0.1 s"),
+        ({"plant": signal.dlti([1.0], [1.0, 0.5]), "sample_time": 1.0}, ValueError, "has no sample time; give its dt"),
+        ({"controller": math.nan}, ValueError, "the controller has to be a finite number, not nan"),
+        ({"controller": TWICE, "compensator": TWICE}, ValueError, "one block, with one memory, stands in two places"),
         ({"controller": signal.dlti([1.0], [1.0, 0.5], dt=0.2)}, ValueError, "the controller has a sample time of 0.2"),
         ({"controller": None}, TypeError, "a loop needs a controller"),
         ({"controller": signal.lti([1.0], [1.0, 0.0])}, TypeError, "the controller is a continuous system"),
@@ -584,7 +593,28 @@ def test_what_cannot_be_a_loop(change: dict[str, object], error: type[Exception]
         Loop(**{"plant": ([1.0], [1.0, 1.0]), "controller": 1.0, "sample_time": 0.1, **change})  # type: ignore[arg-type]
 
 
-def test_what_cannot_be_a_reference_or_an_operator() -> None:
+def test_loops_are_told_apart_as_objects() -> None:
+    one, other = (Loop((np.eye(1), [[1.0]], [[1.0]], [[0.0]]), 1.0, 0.1) for _ in range(2))
+    assert one != other
+    assert len({one, other}) == 2
+
+
+@pytest.mark.parametrize(("kp", "ki", "name"), [(math.nan, 1.0, "kp"), ("a", 1.0, "kp"), (1.0, None, "ki")])
+def test_gains_that_are_none(kp: float, ki: float, name: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} has to be a finite number"):
+        PIController(kp, ki)
+
+
+def test_operators_come_from_parameter_files(tmp_path: Path) -> None:
+    file = tmp_path / "note.yaml"
+    file.write_text(NOTE, encoding="utf-8")
+    for make in (BitReference, CompiledC):
+        assert make(file).step(1.5) == make(str(file)).step(1.5) == make(model(NOTE)).step(1.5)
+        with pytest.raises(TypeError, match="PI"):
+            make(STAGE)  # type: ignore[arg-type]
+
+
+def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPatch) -> None:
     loop = Loop(([1.0], [1.0, 1.0]), 1.0, 0.1)
     for reference, duration, said in (
         (wanted, None, "needs a duration"),
@@ -593,13 +623,20 @@ def test_what_cannot_be_a_reference_or_an_operator() -> None:
         ([], None, "one finite number a sample"),
         ([1.0, math.nan], None, "one finite number a sample"),
         ([[1.0]], None, "one finite number a sample"),
+        ("abc", None, "one finite number a sample"),
+        ([1j, 2.0], None, "one finite number a sample"),
+        (np.array([1j, 2.0]), None, "one finite number a sample"),
     ):
         with pytest.raises(ValueError, match=said):
             loop.run(reference, duration)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="operator 'both' is neither inverse nor forward"):
         CompiledC(model(NOTE), "both")
-    with pytest.raises(compilers.CompileError, match="tcc is not installed; install gcc or clang"):
-        CompiledC(model(NOTE), compiler="tcc")
+    with pytest.raises(ValueError, match="compiler 'ls' is none of gcc, clang, zig"):
+        CompiledC(model(NOTE), compiler="ls")
+    with monkeypatch.context() as patch:
+        patch.setattr(compilers, "find", lambda _: None)
+        with pytest.raises(compilers.CompileError, match="clang is not installed; install gcc or clang"):
+            CompiledC(model(NOTE), compiler="clang")
     creeping = model(NOTE + "  effects: [{name: lag, time_constant: 0.01}]\n")
     for make in (CompiledC, BitReference, lambda stage: Loop(([1.0], [1.0]), 1.0, 0.1, stage)):
         with pytest.raises(UnsupportedEffectsError, match="lag"):

@@ -18,10 +18,12 @@ class Instance:
 
     `options`: one operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is installed; it is called as a
     user calls it, in its default dialect. The files lie in a temporary folder. Raises CompileError, also where there
-    is no compiler.
+    is no compiler, and ValueError for another name.
     """
 
     def __init__(self, model: Model, options: module.Options, compiler: str | None = None) -> None:
+        if compiler is not None and compiler not in compilers.NAMES:
+            raise ValueError(f"compiler {compiler!r} is none of {', '.join(compilers.NAMES)}")
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
         if chosen is None:
             missing = f"{compiler} is not installed" if compiler else "no C compiler found"
@@ -36,7 +38,8 @@ class Instance:
         # What is loaded stays so without its file; only Windows keeps the file until then
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             library = Path(folder) / "instance.so"
-            chosen.shared_library(sources.write(Path(folder), model, options).all, library, compilers.USER)
+            written = sources.write(Path(folder), model, options)
+            chosen.shared_library([*written.module, written.harness], library, compilers.USER)
             self._library = self._ffi.dlopen(str(library))
         size = getattr(self._library, f"hystgen_harness_{op}_size")()
         self._context = self._ffi.new("long long[]", size // 8 + 1)

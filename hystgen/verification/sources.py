@@ -20,7 +20,13 @@ class Sources:
     name: str
     operators: tuple[str, ...]
     module: tuple[Path, ...]
-    callers: tuple[Path, ...]  # self-test and harness
+    selftest: Path
+    harness: Path
+
+    @property
+    def callers(self) -> tuple[Path, ...]:
+        """Self-test and harness."""
+        return self.selftest, self.harness
 
     @property
     def all(self) -> tuple[Path, ...]:
@@ -40,12 +46,7 @@ def write(folder: Path, model: Model, options: module.Options) -> Sources:
     operators = tuple(op for op in ("forward", "inverse") if getattr(options, op))
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    callers = [f"{name}_selftest.c", "hystgen_harness.c"]
     texts["hystgen_harness.c"] = harness(name, operators)
-    paths = [path for path in files.write(folder, texts) if path.suffix == ".c"]
-    return Sources(
-        name,
-        operators,
-        tuple(path for path in paths if path.name not in callers),
-        tuple(path for path in paths if path.name in callers),
-    )
+    paths = {path.name: path for path in files.write(folder, texts) if path.suffix == ".c"}
+    selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
+    return Sources(name, operators, tuple(paths.values()), selftest, caller)
