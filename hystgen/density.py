@@ -29,6 +29,8 @@ from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
+from hystgen.checks import finite, positive, whole
+
 MAX_FORMULA = 1000
 MAX_PLAYS = 4096
 FUNCTIONS = ("exp", "log", "sqrt", "sin", "cos", "tanh")
@@ -271,7 +273,13 @@ class Density:
         return self._before[i][0] + mass, self._before[i][1] + moment
 
     def discretise(self, p0: float, n: int) -> Discretisation:
-        """Thresholds and weights of n equal cells behind `r_0 = 0` and `p0`."""
+        """Thresholds and weights of n equal cells of the density (18) behind `r_0 = 0` and `p0`.
+
+        `p0` in output per input unit, as the weights that are returned; thresholds in input units; `n` from 1 on.
+        Raises ValueError for other numbers, DensityError for cells so narrow that thresholds coincide.
+        """
+        finite(p0=p0)
+        whole(1, n=n)
         thresholds, weights = [0.0], [p0]
         worst = total = start = mass = moment = _context().mpf(0)
         for i in range(1, n + 1):
@@ -299,11 +307,13 @@ class Density:
         return Discretisation(tuple(thresholds), tuple(weights), *errors)
 
     def discretise_to(self, p0: float, tolerance: float) -> Discretisation:
-        """The fewest equal cells, up to 4096, whose error bound is at most `tolerance`.
+        """The fewest equal cells of the density (18), up to 4096, whose error bound is at most `tolerance`.
 
-        The bound falls like 1/n**2; it is searched as if it fell at every step. Raises DensityError, naming the
-        bound within reach, if 4096 are not enough.
+        `tolerance` > 0 in output units, of the loading curve (19); `p0` in output per input unit. The bound falls like
+        1/n**2; it is searched as if it fell at every step. Raises ValueError for other numbers and DensityError, naming
+        the bound within reach, if 4096 are not enough.
         """
+        positive(tolerance=tolerance)
         too_few, enough, found = 0, MAX_PLAYS + 1, None
         n, tries = 16, 0
         while enough - too_few > 1:

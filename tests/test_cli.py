@@ -26,6 +26,7 @@ from ruamel.yaml import YAML
 
 import hystgen
 from hystgen import cli, tables, verification
+from hystgen.bounds import error_bounds
 from hystgen.emission import module
 from hystgen.emission.text import literal
 from hystgen.verification import compilers, run
@@ -819,6 +820,24 @@ def test_show_says_why_there_is_no_inverse() -> None:
     text = hyst("show", "flat.yaml").stdout
     assert not re.search(r"inverse\s+exists", text)
     assert "between 1 and 3" in text, "the dead-zone piece that falls"
+
+
+def test_show_rounds_no_bound_down() -> None:
+    """Nor up by more than a unit of the third digit."""
+    for n in range(1, 9):
+        Path("dense.yaml").write_text(
+            "hystgen: 1\nname: dense\ninput_range: [0, 10]\nmodel:\n  pi:\n"
+            f"    density: {{formula: 0.8*exp(-0.3*r), p0: 0.7, r_max: 10, n: {n}}}\n"
+        )
+        model = hystgen.load("dense.yaml")
+        exact = [model.parameters.model.pi.density_error, model.parameters.model.pi.density_output_error]
+        for arithmetic in ("float32", "float64"):
+            bounds = error_bounds(model.cascade, arithmetic, model.engine(arithmetic=arithmetic))
+            exact += [bounds.forward, bounds.rounding]
+        lines = [line for line in hyst("show", "dense.yaml").lines if line.startswith(("density", "error, float"))]
+        shown = [float(x) for line in lines for x in re.findall(r"(?:within|forward|inverse) ([\d.e+-]+)", line)]
+        assert len(shown) == len(exact)
+        assert all(e <= s <= 1.01 * e for e, s in zip(exact, shown, strict=True)), (exact, shown)
 
 
 @pytest.mark.parametrize(("p0", "warned"), [(2e-6, False), (1e-6, True), (1e-9, True)])

@@ -318,6 +318,25 @@ def test_speed() -> None:
     assert time.perf_counter() - start < 1
 
 
+@pytest.mark.parametrize(
+    ("p0", "n", "message"),
+    [
+        (1.0, 0, "n has to be a whole number from 1 on, not 0"),
+        (1.0, 2.5, "n has to be a whole number from 1 on, not 2.5"),
+        (math.nan, 2, "p0 has to be a finite number, not nan"),
+    ],
+)
+def test_what_cannot_be_discretised(p0: float, n: int, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        from_table([0, 1], [1, 1]).discretise(p0, n)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, math.nan])
+def test_tolerances_that_are_none(tolerance: float) -> None:
+    with pytest.raises(ValueError, match="tolerance has to be"):
+        from_table([0, 1], [1, 1]).discretise_to(1.0, tolerance)
+
+
 # Output, any history ------------------------------------------------------------------------------------
 
 knots = st.lists(st.floats(0.05, 2.0), min_size=1, max_size=6)

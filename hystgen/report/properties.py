@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import decimal
 from typing import Any
 
 from hystgen import fixed_tables
@@ -11,6 +12,7 @@ from hystgen.models import DeadZone
 from hystgen.tables import FormatError
 
 HARD_RATIO = 1e6
+UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
 
 def properties(model: Model) -> str:
@@ -31,10 +33,11 @@ def properties(model: Model) -> str:
         f"slope ratio        {c.slope_ratio:.6g} (largest slope of the model over its smallest)",
         f"start memory       {'projected to the admissible set' if pi.projected else 'as given'}",
     ]
-    if p.model.pi.density is not None:
+    curve, history = p.model.pi.density_error, p.model.pi.density_output_error
+    if curve is not None and history is not None:
         lines.append(
-            f"density            loading curve within {p.model.pi.density_error:.3g}{output}, output of any history "
-            f"within {p.model.pi.density_output_error:.3g}{output}"
+            f"density            loading curve within {_most(curve)}{output}, output of any history within "
+            f"{_most(history)}{output}"
         )
     problems = c.inverse_problems()
     if model.effects:
@@ -50,13 +53,18 @@ def properties(model: Model) -> str:
         for arithmetic in ("float32", "float64"):
             bounds = error_bounds(c, arithmetic, model.engine(arithmetic=arithmetic))
             lines.append(
-                f"error, {arithmetic}     forward {bounds.forward:.3g}{output}, inverse {bounds.rounding:.3g}{drive}"
-                " at most, against the exact model"
+                f"error, {arithmetic}     forward {_most(bounds.forward)}{output}, inverse "
+                f"{_most(bounds.rounding)}{drive} at most, against the exact model"
             )
         lines += _fixed(model, drive, output)
         if c.branches_differ:
             lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
     return "\n".join(lines)
+
+
+def _most(bound: float) -> str:
+    """A bound in three digits that are no smaller."""
+    return f"{float(UP.create_decimal_from_float(bound)):.3g}"
 
 
 def _effects(model: Model) -> list[str]:
@@ -94,9 +102,9 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
             lines.append(f"{arithmetic}                not available: {error}")
             continue
         a, b = float(form.drive_lsb), float(form.output_lsb)
-        back = "" if form.inverse_rounding is None else f", inverse {form.inverse_rounding * a:.3g}{drive}"
+        back = "" if form.inverse_rounding is None else f", inverse {_most(form.inverse_rounding * a)}{drive}"
         lines.append(
-            f"error, {arithmetic}         forward {form.forward_error * b:.3g}{output}{back} at most; a code is "
+            f"error, {arithmetic}         forward {_most(form.forward_error * b)}{output}{back} at most; a code is "
             f"{a:.4g}{drive}, {b:.4g}{output}"
         )
     return lines
