@@ -6,7 +6,7 @@
 >>> v = model.inverse().simulate(u)
 >>> hystgen.emit(model, "firmware/")
 
-`hystgen.closed_loop` simulates it with a plant and a controller.
+`hystgen.closed_loop` simulates it with a plant and a controller, `hystgen.plants` other hysteretic plants.
 """
 
 from __future__ import annotations
@@ -41,10 +41,18 @@ _PLACES = {
     "verify": "api",
 }
 
-__all__ = [*sorted(_PLACES), "__version__"]
+_SUBMODULES = ("closed_loop", "density", "effects", "elastoplastic", "operators", "plants", "records")
+
+__all__ = [*sorted(_PLACES), *_SUBMODULES, "__version__"]
 
 if TYPE_CHECKING:
     from hystgen import closed_loop as closed_loop
+    from hystgen import density as density
+    from hystgen import effects as effects
+    from hystgen import elastoplastic as elastoplastic
+    from hystgen import operators as operators
+    from hystgen import plants as plants
+    from hystgen import records as records
     from hystgen.api import InverseModel as InverseModel
     from hystgen.api import Model as Model
     from hystgen.api import diagnose as diagnose
@@ -69,8 +77,8 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    if name == "closed_loop":
-        return importlib.import_module("hystgen.closed_loop")
+    if name in _SUBMODULES:
+        return importlib.import_module(f"hystgen.{name}")
     if name not in _PLACES:
         raise AttributeError(f"module 'hystgen' has no attribute {name!r}")
     value = getattr(importlib.import_module(f"hystgen.{_PLACES[name]}"), name)
