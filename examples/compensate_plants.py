@@ -44,7 +44,7 @@ PLAYS = np.array([[0.0, 4.0, 9.0, 16.0, 26.0], [0.10, 0.03, 0.025, 0.02, 0.015]]
 
 @dataclass(frozen=True)
 class Case:
-    """A plant, the drive range it is used in, whether it leads, and the thresholds of a play sum where they are known.
+    """A plant, the drive range it is used in, whether it leads, and what `hystgen.identify` is told to look for.
 
     The output of a leading plant runs ahead of its input. As a play sum it would need negative weights, which
     `identify` does not give; but its inverse lags. So the records are handed over with input and output exchanged, and
@@ -55,7 +55,8 @@ class Case:
     plant: Callable[[Array], Array]
     drive: tuple[float, float]
     leads: bool = False
-    thresholds: tuple[float, ...] | None = None
+    model: str = "auto"
+    thresholds: int | tuple[float, ...] | None = None
     remark: str = ""
 
 
@@ -90,7 +91,7 @@ def bell(alpha: Array, beta: Array) -> Array:
 
 
 def cases() -> list[Case]:
-    """The plants, those that a play sum is made for first."""
+    """The plants, those that a play sum is made for first; then some of them again, with other models."""
     slip = MaxwellSlip([1.0, 0.8, 0.6, 0.5], [0.4, 0.9, 1.5, 2.6], spring=1.0)
     hardening = BoucWen(alpha=1.6, k=0.1, D=8.0, beta=0.6, gamma=0.3, n=1.0)
     softening = BoucWen(alpha=0.4, k=0.1, D=8.0, beta=0.6, gamma=0.3, n=1.0)
@@ -105,18 +106,29 @@ def cases() -> list[Case]:
     inside = tuple(slip.play_sum().inverse().thresholds[1:])
     apart = "minor loops stay open and depend on what was before"
     place = "congruent, but loops depend on the place, for which the front stands"
-    return [
-        replace(plays, remark="a PI model, but for the thresholds that were chosen"),
-        replace(plays, thresholds=tuple(PLAYS[0][1:].tolist()), remark="a PI model, its thresholds given"),
-        replace(blocks, remark="a PI model by exchange of input and output, but for the thresholds"),
-        replace(blocks, thresholds=inside, remark="a PI model by exchange, its thresholds given"),
+    open_loops = [
         Case("Dahl friction in a positioner", lambda v: 0.1 * v - friction.simulate(v), volts, remark=apart),
         Case("Bouc-Wen, alpha = 1.6", hardening.simulate, volts, remark=apart),
         Case("Bouc-Wen, alpha = 0.4", softening.simulate, volts, leads=True, remark=apart + "; by exchange"),
         Case("Duhem, Coleman-Hodgdon", lagging.simulate, volts, remark=apart),
+    ]
+    others = [
         Case("Preisach, bell-shaped density", relays.simulate, volts, remark=place),
         Case("Krasnosel'skii-Pokrovskii", ramps.simulate, volts, remark=place),
         Case("Jiles-Atherton", magnet.simulate, (-3000.0, 3000.0), remark="saturates, and minor loops stay open"),
+    ]
+    given = tuple(PLAYS[0][1:].tolist())
+    return [
+        replace(plays, remark="a PI model, but for the thresholds that were chosen"),
+        replace(plays, model="pi", thresholds=given, remark="a PI model, its thresholds given"),
+        replace(blocks, remark="a PI model by exchange of input and output, but for the thresholds"),
+        replace(blocks, model="pi", thresholds=inside, remark="a PI model by exchange, its thresholds given"),
+        *open_loops,
+        *others,
+        *(replace(case, model="pi", thresholds=32, remark="32 plays") for case in open_loops),
+        *(replace(case, model="gpi-tanh", thresholds=32, remark="32 plays behind a front") for case in open_loops),
+        *(replace(case, model="pi", remark="no front") for case in others),
+        replace(others[-1], model="gpi-deadzone", remark="another front"),
     ]
 
 
@@ -200,8 +212,7 @@ def measure(case: Case) -> Result:
         return Record(name, np.arange(len(v)) * 1e-3, *((y, v) if case.leads else (v, y)), sample_time=1e-3)
 
     train, other = record("training", training()), record("held out", held_out())
-    model = "pi" if case.thresholds else "auto"
-    fit = hystgen.identify(train, holdout=other, model=model, thresholds=case.thresholds, name="plant")
+    fit = hystgen.identify(train, holdout=other, model=case.model, thresholds=case.thresholds, name="plant")
     identified = hystgen.Model(fit.parameters)
     assert train.y is not None
     v, y = (train.y, train.v) if case.leads else (train.v, train.y)
@@ -253,9 +264,9 @@ def table(results: list[Result]) -> str:
 
 
 def draw(results: list[Result]) -> Any:
-    """Output over reference of every plant, without and with its compensator."""
+    """Output over reference of every plant, without and with the compensator that is chosen for it."""
     columns = 3
-    results = [result for result in results if not result.case.thresholds]
+    results = [result for result in results if result.case.model == "auto"]
     lines = -(-len(results) // columns)
     figure = drawing.figure(10.4, 3.2 * lines)
     for k, result in enumerate(results, 1):
