@@ -36,7 +36,10 @@ def _inverse(folder: Path) -> None:
     note.describe(loop, "c", "Loop and first rise", note.REFERENCE, note.DRIVE)
     x = np.linspace(0.0, 10.0, 401)
     phi = inverse.loading_curve(x)
-    note.close("the inverse's loading curve is the model's, reflected", note.EXAMPLE_1.loading_curve(phi), x, 1e-12)
+    # sums of 7 terms, each with a difference and a product, of weights and thresholds that are such sums themselves
+    largest = note.EXAMPLE_1.slopes[-1] * 10.0 * np.sum(np.abs(inverse.weights))
+    off_by = note.rounded(3 * 7 * 7, largest)
+    note.close("the inverse's loading curve is the model's, reflected", note.EXAMPLE_1.loading_curve(phi), x, off_by)
     curve.plot(x, phi, color=note.FIRST)
     curve.plot(inverse.thresholds, inverse.loading_curve(inverse.thresholds), "o", color=note.FIRST, markersize=4)
     curve_axis = rf"$\varphi(r)$ ({note.INPUT})"
@@ -70,8 +73,9 @@ def save_compensation(folder: Path, name: str, example: str, u: note.Array, v: n
 
 def _exact(folder: Path) -> None:
     u = note.sine(10.0)
-    y = note.EXAMPLE_1.simulate(note.EXAMPLE_1.inverse().simulate(u))
-    note.close("Example 2, compensation by the exact inverse (34)", y, u, 1e-13)
+    v = note.EXAMPLE_1.inverse().simulate(u)
+    y = note.EXAMPLE_1.simulate(v)
+    note.close("Example 2, compensation by the exact inverse (34)", y, u, note.cancelled(note.EXAMPLE_1, u, v))
     drawn, areas = note.panels(2)
     draw_tracking(areas, "ab", u, y, note.TIME)
     note.save(folder, "figure_12", drawn)
@@ -103,5 +107,5 @@ def _two_frequencies(folder: Path) -> None:
     u = note.sine(5.85) + note.sine(2.35, 5.0)
     v = note.EXAMPLE_1.inverse().simulate(u)
     y = note.EXAMPLE_1.simulate(v)
-    note.close("Example 3, compensation by the exact inverse", y, u, 1e-13)
+    note.close("Example 3, compensation by the exact inverse", y, u, note.cancelled(note.EXAMPLE_1, u, v))
     save_compensation(folder, "figure_14", "Example 3", u, v, y)

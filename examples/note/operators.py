@@ -20,18 +20,18 @@ def make(folder: Path) -> None:
 
 
 def _characteristics(folder: Path) -> None:
-    t, r, start = np.linspace(0.0, 3.0, 1201), 1.0, 0.6
-    v = 3.0 * np.sin(2.0 * np.pi * t) * np.exp(-0.35 * t)
+    t, r, start = np.linspace(0.0, 3.0, 1201), 1.0, 0.625
+    v = note.coarse(3.0 * np.sin(2.0 * np.pi * t) * np.exp(-0.35 * t))
     play, stop = operators.play(v, r, start), operators.stop(v, r, start)
-    note.close("play and stop add up to the input (26)", play + stop, v, 1e-14)
+    note.close("play and stop add up to the input (26)", play + stop, v, 0.0)
     note.close("the stop stays within its threshold (6)", np.maximum(np.abs(stop), r), r, 0.0)
-    note.close("the play stays within its threshold of the input (27)", np.maximum(np.abs(v - play), r), r, 1e-15)
+    note.close("the play stays within its threshold of the input (27)", np.maximum(np.abs(v - play), r), r, 0.0)
     drawn, (left, right) = note.panels(2)
     for axes, y, colour in ((left, play, note.FIRST), (right, stop, note.SECOND)):
         axes.plot(v, y, color=colour)
         axes.plot(v[0], y[0], "o", color=colour, markersize=5)
     line = {"arrowstyle": "-", "color": note.DIM}
-    left.annotate("start, $M_0 = 0.6$", (v[0], play[0]), (-2.4, 1.6), arrowprops=line, fontsize=9)
+    left.annotate(f"start, $M_0 = {start:g}$", (v[0], play[0]), (-2.4, 1.6), arrowprops=line, fontsize=9)
     right.annotate("start, $v_0 - M_0$", (v[0], stop[0]), (1.6, -0.4), arrowprops=line, fontsize=9)
     for offset in (-r, r):
         left.axline((0.0, offset), slope=1.0, color=note.DIM, linestyle="--", linewidth=0.9)
@@ -68,12 +68,12 @@ def _masses(folder: Path) -> None:
 
 def _elements(folder: Path) -> None:
     modulus, yield_stress = 2.0, 1.5
-    load = 4.0 * np.sin(2.0 * np.pi * note.TIME) * np.exp(-0.4 * note.TIME)
+    load = note.coarse(4.0 * np.sin(2.0 * np.pi * note.TIME) * np.exp(-0.4 * note.TIME))
     strain = elastoplastic.parallel(load, modulus, yield_stress).strain
     stress = elastoplastic.series(load / modulus, modulus, yield_stress).stress
     play, stop = operators.play(load, yield_stress) / modulus, operators.stop(load, yield_stress)
-    note.close("strain of the parallel element (12)", strain, play, 1e-14)
-    note.close("stress of the series element (17)", stress, stop, 1e-14)
+    note.close("strain of the parallel element (12)", strain, play, 0.0)
+    note.close("stress of the series element (17)", stress, stop, 0.0)
     drawn, (left, right) = note.panels(2)
     for axes, x, solved, operator, names in (
         (left, load, strain, play, ("return mapping", "play / E")),

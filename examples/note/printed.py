@@ -70,6 +70,40 @@ def close(what: str, values: ArrayLike, expected: ArrayLike, tolerance: float) -
         raise MismatchError(f"{what}: off by {worst:.3g}, {tolerance:.3g} is allowed")
 
 
+def coarse(x: ArrayLike) -> Array:
+    """The nearest multiples of 2^-20, of which sums and differences are exact."""
+    return np.asarray(np.round(np.asarray(x) * 2.0**20) / 2.0**20)
+
+
+def rounded(count: float, size: ArrayLike) -> float:
+    """What `count` roundings of numbers up to `size` may add up to."""
+    return float(count * 2.0**-53 * np.max(np.abs(size)))
+
+
+def summed(pi: PI, v: ArrayLike) -> float:
+    """How far roundings may put two sums of plays apart: of each term a difference, a product and a sum."""
+    return rounded(2 * 3 * (pi.n + 1), pi.slopes[-1] * np.max(np.abs(v)))
+
+
+def inverted(pi: PI, u: ArrayLike) -> float:
+    """How far roundings may put the inverse of a play sum off: of each term a difference, a product and a sum, and as
+    many in its weight and threshold."""
+    return rounded(6 * (pi.n + 1), np.sum(np.abs(pi.inverse().weights)) * np.max(np.abs(u)))
+
+
+def cancelled(model: PI | Cascade, u: ArrayLike, v: ArrayLike) -> float:
+    """How far roundings may keep a model behind its inverse from the identity, for the reference u and the drive v.
+
+    No output moves by more than the last slope times how far the input of the plays is off; a front and its inverse
+    add roundings of the input times the largest slope, and of the output.
+    """
+    pi, front = (model, 0.0) if isinstance(model, PI) else (model.pi, rounded(8, model.front(v)))
+    if isinstance(model, Cascade):
+        front += rounded(8, model.front_slopes[1] * np.asarray(v))
+    last = pi.slopes[-1]
+    return last * (inverted(pi, u) + front) + rounded(3 * (pi.n + 1), last * np.max(np.abs(u)))
+
+
 def spread(function: Callable[[Array], ArrayLike], numbers: Sequence[float], half: ArrayLike) -> Array:
     """How far the results of `function` may move, to first order, while each number moves by up to its `half`."""
     x = np.asarray(numbers, dtype=np.float64)
