@@ -55,7 +55,7 @@ class PI:
             raise ValueError(f"{len(thresholds)} thresholds but {len(weights)} weights")
         requested: float | tuple[float, ...]
         if isinstance(self.initial_state, int | float):
-            requested = float(self.initial_state)
+            (requested,) = numbers([self.initial_state], "the initial state")
         else:
             requested = numbers(self.initial_state, "initial states")
         start, projected = memory.project(requested, thresholds)

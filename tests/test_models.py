@@ -306,6 +306,12 @@ def test_loading_curves_that_are_none(x: list[float], phi: list[float], message:
         PI.from_loading_curve(x, phi)
 
 
+@pytest.mark.parametrize("start", [float("nan"), float("inf"), [0.0, float("nan")]])
+def test_start_states_that_are_none(start: float | list[float]) -> None:
+    with pytest.raises(ValueError, match="give (the )?initial states? as finite numbers"):
+        PI([0, 1], [1, 1], start)
+
+
 @given(virgins, turns)
 def test_width_is_that_of_the_largest_loop(pi: PI, middle: list[float]) -> None:
     """(32), corrected: how far apart rising and falling drives of one output lie on a loop that moves every play,
