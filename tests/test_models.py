@@ -308,7 +308,7 @@ def test_loading_curves_that_are_none(x: list[float], phi: list[float], message:
 
 @pytest.mark.parametrize("start", [float("nan"), float("inf"), [0.0, float("nan")]])
 def test_start_states_that_are_none(start: float | list[float]) -> None:
-    with pytest.raises(ValueError, match="give (the )?initial states? as finite numbers"):
+    with pytest.raises(ValueError, match=r"give (the )?initial states? as finite numbers"):
         PI([0, 1], [1, 1], start)
 
 
