@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
-from hystgen.diagnosis import floor, options, selection
+from hystgen.diagnosis import floor, selection
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import Run
-from hystgen.identification.fronts import DeadZones, Ends
-from hystgen.records import Record
 from tests.plants.__main__ import main as plants
 
 Array = NDArray[np.float64]
@@ -67,9 +65,7 @@ class TestBlindPlants:
                 assert content["gap"]["after"]["holdout"] < 0.5 * content["gap"]["refitted"]["holdout"]
                 (effect,) = content["effects"]
                 before, after = effect["holdout_before"], effect["holdout_after"]
-                share, gap = effect["share_of_gap"], content["gap"]["refitted"]["holdout"]
-                half = 5e-8  # a unit of the eighth digit, to which all four numbers are given
-                assert abs(share * gap - (before - after)) <= half * (2.0 * share * gap + before + after)
+                assert effect["share_of_gap"] == pytest.approx((before - after) / content["gap"]["refitted"]["holdout"])
                 assert after == content["gap"]["after"]["holdout"]
         assert right >= SINGLES - 1, wrong
         assert alone >= SINGLES - 1, wrong
@@ -145,106 +141,23 @@ class TestNoise:
         assert selection.difference(less, before) > 0.9
 
 
-    def test_a_hold_that_rings_tells_nothing(self) -> None:
-        """An oscillation that dies away in a hold is no noise, however large; slow noise there is."""
-        rng = np.random.default_rng(7)
-        t = np.arange(2000) * 1e-3
-        v = np.interp(t, [0.0, 0.5, 0.9, 1.4, 2.0], [0.0, 90.0, 90.0, 5.0, 0.0])
-        ringing = np.where((t > 0.5) & (t < 0.9), np.exp(-2.0 * (t - 0.5)) * np.cos(2.0 * np.pi * 47.0 * t), 0.0)
-        y = 0.1 * v + rng.normal(0.0, 0.02, len(v))
-        assert floor.noise_floor([self.item(y + ringing, v)]).holds is None
-        slow = np.zeros(len(v))
-        for k in range(1, len(v)):
-            slow[k] = 0.9 * slow[k - 1] + rng.normal(0.0, 0.05 * np.sqrt(1.0 - 0.81))
-        found = floor.noise_floor([self.item(0.1 * v + slow, v)]).holds
-        assert found is not None
-        # 240 samples of which 13 are independent, some of them taken for creep
-        assert found == pytest.approx(0.05, rel=4.0 / np.sqrt(2.0 * 13))
-
-
-@pytest.mark.parametrize(
-    ("points", "names"),
-    [
-        ([(0, 0), (90, 90), (100, 90.5)], ("saturation",)),  # one rail
-        ([(0, 8), (8, 8.1), (95, 95), (100, 95.1)], ("saturation",)),  # two
-        ([(0, 0), (80, 80), (100, 98)], ("saturation", "asymmetry")),  # is it a soft rail, is it a bend?
-        ([(0, 0), (50, 55), (100, 100)], ("asymmetry",)),
-        ([(0, 0), (80, 80), (100, 110)], ("asymmetry",)),  # steeper at an end
-        ([(0, 0), (25, 15), (50, 40), (75, 75), (100, 120)], ("asymmetry",)),
-        ([(0, 0), (20, 10), (80, 90), (100, 100)], ("saturation",)),  # alike at both
-    ],
-)
-def test_what_a_front_is_called(points: list[tuple[float, float]], names: tuple[str, ...]) -> None:
-    x, y = np.array(points, dtype=np.float64).T
-    front = DeadZones((x[0], x[-1]), tuple(x[1:-1].tolist()))
-    assert options.front_names(front, front.shape(np.diff(y) / np.diff(x)), front.drive) == names
-
-
-@pytest.mark.parametrize("drive", [(0.0, 100.0), (-50.0, 50.0), (-10.0, 100.0), (-120.0, -20.0)])
-def test_a_limiter_is_straight_between_its_ends(drive: tuple[float, float]) -> None:
-    low, high = drive
-    (stage,) = Ends(drive).stages(np.array([0.1, 0.2, -3.0]))
-    ends = np.array([low, low + 0.1 * (high - low), high - 0.2 * (high - low), high])
-    v = np.linspace(low, high, 1001)
-    inner = 1.0 / (0.7 + 0.3 * np.exp(-3.0))  # the range keeps its length
-    slopes = inner * np.array([np.exp(-3.0), 1.0, np.exp(-3.0)])
-    heights = np.concatenate([[0.0], np.cumsum(slopes * np.diff(ends))])
-    exact = np.interp(v, ends, heights)
-    exact -= exact[0] - stage.forward(np.array([low]))[0]
-    # numbers of the stage have ten digits; three of them act at a place
-    assert np.max(np.abs(stage.forward(v) - exact)) <= 3 * 0.5e-9 * 120.0
-    assert stage.forward(np.array([0.0]))[0] == 0.0
-    assert not list(stage.inverse_problems(low, high))
-
-
-def test_a_strong_curve_of_the_sensor_is_found_whatever_the_offset(tmp_path: Path) -> None:
-    """The sensor sees the offset too; where the curve is strong, its argument has to be right."""
-    records = []
-    for number, reach in enumerate((100.0, 60.0, 100.0), 1):
-        v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (reach / 100.0) * (wander(number) - 40.0)])
-        h = brute_output(v, (0.0, 10.0), (1.0, 0.8), 0.0) + 20.0
-        y = h + 0.1 * h**2 / 100.0 - 0.05 * h**3 / 100.0**2
-        records.append(record(v, noisy(y, 0.02, number), f"record {number}"))
-    content = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0]).content
-    assert [effect["name"] for effect in content["effects"]] == ["sensor_nonlinearity"]
-    # the believed thresholds are the right ones, so that nothing else is left
-    assert content["gap"]["refitted"]["holdout"] > 30.0 * 0.02
-    assert content["gap"]["after"]["holdout"] < 1.15 * 0.02
-
-
-def test_a_drift_is_not_explained_by_free_start_states(tmp_path: Path) -> None:
-    """With an unknown history creep may begin anywhere in every record, which imitates a drift piece by piece."""
-    records = []
-    for number in range(1, 6):
-        v = wander(number, turns=40)
-        t = np.arange(len(v)) * 1e-3 + 3.0 * number
-        y = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + 0.4 * t + 0.02 * t**1.5
-        records.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
-    content = hystgen.diagnose(_model(tmp_path), records[:3], holdout=records[3:]).content
-    assert [effect["name"] for effect in content["effects"]] == ["drift"]
-
-
 def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> None:
     """Only the steps of one record are faster than the amplifier: held out, they are no ground for any number."""
     slow = [np.concatenate([np.linspace(0.0, v[0], 40), v]) for v in (wander(seed, turns=40) for seed in (1, 2))]
     steps = np.concatenate([np.zeros(40), np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
-
-    def output(v: Array, rate: float) -> Array:
+    records = []
+    for number, v in enumerate((*slow, steps)):
         a = v.copy()
         for k in range(1, len(a)):
-            a[k] = a[k - 1] + np.clip(v[k] - a[k - 1], -1e-3 * rate, 1e-3 * rate)
-        return brute_output(a, (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0)
-
-    drives = enumerate((*slow, steps))
-    records = [record(v, noisy(output(v, 7000.0), 0.05, number), f"record {number}") for number, v in drives]
+            a[k] = a[k - 1] + np.clip(v[k] - a[k - 1], -7.0, 7.0)  # 7000 a second
+        y = noisy(brute_output(a, (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0), 0.05, number)
+        records.append(record(v, y, f"record {number}"))
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0]).content
     assert found["verdict"] == "unexplained"
     assert any(advice.startswith("fit record 2 too and hold out others") for advice in found["advice"])
     found = hystgen.diagnose(_model(tmp_path), records[1:], holdout=records[:1], history=[0.0]).content
     assert [effect["name"] for effect in found["effects"]] == ["slew_limit"]
-    # the noise leaves this open to 0.05 / |slope|, of which four are allowed
-    slope = (output(steps, 7001.0) - output(steps, 6999.0)) / 2.0
-    assert abs(found["effects"][0]["parameters"]["rate"] - 7000.0) <= 4.0 * 0.05 / np.linalg.norm(slope)
+    assert found["effects"][0]["parameters"]["rate"] == pytest.approx(7000.0, rel=1e-3)
     assert not any("hold out others" in advice for advice in found["advice"])
 
 

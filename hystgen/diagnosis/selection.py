@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
-from hystgen.diagnosis.options import Option, about, front_names, options
+from hystgen.diagnosis.options import Option, about, front_name, options
 from hystgen.diagnosis.structure import Fitted, Item, Structure
 from hystgen.effects.base import About, Effect
 from hystgen.identification.fronts import Kept
@@ -81,15 +81,14 @@ class Tried:
 
     option: Option
     fitted: Fitted
-    names: tuple[str, ...]
-    """the name, and others that the same numbers would bear as well"""
+    name: str
     held_out: float
     errors: list[Array]
 
     @property
-    def name(self) -> str:
-        """What it is called."""
-        return self.names[0]
+    def numbers(self) -> int:
+        """How many numbers it takes."""
+        return len(self.fitted.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +206,8 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
 
 
 def _found(best: Tried, tried: Sequence[Tried], before: float, merit: _Merit, records: _Records) -> Found:
-    alike = [t.name for t in tried if t.name != best.name and _alike(t, best, records.noise)]
-    rivals = tuple(dict.fromkeys([*best.names[1:], *alike]))
-    return Found(best.name, best.option.label, before, best.held_out, merit.p_value, rivals)
+    rivals = dict.fromkeys(t.name for t in tried if t.name != best.name and _alike(t, best, records.noise))
+    return Found(best.name, best.option.label, before, best.held_out, merit.p_value, tuple(rivals))
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
@@ -285,28 +283,20 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
         if fitted.rms >= now.rms:
             continue
         errors = fitted.errors(records.held)
-        names: tuple[str, ...] = (option.name,)
+        name = option.name
         if option.front:
             shape, _ = fitted.structure.pieces(fitted.shape)
-            names = front_names(fitted.structure.front, shape, records.known.drive)
-        tried.append(Tried(option, fitted, names, fits.rms(errors), errors))
+            name = front_name(fitted.structure.front, shape, records.known.drive)
+        tried.append(Tried(option, fitted, name, fits.rms(errors), errors))
     return sorted(tried, key=lambda each: each.held_out)
 
 
 def _simplest(tried: Sequence[Tried], held: Sequence[Item]) -> Tried:
-    """The best, or one of fewer numbers that is about as good where both leave the same free in every record.
-
-    What a shape leaves free in a record counts as its numbers: free responses to a start state alone may explain a
-    drift.
-    """
-
-    def numbers(each: Tried) -> int:
-        return len(each.fitted.shape) + max(len(each.fitted.actuator.nuisances(item)) for item in held)
-
+    """The best, or one of fewer numbers that is about as good where both leave the same free in every record."""
     best = tried[0]
     enough = (1.0 + SIMPLER) * best.held_out
     near = [each for each in tried if fits.rms(each.fitted.errors(held, best.fitted)) <= enough]
-    return min(near or [best], key=lambda each: (numbers(each), each.held_out))
+    return min(near or [best], key=lambda each: (each.numbers, each.held_out))
 
 
 def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
