@@ -245,7 +245,7 @@ HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memor
         if (turned) {
             hystgen_corners_settle(t, &m->here, corner);
         }
-        if (hystgen_reached(w, m->here.next, m->here.rising)) {
+        if (hystgen_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
             hystgen_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
             hystgen_corners_settle(t, &m->here, corner);
         }

@@ -170,6 +170,11 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     if (!hystgen_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    return rising ? hystgen_corners_rise(t, corner, m->start, depth, k, output, &m->there)
-                  : hystgen_corners_fall(t, corner, m->start, depth, k, output, &m->there);
+    w = rising ? hystgen_corners_rise(t, corner, m->start, depth, k, output, &m->there)
+               : hystgen_corners_fall(t, corner, m->start, depth, k, output, &m->there);
+    if (!hystgen_past(w, m->w, rising)) { /* rounding is kept from leading back */
+        m->there.k = 0;
+        return m->w;
+    }
+    return w;
 }

@@ -335,7 +335,7 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     else:
         if turned:
             corners_settle(t, s)
-        if reached(w, s.real[NEXT], s.counts[RISING]):
+        if past(w, s.real[NEXT], s.counts[RISING]):  # right there the next play does not move yet
             left, k = corners_find(
                 t, s, 0, s.counts[DEPTH], s.counts[K] + 1, s.counts[RISING], w, s.extremum, t.threshold
             )
@@ -388,16 +388,23 @@ def corners_solve(t: Tables, s: State, output: Any) -> Any:
     rising = s.counts[RISING]
     depth = s.counts[DEPTH]
     if reached(output, s.real[NEXT_OUTPUT], rising):
-        return corners_locate(t, s, depth, k + 1, rising, output)
-    w = s.real[ANCHOR] + (output - s.real[ANCHOR_OUTPUT]) * t.inverse_slope[k]
-    if (rising and w >= s.real[W]) or (not rising and w <= s.real[W]):
-        if reached(w, s.real[NEXT], rising):
-            return s.real[NEXT]
-        return w
-    if k > 1:
-        push_corner(t, s, depth)
-        depth = depth + 1
-    return corners_locate(t, s, depth, 1, 1 - rising, output)
+        k = k + 1
+    else:
+        w = s.real[ANCHOR] + (output - s.real[ANCHOR_OUTPUT]) * t.inverse_slope[k]
+        if reached(w, s.real[W], rising):
+            if reached(w, s.real[NEXT], rising):
+                return s.real[NEXT]
+            return w
+        if k > 1:
+            push_corner(t, s, depth)
+            depth = depth + 1
+        k = 1
+        rising = 1 - rising
+    w = corners_locate(t, s, depth, k, rising, output)
+    if not past(w, s.real[W], rising):  # rounding is kept from leading back
+        s.counts[HINT_K] = 0
+        return s.real[W]
+    return w
 
 
 # ---------------------------------------------------------------- loop_absorb.c, loop_solve.c

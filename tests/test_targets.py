@@ -99,7 +99,7 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
             for row in mine:
                 if row.operator == "selftest":
                     continue
-                assert row.samples == 700 * (13 if row.operator == "forward" else 15)
+                assert row.samples == 700 * (14 if row.operator == "forward" else 16)
                 assert row.mean_instructions is not None
                 assert row.max_instructions is not None
                 assert 40 < row.mean_instructions < row.max_instructions < 60_000

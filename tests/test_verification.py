@@ -133,6 +133,13 @@ def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) ->
     assert np.mean(outside < low) > 0.05
     tiny = np.abs(records["denormals"][1])
     assert np.mean((tiny > 0) & (tiny < np.finfo(real).tiny)) > 0.5
+    onto = records["onto the plays"][1]
+    levels = numbers.start_level if inverse else numbers.threshold
+    moves = np.abs(np.diff(onto.astype(float)))
+    known = np.min(np.abs(moves[:, None] - 2.0 * levels.astype(float)), axis=1) < 1e-5 * (high - low)
+    assert np.mean(known) > 0.9  # over again, by last bits, or just as far as a play needs
+    assert np.mean(moves == 0) > 0.2
+    assert np.mean(moves > 0.01 * (high - low)) > 0.2
     odd = records["NaN, infinities, extremes"][1]
     assert np.isnan(odd).any()
     assert np.isposinf(odd).any()

@@ -139,8 +139,8 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
     if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
         return 4 if fixed else 3, 10, 0, 2  # next 1, search 3. In fixed point a sum takes two multiplications.
     # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
-    # 4 + 3; where samples can be fast: two edges, and in fixed point one more play 5, edges anew 4, in floating point
-    # ahead 1, the range's ends 3, limited 2. The drive's corner and way, the reference's; two lines; with fast samples
-    # the edge, and in fixed point the next play's line and way.
-    compares = 30 + (11 if fixed else 8) * fast
+    # 4 + 3, in floating point ahead 1; where samples can be fast: two edges, and in fixed point one more play 5, edges
+    # anew 4, in floating point room 1, the range's ends 3, limited 2. The drive's corner and way, the reference's; two
+    # lines; with fast samples the edge, and in fixed point the next play's line and way.
+    compares = 30 + 11 * fast if fixed else 31 + 8 * fast
     return (10 + 4 * fast if fixed else 6 + fast), compares, 0, 4

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import reference
+from hystgen import fixed, reference
 from hystgen.fixed import FixedTables
 from hystgen.reference import Bytes
 
@@ -22,6 +22,25 @@ def _steps(x: NDArray[np.float64]) -> Bytes:
 def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
     """Straight moves between turning points."""
     return np.interp(np.linspace(0, len(points) - 1, length), np.arange(len(points)), points)
+
+
+def _onto_the_plays(
+    levels: NDArray[np.float64], least: Any, low: float, high: float, length: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Turns that end where another play starts to follow, give or take last bits; most are asked for again."""
+    x = np.empty(length)
+    at, i = (low + high) / 2, 0
+    while i < length:
+        way = 2 * float(rng.choice(levels)) * (1 if rng.random() < 0.5 else -1)
+        if not low <= at + way <= high:
+            way = -way
+        at = at + way if low <= at + way <= high else float(rng.uniform(low, high))
+        for _ in range(rng.integers(1, 4)):
+            times = int(rng.integers(1, 3))
+            x[i : i + times] = at
+            i += times
+            at = at + float(least(at)) * int(rng.integers(-2, 3))
+    return x
 
 
 def suite(
@@ -71,6 +90,13 @@ def _suite(
         yield record("denormals", np.where(rng.random(length) < 0.7, tiny, small))
     least = 1.0 if whole else np.spacing(real(abs(middle)))
     yield record("last bits", middle + float(least) * np.round(rng.normal(0, 4, length)))
+
+    levels = (tables.start_level if inverse else tables.threshold)[1:].astype(float)
+    if isinstance(tables, FixedTables):
+        levels = levels / 2.0 ** int(tables.limits[fixed.FRACTION] if inverse else tables.limits[fixed.FINE])
+    if len(levels) > 0:
+        bit = (lambda _: 1.0) if whole else (lambda at: np.spacing(real(abs(at))))
+        yield record("onto the plays", _onto_the_plays(levels, bit, low, high, length, rng))
 
     if whole:
         most = float(np.iinfo(real_type).max)

@@ -324,7 +324,7 @@ static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, 
         if (turned) {
             curved_corners_settle(t, &m->here, corner);
         }
-        if (curved_reached(w, m->here.next, m->here.rising)) {
+        if (curved_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
             curved_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
             curved_corners_settle(t, &m->here, corner);
         }

@@ -300,7 +300,7 @@ static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, pla
         if (turned) {
             plain_corners_settle(t, &m->here, corner);
         }
-        if (plain_reached(w, m->here.next, m->here.rising)) {
+        if (plain_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
             plain_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
             plain_corners_settle(t, &m->here, corner);
         }
@@ -637,7 +637,7 @@ static plain_real_t plain_inverse_send(plain_inverse_t *self, plain_real_t v)
 {
     const plain_memory_t *m = &self->memory;
     (void)plain_inverse_answer(self, v);
-    self->has_pending = m->there.k > 0 || v < m->w || v > m->w || (m->here.rising ? v >= m->here.next : v <= m->here.next);
+    self->has_pending = m->there.k > 0 || v < m->w || v > m->w;
     return v;
 }
 
@@ -670,7 +670,11 @@ static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth,
     plain_real_t edge;
     if (rising) {
         v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
-        if (!(v > self->memory.w)) {
+        if (!(v > self->memory.w)) { /* rounding is kept from leading back */
+            self->memory.there.k = 0;
+            return plain_inverse_stay(self, self->memory.w);
+        }
+        if (v > p->next) { /* nor is there room for the place */
             return plain_inverse_stay(self, v);
         }
         edge = p->next_output;
@@ -692,7 +696,11 @@ static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth,
         return v;
     }
     v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
-    if (!(v < self->memory.w)) {
+    if (!(v < self->memory.w)) { /* rounding is kept from leading back */
+        self->memory.there.k = 0;
+        return plain_inverse_stay(self, self->memory.w);
+    }
+    if (v < p->next) { /* nor is there room for the place */
         return plain_inverse_stay(self, v);
     }
     edge = p->next_output;
@@ -728,7 +736,7 @@ static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t v)
 {
     const plain_place_t *p = &self->memory.here;
     plain_real_t edge;
-    if (!(v > self->memory.w && v < p->next)) {
+    if (!(v > self->memory.w)) {
         return plain_inverse_stay(self, v);
     }
     plain_copy_place(&self->memory.there, p);
@@ -756,7 +764,7 @@ static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t v)
 {
     const plain_place_t *p = &self->memory.here;
     plain_real_t edge;
-    if (!(v < self->memory.w && v > p->next)) {
+    if (!(v < self->memory.w)) {
         return plain_inverse_stay(self, v);
     }
     plain_copy_place(&self->memory.there, p);
@@ -861,14 +869,16 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     z = z + z;
                 }
                 r = c->extremum + r;
+                z = z - y; /* the last play of a corner goes by this output, the others by the way */
                 v = p->next + (output - p->next_output) * plain_reciprocal[k];
-                if (first && v < r && v <= PLAIN_DRIVE_MAX) {
+                if (first && output < z && v < r && v > self->pending
+                    && v <= PLAIN_DRIVE_MAX) {
                     plain_copy_place(&m->here, p);
                     m->w = self->pending;
                     p->anchor = p->next;
                     p->anchor_output = p->next_output;
                     p->next = r;
-                    p->next_output = z - y;
+                    p->next_output = z;
                     p->k = (uint_least16_t)k;
                     plain_inverse_ask(self, u, 0);
                     edge = p->next_output;
@@ -946,14 +956,16 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     z = z + z;
                 }
                 r = c->extremum - r;
+                z = y - z; /* the last play of a corner goes by this output, the others by the way */
                 v = p->next + (output - p->next_output) * plain_reciprocal[k];
-                if (first && v > r && v >= PLAIN_DRIVE_MIN) {
+                if (first && output > z && v > r && v < self->pending
+                    && v >= PLAIN_DRIVE_MIN) {
                     plain_copy_place(&m->here, p);
                     m->w = self->pending;
                     p->anchor = p->next;
                     p->anchor_output = p->next_output;
                     p->next = r;
-                    p->next_output = y - z;
+                    p->next_output = z;
                     p->k = (uint_least16_t)k;
                     plain_inverse_ask(self, u, 0);
                     edge = p->next_output;

@@ -11,7 +11,7 @@
  * Cost, derived from the model (32-bit target):
  *     constant tables   152 bytes
  *     inverse instance  200 bytes of RAM
- *     inverse step, worst case: 7 multiplications, 50 comparisons (38 + 4 b, b = 3 the bits of n)
+ *     inverse step, worst case: 7 multiplications, 51 comparisons (39 + 4 b, b = 3 the bits of n)
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero

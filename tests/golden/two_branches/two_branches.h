@@ -11,7 +11,7 @@
  * Cost, derived from the model (32-bit target):
  *     constant tables   364 bytes
  *     inverse instance  184 bytes of RAM
- *     inverse step, worst case: 12 multiplications, 60 comparisons (48 + 4 b, b = 3 the bits of n), 1 tanh, 2 atanh
+ *     inverse step, worst case: 12 multiplications, 61 comparisons (49 + 4 b, b = 3 the bits of n), 1 tanh, 2 atanh
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Define TWO_BRANCHES_IMPLEMENTATION in one C file
@@ -576,7 +576,7 @@ static void two_branches_corners_absorb(const two_branches_tables_t *t, two_bran
         if (turned) {
             two_branches_corners_settle(t, &m->here, corner);
         }
-        if (two_branches_reached(w, m->here.next, m->here.rising)) {
+        if (two_branches_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
             two_branches_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
             two_branches_corners_settle(t, &m->here, corner);
         }
@@ -824,8 +824,13 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
     if (!two_branches_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    return rising ? two_branches_corners_rise(t, corner, m->start, depth, k, output, &m->there)
-                  : two_branches_corners_fall(t, corner, m->start, depth, k, output, &m->there);
+    w = rising ? two_branches_corners_rise(t, corner, m->start, depth, k, output, &m->there)
+               : two_branches_corners_fall(t, corner, m->start, depth, k, output, &m->there);
+    if (!two_branches_past(w, m->w, rising)) { /* rounding is kept from leading back */
+        m->there.k = 0;
+        return m->w;
+    }
+    return w;
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
