@@ -1,13 +1,16 @@
 """Instructions per sample on microcontroller cores, counted on emulated ones.
 
     python benchmarks/targets.py [--n 16,128] [--targets cortex-m4f] [--compilers zig,gcc] [-o FOLDER] [--check]
+    python benchmarks/targets.py --parts FOLDER/targets.csv ... [-o FOLDER] [--check]
 
 Emitted code of both engines and operators against the textbook loop (`textbook/textbook.c`: formula (35) as ternaries
 with the same care for NaN, range and status), same compiler, flags (-std=c99 -O2) and signal: a decaying multisine over
 the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
-one among them, then jumps to everywhere. Every answer that is counted has been compared with the bit reference.
+one among them, then a sample after which the next one has to do more (`ways`), then jumps to everywhere; and what lies
+near the dearest of these. Every answer that is counted has been compared with the bit reference.
 
-Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed.
+Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed. All plays, cores and
+arithmetics take hours: `--parts` puts the tables of shorter runs together.
 """
 
 from __future__ import annotations
@@ -37,6 +40,7 @@ from hystgen.verification import comparison, compilers, cross, emulator, sources
 HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
+SEARCHED = 200_000  # samples of a round of the search for the worst case
 RANGE = 10.0
 # of the textbook loop: what numbers are and what sums are
 TYPES = {
@@ -66,6 +70,9 @@ class Figures:
     library: int
     ram: int
     stack: int
+
+
+KINDS = {name: {"str": str, "int": int, "float": float}[str(kind)] for name, kind in Figures.__annotations__.items()}
 
 
 @functools.cache
@@ -108,52 +115,129 @@ def from_drive(n: int, operator: str, drive: Reals, call: Any = None) -> Reals:
     return session.run(drive)[0] if call is None else session.operate(call, drive)[0]
 
 
+def blocks(n: int) -> Iterator[list[int]]:
+    """Sizes of the blocks of a corner list, the one with the largest thresholds first: equal ones of 1, 2, 4 .. n
+    plays, and one large block among blocks of one, since a search halves the blocks first and then the plays of one."""
+    size = 1
+    while size <= n:
+        yield [size] * (n // size)
+        size *= 2
+    for large in sorted({n // 4, n // 2, 3 * n // 4} - {0, 1}):
+        for above in sorted({0, (n - large) // 2, n - large}):
+            yield [1] * above + [large] + [1] * (n - large - above)
+
+
 def corner_lists(n: int) -> Iterator[Reals]:
-    """Drives that leave a corner list: full swings, which wipe the memory, then turning points of a shrinking
-    alternating swing, each of which leaves a block of 1, 2, 4 .. n plays behind; each also upside down."""
+    """Drives that leave a corner list: swings that take every play along, or rest, then turning points of a shrinking
+    alternating swing, each of which leaves a block behind; each also upside down. What full swings leave, no jump can
+    wipe as a whole; what shorter ones from rest do, one can."""
     r = np.asarray(model(n).cascade.pi.thresholds)
-    block = 1
-    while block <= n:
-        at = -RANGE
-        points = [RANGE, at]
-        for turn, k in enumerate(range(n - block, 0, -block)):
-            at += (r[k] + r[k + 1]) * (1 if turn % 2 == 0 else -1)  # moves play k and not the next
-            points.append(at)
-        yield np.array(points)
-        yield -np.array(points)
-        block *= 2
+    for sizes in blocks(n):
+        turns = n - np.cumsum(sizes[:-1])
+        swing = np.array([r[k] + r[k + 1] for k in turns])  # moves play k and not the next
+        swing[1::2] *= -1
+        lists = [np.concatenate([[RANGE, -RANGE], np.cumsum(swing) - RANGE])]
+        if len(turns):
+            halved = swing.copy()
+            halved[0] /= 2  # a play at rest follows after once its threshold, after a turn after twice
+            lists.append(np.append(0.0, np.cumsum(halved)))
+        short = np.array([1.8 * r[k] + 0.2 * r[k + 1] for k in turns])
+        short = short[short < 1.5 * RANGE]
+        short[1::2] *= -1
+        lists.append(np.concatenate([[RANGE, -RANGE / 2], np.cumsum(short) - RANGE / 2]))
+        for points in lists:
+            yield points
+            yield -points
 
 
-def everywhere(n: int) -> Reals:
-    """Drives between all activation points of a few plays, or many of those of many; the outermost beyond the range."""
-    return np.linspace(-1.01 * RANGE, 1.01 * RANGE, min(4 * n + 1, 129))
+def activations(n: int, points: Reals) -> Reals:
+    """Drives beyond which a move from the last of `points` takes another play along, by formula (35); ascending."""
+    r = np.asarray(model(n).cascade.pi.thresholds)[1:]
+    plays = np.zeros(n)
+    for x in np.clip(points, -RANGE, RANGE):
+        plays = np.maximum(x - r, np.minimum(x + r, plays))
+    return np.unique(np.concatenate([plays - r, plays + r]).round(9))
 
 
-def trials(n: int) -> list[Reals]:
-    """Every corner list, then two jumps, since the search for what follows after a jump is the work of a sample; also
-    with a small step on between them, after which the sample before the last was one that need not look."""
-    jumps = everywhere(n)
-    first, second = jumps[:: max(1, len(jumps) // 12)], jumps[:: max(1, len(jumps) // 24)]
-    found = []
+def thinned(x: Reals, most: int) -> Reals:
+    """At most so many of them, the ends among them."""
+    return x[np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int)]
+
+
+def landings(n: int, points: Reals, most: int = 129) -> Reals:
+    """Drives that take different plays along from the last of `points` on; the outermost lie beyond the range."""
+    ends = np.array([-1.01 * RANGE, 1.01 * RANGE])
+    between = np.unique(np.concatenate([ends, np.clip(activations(n, points), -RANGE, RANGE)]))
+    return np.concatenate([ends, thinned((between[1:] + between[:-1]) / 2, most - 2)])
+
+
+def trials(n: int) -> Iterator[Reals]:
+    """Every corner list, then a jump, since the search for where it leads is the work of a sample."""
     for points in corner_lists(n):
-        for a, b in itertools.islice(itertools.product(first, second), 0, None, 1 + len(points) // 40):
-            on = a + 1e-3 * np.sign(a - points[-1])
-            found += [np.append(points, (a, b)), np.append(points, (a, on, b))]
+        for jump in landings(n, points, 2000 // n + 20):
+            yield np.append(points, jump)
     # and blocks of uneven sizes, which no rule makes: turning points at random, small among large
     rng = np.random.default_rng(11)
-    for _ in range(1500):
+    for _ in range(2000):
         size = rng.integers(4, 12)
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
-        found += [np.concatenate([[RANGE, -RANGE], turns]), turns]  # after full swings, and from the start
-    return found
+        yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
+        yield turns  # and from the start
 
 
-def neighbours(n: int, trial: Reals) -> Iterator[Reals]:
-    """A trial with one of its jumps, or a turning point shortly before them, moved anywhere."""
-    for place, jump in itertools.product(range(-min(5, len(trial)), 0), everywhere(n)):
-        other = trial.copy()
-        other[place] = jump
-        yield other
+def ways(n: int, points: Reals, hair: float) -> Iterator[Reals]:
+    """Steps on from `points` after which the next sample has more to do before it looks for its own place.
+
+    A sample is fast where the one before it ended in the place that its search had found. That one did not where it led
+    back to the corner that it came from, since no play followed in between; where it asked for less than a `hair`, the
+    finest step of the drive, so that rounding sent the answer nowhere or back; where it met a limit; and where rounding
+    carried the answer to an activation point or across, at the first time or when the same was asked for again.
+    """
+    at, on = points[-1], 1.0 if len(points) < 2 else np.sign(points[-1] - points[-2])
+    first = model(n).cascade.pi.thresholds[1]
+    yield np.array([at - on * first])
+    yield np.array([at - on * first, at - on * first / 2])
+    for part in (0.5, 1.0, 1.5):
+        yield np.array([at + part * hair])
+        yield np.array([at - part * hair])
+    yield np.array([1.01 * RANGE])
+    yield np.array([-1.01 * RANGE])
+    for a in thinned(activations(n, points), 8):
+        for times in (1, 2):
+            yield np.full(times, a - np.sign(a - at) * hair / 4)
+
+
+def longer(n: int, trial: Reals, hair: float) -> Iterator[Reals]:
+    """A trial with a way between what it jumps from and its jump, which then leads anywhere."""
+    for way in ways(n, trial[:-1], hair):
+        points = np.concatenate([trial[:-1], way])
+        for jump in landings(n, points, 9):
+            yield np.append(points, jump)
+
+
+def neighbours(n: int, trial: Reals, hair: float) -> Iterator[Reals]:
+    """A trial with its last jump, or a point shortly before, led elsewhere; what is longer; and what has other numbers,
+    on which the cost of floating point in software depends."""
+    for place in range(-1, -min(5, len(trial)), -1):
+        for jump in landings(n, trial[:place], 65):
+            other = trial.copy()
+            other[place] = jump
+            yield other
+    rng = np.random.default_rng(13)
+    for size in np.repeat([1.0, 0.3, 0.1], 30) * model(n).cascade.pi.thresholds[1]:
+        yield trial + rng.uniform(-size, size, len(trial))
+    yield from longer(n, trial, hair)
+
+
+def within(most: int, found: Iterable[Reals]) -> list[Reals]:
+    """The first of them, of so many samples together."""
+    kept = []
+    for trial in found:
+        most -= len(trial) + 1
+        if most < 0:
+            break
+        kept.append(trial)
+    return kept
 
 
 @dataclass(frozen=True)
@@ -196,7 +280,7 @@ class Bench:
         self._folder = folder
         self._number = itertools.count()
         self._emitted: dict[tuple[int, str, str], sources.Sources] = {}
-        self._worst: dict[Case, tuple[Any, Any]] = {}
+        self._worst: dict[Case, list[Reals]] = {}
 
     def image(self, case: Case, engine: str) -> emulator.Image:
         """A strict build of emitted code with both operators, or of the textbook loop with one."""
@@ -277,7 +361,8 @@ class Bench:
     def worst(self, case: Case) -> Figures:
         """Engine corners over the worst trials."""
         image = self.image(case, "corners")
-        core = self.run(case, image, "corners", *self._worst_trials(case))
+        call, drive = together(self._worst_trials(case))
+        core = self.run(case, image, "corners", given(case, drive, call=call), call)
         return figures_of(case, "corners", "worst case", core, image)
 
     def run(self, case: Case, image: emulator.Image, engine: str, x: Any, call: Any = None) -> emulator.Core:
@@ -291,30 +376,44 @@ class Bench:
         assert not outcome.different, f"{case}, {engine}: {outcome}"
         return core
 
-    def _worst_trials(self, case: Case) -> tuple[Any, Any]:
-        """The trials with the dearest samples on a Cortex-M4F, after a search among their neighbours for dearer ones;
-        those of other cores differ little."""
-        case = replace(case, target=targets.find("cortex-m4f"))
+    def _worst_trials(self, case: Case) -> list[Reals]:
+        """The trials with the dearest samples on a Cortex-M4F or, for cores without FPU, on a Cortex-M0+; other cores
+        differ little. What is built is searched, then the neighbours of what is found for dearer ones."""
+        case = replace(case, target=targets.find("cortex-m4f" if case.target.fpu else "cortex-m0plus"))
         if case not in self._worst:
-            image = self.image(case, "corners")
-
-            def dearest(found: list[Reals], number: int) -> list[Reals]:
-                call, drive = together(found)
-                counts = np.zeros(len(call))
-                counts[call == reference.OP_STEP] = self.run(
-                    case, image, "corners", given(case, drive, call=call), call
-                ).counts
-                ends = np.cumsum([len(trial) + 1 for trial in found])
-                dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
-                return [found[i] for i in np.argsort(dear, kind="stable")[-number:]]
-
-            kept = min(10, max(2, 320 // case.n))  # long corner lists take long to run
-            best = dearest(trials(case.n), kept)
-            for _ in range(3 if case.n <= 32 else 2):
-                best = dearest([*best, *(other for trial in best for other in neighbours(case.n, trial))], kept)
-            call, drive = together(best)
-            self._worst[case] = given(case, drive, call=call), call
+            real = comparison.REALS[case.arithmetic]
+            hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
+            in_software = real.kind == "f" and not (case.target.fpu and case.arithmetic == "float32")
+            most, rounds = SEARCHED // (8 if in_software else 1), 6
+            if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
+                best, rounds = self._worst_trials(replace(case, arithmetic="float32")), 1
+            else:
+                _, best = self._dearest(case, within(SEARCHED // (1 + in_software), trials(case.n)), 20)
+                best += within(most, (x for trial in best for x in longer(case.n, trial, hair)))
+            before, (dear, best) = 0, self._dearest(case, best, 10)
+            for _ in range(rounds):
+                if dear == before:
+                    break
+                before, near = dear, (x for trial in best for x in neighbours(case.n, trial, hair))
+                dear, best = self._dearest(case, [*best, *within(most, near)], 10)
+            self._worst[case] = best
         return self._worst[case]
+
+    def _dearest(self, case: Case, found: list[Reals], number: int) -> tuple[int, list[Reals]]:
+        """Instructions of the dearest sample, and so many trials with the dearest ones, those first, and one of those
+        that jump from the same place."""
+        call, drive = together(found)
+        counts = np.zeros(len(call))
+        image = self.image(case, "corners")
+        counts[call == reference.OP_STEP] = self.run(
+            case, image, "corners", given(case, drive, call=call), call
+        ).counts
+        ends = np.cumsum([len(trial) + 1 for trial in found])
+        dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
+        kept: dict[bytes, Reals] = {}
+        for i in np.argsort(dear, kind="stable")[::-1]:
+            kept.setdefault(found[i][:-1].tobytes(), found[i])
+        return max(dear), list(kept.values())[:number]
 
 
 def figures_of(case: Case, engine: str, signal: str, core: emulator.Core, image: emulator.Image) -> Figures:
@@ -369,6 +468,17 @@ def measure(
                 seconds = time.monotonic() - began
                 print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
     return found
+
+
+def read(paths: Iterable[Path]) -> list[Figures]:
+    """The figures in tables that were written, in the order of a run that measures all of them."""
+    found = []
+    for path in paths:
+        with path.open(newline="", encoding="ascii") as file:
+            for row in csv.DictReader(file):
+                found.append(Figures(**{name: KINDS[name](text) for name, text in row.items()}))
+    place = {name: i for i, name in enumerate((*targets.NAMES, *cross.NAMES, *TYPES))}
+    return sorted(found, key=lambda f: (place[f.target], place[f.compiler], f.n, place[f.arithmetic]))
 
 
 def key(f: Figures) -> tuple[Any, ...]:
@@ -491,10 +601,11 @@ def main() -> int:
     parser.add_argument("--compilers", default=",".join(cross.NAMES), help="zig, gcc")
     parser.add_argument("--arithmetics", default="float32,float64,q31,q15", help="comma separated")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="of the multisine")
+    parser.add_argument("--parts", type=Path, nargs="+", help="measure nothing, but put these tables together")
     parser.add_argument("-o", "--output", type=Path, help="folder for targets.csv and targets.svg")
     parser.add_argument("--check", action="store_true", help="exit 1 where a goal is missed")
     wanted = parser.parse_args()
-    figures = measure(
+    figures = read(wanted.parts) if wanted.parts else measure(
         [int(n) for n in wanted.n.split(",")],
         [targets.find(name) for name in wanted.targets.split(",")],
         wanted.compilers.split(","),

@@ -282,17 +282,36 @@ def test_counts_agree_with_those_known_for_the_textbook_loop(
     assert 0.9 * textbook.mean <= loop.mean <= 1.3 * textbook.mean
 
 
-def test_the_constructed_worst_case_is_the_worst(bench: ModuleType, tmp_path: Path) -> None:
-    """Its corner lists are as deep as they can be, and no random walk finds a sample that is dearer by more than what
-    a status bit takes."""
-    lists = list(bench.corner_lists(16))[::2]  # each also upside down
-    assert [len(points) for points in lists] == [17, 9, 5, 3, 2]
-    made, case = bench.Bench(tmp_path), bench.Case(targets.find("cortex-m4f"), "zig", 16, "inverse", "float32")
-    worst = made.worst(case)
+def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
+    """By formula (35): so many different groups of plays, each with the drive at which it was left."""
+    found = []
+    for points in list(bench.corner_lists(16))[::2]:  # each also upside down
+        r = np.asarray(bench.model(16).cascade.pi.thresholds)[1:]
+        plays = np.full(16, points[0])
+        for x in points:
+            plays = np.maximum(x - r, np.minimum(x + r, plays))
+        left = np.where(np.abs(plays + r - points[:, None]).min(axis=0) < 1e-9, plays + r, plays - r)
+        found.append(len(np.unique(left.round(9))))
+    assert max(found) == 16
+    assert {1, 2, 4, 8, 16} <= set(found)
+
+
+@pytest.mark.parametrize("core", ["cortex-m4f", "cortex-m0plus"])
+@pytest.mark.parametrize("n", [4, pytest.param(16, marks=pytest.mark.slow), pytest.param(64, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("operator", ["forward", "inverse"])
+def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(
+    operator: str, arithmetic: str, n: int, core: str, bench: ModuleType, tmp_path: Path
+) -> None:
+    """Neither the benchmark's multisine nor jumps and steps at random."""
+    made, case = bench.Bench(tmp_path), bench.Case(targets.find(core), "zig", n, operator, arithmetic)
+    worst = made.worst(case).max
     rng = np.random.default_rng(5)
-    walk = bench.from_drive(16, "inverse", rng.uniform(-10.5, 10.5, 5000) * rng.choice([1, 0.5, 0.1], 5000))
-    core = made.run(case, made.image(case, "corners"), "corners", walk)
-    assert core.counts.max() <= worst.max + 5
+    jumps = rng.uniform(-10.5, 10.5, 6000) * rng.choice([1, 0.5, 0.1], 6000)
+    walk = np.clip(np.cumsum(rng.normal(0, 0.6, 6000)), -10.5, 10.5)
+    for drive in (bench.RANGE * bench.multisine(bench.SAMPLES), np.concatenate([jumps, walk])):
+        core_after = made.run(case, made.image(case, "corners"), "corners", bench.given(case, drive))
+        assert core_after.counts.max() <= worst
 
 
 @pytest.mark.parametrize(
