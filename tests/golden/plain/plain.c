@@ -655,6 +655,24 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
     return plain_inverse_send(self, inside);
 }
 
+/* A move by so little that rounding leaves the drive where it is: fast for what follows, which no sample is up to. */
+static plain_real_t plain_inverse_rest(plain_inverse_t *self)
+{
+    plain_memory_t *m = &self->memory;
+    if (m->w < PLAIN_DRIVE_MIN || m->w > PLAIN_DRIVE_MAX) {
+        m->there.k = 0;
+        return plain_inverse_stay(self, m->w);
+    }
+    plain_copy_place(&m->there, &m->here);
+    self->falling = !m->here.rising;
+    self->edge[self->falling] = self->reference;
+    self->edge[!self->falling] = self->falling ? FLT_MAX : -FLT_MAX;
+    self->gain = plain_reciprocal[m->here.k];
+    self->fast = true;
+    self->pending = m->w;
+    return m->w;
+}
+
 /* A move to u once what begins it is known: k plays follow, `depth` corners hold the others. From where it ends samples
    are fast up to the reference at which another play follows, so that they need not look; a little short of it, by more
    than rounding can be. */
@@ -671,8 +689,7 @@ static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth,
     if (rising) {
         v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
         if (!(v > self->memory.w)) { /* rounding is kept from leading back */
-            self->memory.there.k = 0;
-            return plain_inverse_stay(self, self->memory.w);
+            return plain_inverse_rest(self);
         }
         if (v > p->next) { /* nor is there room for the place */
             return plain_inverse_stay(self, v);
@@ -697,8 +714,7 @@ static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth,
     }
     v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
     if (!(v < self->memory.w)) { /* rounding is kept from leading back */
-        self->memory.there.k = 0;
-        return plain_inverse_stay(self, self->memory.w);
+        return plain_inverse_rest(self);
     }
     if (v < p->next) { /* nor is there room for the place */
         return plain_inverse_stay(self, v);
@@ -737,7 +753,7 @@ static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t v)
     const plain_place_t *p = &self->memory.here;
     plain_real_t edge;
     if (!(v > self->memory.w)) {
-        return plain_inverse_stay(self, v);
+        return plain_inverse_rest(self);
     }
     plain_copy_place(&self->memory.there, p);
     edge = p->next_output;
@@ -765,7 +781,7 @@ static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t v)
     const plain_place_t *p = &self->memory.here;
     plain_real_t edge;
     if (!(v < self->memory.w)) {
-        return plain_inverse_stay(self, v);
+        return plain_inverse_rest(self);
     }
     plain_copy_place(&self->memory.there, p);
     edge = p->next_output;
