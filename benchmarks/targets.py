@@ -335,7 +335,7 @@ class Bench:
         (folder / "hystgen_harness.c").write_text(sources.harness("textbook", ("forward",)))
         for file in ("textbook.h", "textbook.c"):
             (folder / file).write_text((HERE / "textbook" / file).read_text())
-        return sources.Sources("textbook", ("forward",), (folder / "textbook.c",), (folder / "hystgen_harness.c",))
+        return sources.Sources("textbook", ("forward",), (folder / "textbook.c",), folder / "hystgen_harness.c")
 
     def textbook(self, case: Case, drive: Reals) -> Figures:
         """The textbook loop over a drive, the multisine; its answers are compared with the double model."""

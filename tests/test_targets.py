@@ -241,7 +241,7 @@ def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_pat
         STEP_OF_FOUR.replace("RETURN", '"bx lr"' if target.architecture == "arm" else '"ret"')
     )
     (tmp_path / "harness.c").write_text(sources.harness("naked", ("forward",)))
-    files = sources.Sources("naked", ("forward",), (tmp_path / "naked.c",), (tmp_path / "harness.c",))
+    files = sources.Sources("naked", ("forward",), (tmp_path / "naked.c",), tmp_path / "harness.c")
     flags = [*compilers.STRICT, "-Wno-error"]
     image = emulator.Image.load(
         cross.find(target, "zig").image(files, tmp_path / "build", flags, cross.Layout(), "hystgen_harness_forward")
@@ -296,8 +296,15 @@ def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
     assert {1, 2, 4, 8, 16} <= set(found)
 
 
-@pytest.mark.parametrize("core", ["cortex-m4f", "cortex-m0plus"])
-@pytest.mark.parametrize("n", [4, pytest.param(16, marks=pytest.mark.slow), pytest.param(64, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("core", "n"),
+    [
+        ("cortex-m4f", 4),
+        ("cortex-m0plus", 4),
+        pytest.param("cortex-m4f", 16, marks=pytest.mark.slow),
+        pytest.param("cortex-m4f", 64, marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("operator", ["forward", "inverse"])
 def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(

@@ -20,13 +20,13 @@ class Sources:
     name: str
     operators: tuple[str, ...]
     module: tuple[Path, ...]
-    selftest: Path
     harness: Path
+    selftest: Path | None = None  # not all that is run is emitted
 
     @property
     def callers(self) -> tuple[Path, ...]:
-        """Self-test and harness."""
-        return self.selftest, self.harness
+        """Self-test, where there is one, and harness."""
+        return (self.harness,) if self.selftest is None else (self.selftest, self.harness)
 
     @property
     def all(self) -> tuple[Path, ...]:
@@ -49,4 +49,4 @@ def write(folder: Path, model: Model, options: module.Options) -> Sources:
     texts["hystgen_harness.c"] = harness(name, operators)
     paths = {path.name: path for path in files.write(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
-    return Sources(name, operators, tuple(paths.values()), selftest, caller)
+    return Sources(name, operators, tuple(paths.values()), caller, selftest)
