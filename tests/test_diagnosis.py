@@ -65,7 +65,9 @@ class TestBlindPlants:
                 assert content["gap"]["after"]["holdout"] < 0.5 * content["gap"]["refitted"]["holdout"]
                 (effect,) = content["effects"]
                 before, after = effect["holdout_before"], effect["holdout_after"]
-                assert effect["share_of_gap"] == pytest.approx((before - after) / content["gap"]["refitted"]["holdout"])
+                share, gap = effect["share_of_gap"], content["gap"]["refitted"]["holdout"]
+                half = 5e-8  # a unit of the eighth digit, to which all four numbers are given
+                assert abs(share * gap - (before - after)) <= half * (2.0 * share * gap + before + after)
                 assert after == content["gap"]["after"]["holdout"]
         assert right >= SINGLES - 1, wrong
         assert alone >= SINGLES - 1, wrong
@@ -145,19 +147,23 @@ def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> N
     """Only the steps of one record are faster than the amplifier: held out, they are no ground for any number."""
     slow = [np.concatenate([np.linspace(0.0, v[0], 40), v]) for v in (wander(seed, turns=40) for seed in (1, 2))]
     steps = np.concatenate([np.zeros(40), np.repeat(np.random.default_rng(3).uniform(0.0, 100.0, 40), 60)])
-    records = []
-    for number, v in enumerate((*slow, steps)):
+
+    def output(v: Array, rate: float) -> Array:
         a = v.copy()
         for k in range(1, len(a)):
-            a[k] = a[k - 1] + np.clip(v[k] - a[k - 1], -7.0, 7.0)  # 7000 a second
-        y = noisy(brute_output(a, (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0), 0.05, number)
-        records.append(record(v, y, f"record {number}"))
+            a[k] = a[k - 1] + np.clip(v[k] - a[k - 1], -1e-3 * rate, 1e-3 * rate)
+        return brute_output(a, (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0)
+
+    drives = enumerate((*slow, steps))
+    records = [record(v, noisy(output(v, 7000.0), 0.05, number), f"record {number}") for number, v in drives]
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0]).content
     assert found["verdict"] == "unexplained"
     assert any(advice.startswith("fit record 2 too and hold out others") for advice in found["advice"])
     found = hystgen.diagnose(_model(tmp_path), records[1:], holdout=records[:1], history=[0.0]).content
     assert [effect["name"] for effect in found["effects"]] == ["slew_limit"]
-    assert found["effects"][0]["parameters"]["rate"] == pytest.approx(7000.0, rel=1e-3)
+    # the noise leaves this open to 0.05 / |slope|, of which four are allowed
+    slope = (output(steps, 7001.0) - output(steps, 6999.0)) / 2.0
+    assert abs(found["effects"][0]["parameters"]["rate"] - 7000.0) <= 4.0 * 0.05 / np.linalg.norm(slope)
     assert not any("hold out others" in advice for advice in found["advice"])
 
 
