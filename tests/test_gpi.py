@@ -258,6 +258,15 @@ class TestSolvers:
         with pytest.raises(constrained.InfeasibleError):
             constrained.least_squares(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([1.0, 1.0]))
 
+    @pytest.mark.parametrize("height", [1e6, 1e7, 1e8, 1e9])
+    def test_inequalities_that_meet_far_away(self, height: float) -> None:
+        """Two lines that meet at (0, height): no more is lost than rounding takes of the angle between them."""
+        lines = np.array([[1.0, 1.0 / height], [-1.0, 1.0 / height]])
+        x, y = constrained.least_squares(np.eye(2), np.zeros(2), lines, np.ones(2))
+        eps = np.finfo(np.float64).eps
+        assert abs(x) <= 4.0 * eps * height**2
+        assert y == pytest.approx(height, rel=16.0 * eps * height)
+
     @pytest.mark.parametrize("noise", [0.0, 0.4])
     @pytest.mark.parametrize("start", [0.0, 40.0])
     def test_rows_of_segments_have_the_same_normal_equations(self, noise: float, start: float) -> None:

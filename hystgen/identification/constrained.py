@@ -58,7 +58,8 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array) ->
         if rest < INFEASIBLE:
             raise InfeasibleError("the inequalities contradict each other")
         residual = dual_target - dual_matrix @ multipliers
-        shortest = -residual[:k] / residual[-1] * scale
+        # its last component is the square of its length; computed as that it does not cancel to 0
+        shortest = -residual[:k] / rest**2 * scale
     return np.asarray(solve_triangular(triangle, shortest + free) / size)
 
 
