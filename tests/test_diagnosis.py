@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
-from hystgen.diagnosis import floor, selection
+from hystgen.diagnosis import floor, options, selection
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import Run
+from hystgen.identification.fronts import Bent, DeadZones, Ends
+from hystgen.records import Record
 from tests.plants.__main__ import main as plants
 
 Array = NDArray[np.float64]
@@ -107,12 +109,15 @@ class TestBlindPlants:
 
 @pytest.mark.data
 def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
-    """Fitted on the sine, held out on the fades: half a percent of range or better."""
+    """Fitted on the sine, held out on the fades: half a percent of range or better, and the amplifier's lag by name,
+    which takes a second effect to show: alone, rate dependence explains more."""
     sine = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
     fades = part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300)
     hystgen.identify(sine).write(tmp_path / "stage.yaml")
     content = hystgen.diagnose(tmp_path / "stage.yaml", sine, holdout=fades).content
     assert content["verdict"] == "effects_found"
+    assert content["effects"][0]["name"] == "lag"
+    assert content["ranking"][0][0]["name"] == "rate_dependence"
     assert content["gap"]["refitted"]["holdout"] > 0.011 * content["output_range"]
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
 
@@ -141,6 +146,104 @@ class TestNoise:
         assert selection.difference(before, less) < 1e-6
         assert selection.difference(before, same) > 1e-3
         assert selection.difference(less, before) > 0.9
+
+
+    def test_a_hold_that_rings_tells_nothing(self) -> None:
+        """An oscillation that dies away in a hold is no noise, however large; slow noise there is."""
+        rng = np.random.default_rng(7)
+        t = np.arange(2000) * 1e-3
+        v = np.interp(t, [0.0, 0.5, 0.9, 1.4, 2.0], [0.0, 90.0, 90.0, 5.0, 0.0])
+        ringing = np.where((t > 0.5) & (t < 0.9), np.exp(-2.0 * (t - 0.5)) * np.cos(2.0 * np.pi * 47.0 * t), 0.0)
+        y = 0.1 * v + rng.normal(0.0, 0.02, len(v))
+        assert floor.noise_floor([self.item(y + ringing, v)]).holds is None
+        slow = np.zeros(len(v))
+        for k in range(1, len(v)):
+            slow[k] = 0.9 * slow[k - 1] + rng.normal(0.0, 0.05 * np.sqrt(1.0 - 0.81))
+        found = floor.noise_floor([self.item(0.1 * v + slow, v)]).holds
+        assert found is not None
+        # 240 samples of which 13 are independent, some of them taken for creep
+        assert found == pytest.approx(0.05, rel=4.0 / np.sqrt(2.0 * 13))
+
+
+@pytest.mark.parametrize(
+    ("points", "names"),
+    [
+        ([(0, 0), (90, 90), (100, 90.5)], ("saturation",)),  # one rail
+        ([(0, 8), (8, 8.1), (95, 95), (100, 95.1)], ("saturation",)),  # two
+        ([(0, 0), (80, 80), (100, 98)], ("saturation", "asymmetry")),  # is it a soft rail, is it a bend?
+        ([(0, 0), (50, 55), (100, 100)], ("asymmetry",)),
+        ([(0, 0), (80, 80), (100, 110)], ("asymmetry",)),  # steeper at an end
+        ([(0, 0), (25, 15), (50, 40), (75, 75), (100, 120)], ("asymmetry",)),
+        ([(0, 0), (20, 10), (80, 90), (100, 100)], ("saturation",)),  # alike at both
+    ],
+)
+def test_what_a_front_is_called(points: list[tuple[float, float]], names: tuple[str, ...]) -> None:
+    x, y = np.array(points, dtype=np.float64).T
+    front = DeadZones((x[0], x[-1]), tuple(x[1:-1].tolist()))
+    assert options.front_names(front, front.shape(np.diff(y) / np.diff(x)), front.drive) == names
+
+
+@pytest.mark.parametrize("drive", [(0.0, 100.0), (-50.0, 50.0), (-10.0, 100.0), (-120.0, -20.0)])
+def test_a_limiter_is_straight_between_its_ends(drive: tuple[float, float]) -> None:
+    low, high = drive
+    (stage,) = Ends(drive).stages(np.array([0.1, 0.2, -3.0]))
+    ends = np.array([low, low + 0.1 * (high - low), high - 0.2 * (high - low), high])
+    v = np.linspace(low, high, 1001)
+    inner = 1.0 / (0.7 + 0.3 * np.exp(-3.0))  # the range keeps its length
+    slopes = inner * np.array([np.exp(-3.0), 1.0, np.exp(-3.0)])
+    heights = np.concatenate([[0.0], np.cumsum(slopes * np.diff(ends))])
+    exact = np.interp(v, ends, heights)
+    exact -= exact[0] - stage.forward(np.array([low]))[0]
+    # numbers of the stage have ten digits; three of them act at a place
+    assert np.max(np.abs(stage.forward(v) - exact)) <= 3 * 0.5e-9 * 120.0
+    assert stage.forward(np.array([0.0]))[0] == 0.0
+    assert not list(stage.inverse_problems(low, high))
+
+
+@pytest.mark.parametrize("drive", [(0.0, 100.0), (-50.0, 50.0), (-120.0, -20.0)])
+@pytest.mark.parametrize("shape", [(0.4,), (-0.7, 0.3)])
+def test_a_smooth_front_has_the_slopes_of_its_shape(drive: tuple[float, float], shape: tuple[float, ...]) -> None:
+    low, high = drive
+    (stage,) = Bent(drive, len(shape)).stages(np.array(shape))
+    assert stage.forward(np.array([0.0]))[0] == 0.0
+    edges = np.linspace(low, high, 17)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    u = (middles - 0.5 * (low + high)) / (0.5 * (high - low))
+    expected = np.exp(sum(c * u**k for k, c in enumerate(shape, 1)))
+    expected *= 16.0 / np.sum(expected)  # the range keeps its length
+    # away from the breaks, one of which moves a little where it would lie at 0
+    step = 0.1 * (edges[1] - edges[0])
+    slopes = (stage.forward(middles + step) - stage.forward(middles - step)) / (2.0 * step)
+    # the break that moved changes the length of two pieces by a twentieth; numbers of the stage have ten digits
+    moved = 0.05 * float(np.max(np.abs(np.diff(expected)))) / 16.0 if low < 0.0 < high else 0.0
+    assert np.max(np.abs(slopes / expected - 1.0)) <= 1.01 * moved + 17 * 0.5e-10 * 120.0 / step
+
+
+def test_a_strong_curve_of_the_sensor_is_found_whatever_the_offset(tmp_path: Path) -> None:
+    """The sensor sees the offset too; where the curve is strong, its argument has to be right."""
+    records = []
+    for number, reach in enumerate((100.0, 60.0, 100.0), 1):
+        v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (reach / 100.0) * (wander(number) - 40.0)])
+        h = brute_output(v, (0.0, 10.0), (1.0, 0.8), 0.0) + 20.0
+        y = h + 0.1 * h**2 / 100.0 - 0.05 * h**3 / 100.0**2
+        records.append(record(v, noisy(y, 0.02, number), f"record {number}"))
+    content = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0]).content
+    assert [effect["name"] for effect in content["effects"]] == ["sensor_nonlinearity"]
+    # the believed thresholds are the right ones, so that nothing else is left
+    assert content["gap"]["refitted"]["holdout"] > 30.0 * 0.02
+    assert content["gap"]["after"]["holdout"] < 1.15 * 0.02
+
+
+def test_a_drift_is_not_explained_by_free_start_states(tmp_path: Path) -> None:
+    """With an unknown history creep may begin anywhere in every record, which imitates a drift piece by piece."""
+    records = []
+    for number in range(1, 6):
+        v = wander(number, turns=40)
+        t = np.arange(len(v)) * 1e-3 + 3.0 * number
+        y = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + 0.4 * t + 0.02 * t**1.5
+        records.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
+    content = hystgen.diagnose(_model(tmp_path), records[:3], holdout=records[3:]).content
+    assert [effect["name"] for effect in content["effects"]] == ["drift"]
 
 
 def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> None:

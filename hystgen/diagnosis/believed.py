@@ -163,7 +163,18 @@ def _ends(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
     """The believed model with its weights, thresholds and front free, and where a search starts."""
     front, shape = front_of(cascade.stages, found.drive)
-    return Structure(found.thresholds, front, tuple(map(kept, given))), shape
+    places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
+    return Structure(places, front, tuple(map(kept, given))), shape
+
+
+def _through(places: Array, believed: Sequence[float]) -> Array:
+    """The places, those next to a believed threshold moved there: where the belief is right, it is met exactly."""
+    moved = places.copy()
+    for r in believed:
+        near = int(np.argmin(np.abs(places - r)))
+        if near and r < places[-1]:
+            moved[near] = r
+    return np.asarray(np.unique(moved))
 
 
 def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:

@@ -24,6 +24,9 @@ REPEATS = 2e-3
 SETTLED = 0.4
 """Share of a hold, its beginning, that is left out: what still moves there is no noise."""
 
+SLOW, UNPREDICTED = 0.9, 0.3
+"""Least decay of ringing from sample to sample, and largest share of its variance that two samples do not predict."""
+
 QUIET = 0.25
 """Quantile of the holds that counts: in the others something may still ring or creep."""
 
@@ -83,8 +86,21 @@ def _holds(item: Item) -> list[tuple[float, int]]:
         s = (s - s.mean()) / max(float(np.std(s)), 1e-300)
         basis = np.column_stack([np.ones(len(y)), s, s**2, s**3])
         solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
-        parts.append((float(np.sum((y - basis @ solution) ** 2) / max(len(y) - 4, 1)), len(y)))
+        left = y - basis @ solution
+        if not _rings(left):
+            parts.append((float(np.sum(left**2) / max(len(y) - 4, 1)), len(y)))
     return parts
+
+
+def _rings(x: Array) -> bool:
+    """Whether most of it is one oscillation that hardly decays from sample to sample: an actuator's, and no noise.
+
+    Linear prediction from two samples before; noise that is not white is predicted too, but by real or small poles.
+    """
+    before = np.column_stack([x[1:-1], x[:-2]])
+    (a, b), *_ = np.linalg.lstsq(before, x[2:], rcond=None)
+    missed = float(np.sum((x[2:] - before @ np.array([a, b])) ** 2))
+    return bool(a * a + 4.0 * b < 0.0 and -b > SLOW**2 and missed < UNPREDICTED * float(np.sum(x[2:] ** 2)))
 
 
 def _differences(item: Item) -> list[tuple[float, int]]:

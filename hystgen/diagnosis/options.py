@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hystgen import effects
 from hystgen.diagnosis.structure import Fitted, Item, Part, Structure
 from hystgen.effects.base import About, Effect
-from hystgen.identification.fronts import DeadZones, Front, Tanh, even_breaks
+from hystgen.identification.fronts import Bent, DeadZones, Ends, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,16 @@ BREAKS, FINER = 4, 8
 BENT, ASIDE = 0.3, 2.0
 """Curvature and place of tanh envelopes from which a search starts too: bent one way all over the range."""
 
+LIMITED = tuple(np.array([share, share, -2.0]) for share in (0.03, 0.1))
+"""Limiters from which a search starts: places outside the range's ends do nothing, nor does a small change of them."""
+
 PLACES = 201
+
+STRAIGHT, NEAR = 0.6, 0.1
+"""A limiter is straight over this share of the range: its slope is the middle one but for that share of its range."""
+
+LIMIT = 0.6
+"""A slope at an end that is less than so many times that in the middle is a limit's alone."""
 
 
 @dataclass(frozen=True)
@@ -79,17 +88,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     moved = any(effect.moves_plays() for effect in structure.effects(now.shape))
     found = []
     if not held.front.stages(np.empty(0)):
-        tanh = Tanh(known.drive)
-        dead_zones, finer = (DeadZones(known.drive, even_breaks(known.drive, n)) for n in (BREAKS, FINER))
-        bent = [np.array([BENT, side]) for side in (-ASIDE, ASIDE)]
-        fronts: list[tuple[str, Front, tuple[Array, ...], str]] = [
-            ("front of dead zones", dead_zones, (dead_zones.straight,), ""),
-            ("front of more dead zones", finer, (finer.straight,), "front of dead zones"),
-            ("front of one tanh", tanh, (tanh.straight, *bent), ""),
-        ]
-        for label, front, starts, beyond in fronts:
-            pair = replace(structure, front=front), replace(held, front=front)
-            found.append(Option(label, "asymmetry", *pair, starts, True, beyond))
+        found += _fronts(structure, held, known.drive)
     kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
     kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
     for name, kind in kinds:
@@ -105,15 +104,44 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     return found
 
 
-def front_name(front: Front, shape: Array, drive: tuple[float, float]) -> str:
-    """`saturation` for a front that bends alike at both ends and flattens there, else `asymmetry`."""
+def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -> list[Option]:
+    """A memoryless part in front, in all its shapes."""
+
+    def one(label: str, front: Front, starts: Sequence[Array], beyond: str = "") -> Option:
+        pair = replace(structure, front=front), replace(held, front=front)
+        return Option(label, "asymmetry", *pair, tuple(starts), True, beyond)
+
+    one_way, both_ways = Bent(drive, 1), Bent(drive, 2)
+    dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (BREAKS, FINER))
+    tanh = Tanh(drive)
+    return [
+        one("front that bends one way", one_way, [one_way.straight]),
+        one("front that bends both ways", both_ways, [both_ways.straight]),
+        one("front of dead zones", dead_zones, [dead_zones.straight]),
+        one("front of more dead zones", finer, [finer.straight], "front of dead zones"),
+        one("front of one tanh", tanh, [tanh.straight, *(np.array([BENT, side]) for side in (-ASIDE, ASIDE))]),
+        one("front with flatter ends", Ends(drive), LIMITED),
+    ]
+
+
+def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
+    """`saturation` for a front that is straight but for flatter ends, or bends alike at both; else `asymmetry`.
+
+    Both where one end alone is a little flatter: a soft limit there and a bent actuator are one and the same front.
+    """
     v = np.linspace(*drive, PLACES)
     w = v
     for stage in front.stages(shape):
         w = stage.forward(w)
+    slopes = np.diff(w) / np.diff(v)
+    middle, near = float(np.median(slopes)), NEAR * float(np.ptp(slopes))
+    flatter, other = sorted(float(end.mean()) for end in (slopes[: PLACES // 16], slopes[-PLACES // 16 :]))
+    straight = float(np.mean(np.abs(slopes - middle) <= near)) >= STRAIGHT
+    if straight and other <= middle + near and flatter < middle - near:
+        sure = flatter < LIMIT * middle or other < middle - near
+        return ("saturation",) if sure else ("saturation", "asymmetry")
     bent = w - np.polyval(np.polyfit(v, w, 1), v)
     odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
-    slopes = np.diff(w)
     ends = 0.5 * (slopes[: PLACES // 8].mean() + slopes[-PLACES // 8 :].mean())
     odd_wins = np.sum(odd**2) > 2.0 * np.sum(even**2)
-    return "saturation" if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else "asymmetry"
+    return ("saturation",) if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else ("asymmetry",)

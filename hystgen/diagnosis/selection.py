@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
-from hystgen.diagnosis.options import Option, about, front_name, options
+from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Structure
 from hystgen.effects.base import About, Effect
 from hystgen.identification.fronts import Kept
@@ -38,7 +38,8 @@ SHAPES = 2
 RINGING = 3
 """Frequencies at which the error rings, from which a search for a resonance starts too."""
 
-ROUNDS = 5
+ROUNDS, RIVALS = 5, 3
+"""Effects that are added at most, and how many others of about the same use are tried in place of the latest."""
 
 SHARE = 0.05
 """Least share of the refitted gap that an effect has to remove to get a name."""
@@ -53,10 +54,10 @@ UNSURE, DIFFERENT = 0.25, 0.01
 """Effects cannot be told apart within this share of the held-out rms, unless chance explains the difference with a
 lower probability than that."""
 
-SIMPLER = 0.02
+SIMPLER = 0.05
 """A shape with fewer numbers is taken for one whose held-out rms is better by less than this share."""
 
-EXCHANGE = 0.03
+EXCHANGE = 0.05
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
 
 AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
@@ -81,14 +82,22 @@ class Tried:
 
     option: Option
     fitted: Fitted
-    name: str
+    names: tuple[str, ...]
+    """the name, and others that the same numbers would bear as well"""
     held_out: float
     errors: list[Array]
 
     @property
-    def numbers(self) -> int:
-        """How many numbers it takes."""
-        return len(self.fitted.shape)
+    def name(self) -> str:
+        """What it is called."""
+        return self.names[0]
+
+    def numbers(self, held: Sequence[Item]) -> int:
+        """How many numbers it takes, with what it leaves free in a record.
+
+        Free responses to a start state alone may explain a drift.
+        """
+        return len(self.fitted.shape) + max(len(self.fitted.actuator.nuisances(item)) for item in held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,22 +171,26 @@ def select(
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
     gap = records.left(now)
+    latest: _Step | None = None
     for _ in range(ROUNDS):
-        before = records.left(now)
-        if before <= AT_FLOOR * noise:
+        if records.left(now) <= AT_FLOOR * noise:
             break
-        tried = records.extensions(now)
-        if not tried:
+        step = _step(now, gap, records)
+        if latest is not None and (step is None or step.merit is None):
+            pair = _with_rival(latest, now, gap, records)
+            if pair is not None:
+                other, step = pair
+                found[-1] = _found(other, records)
+        if step is not None:
+            rankings.append(tuple(step.tried))
+        if step is None or step.merit is None:
             break
-        rankings.append(tuple(tried))
-        best = _simplest(tried, records.held)
-        merit = _merit(now, best, records)
-        if merit is None or merit.equal - best.held_out < SHARE * gap:
-            break
-        found.append(_found(best, tried, before, merit, records))
-        now = best.fitted
+        found.append(_found(step, records))
+        now, latest = step.best.fitted, step
         now, found = _without_needless(now, found, records)
         now, found = _exchanged(now, found, records)
+        if now is not step.best.fitted:
+            latest = None
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
@@ -187,6 +200,16 @@ class _Merit:
 
     equal: float
     p_value: float
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A hypothesis, what was tried to extend it, the one of those that is taken, and what it is good for if it is."""
+
+    now: Fitted
+    tried: list[Tried]
+    best: Tried
+    merit: _Merit | None
 
 
 def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
@@ -205,9 +228,45 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     return _Merit(equal, p_value) if sure else None
 
 
-def _found(best: Tried, tried: Sequence[Tried], before: float, merit: _Merit, records: _Records) -> Found:
-    rivals = dict.fromkeys(t.name for t in tried if t.name != best.name and _alike(t, best, records.noise))
-    return Found(best.name, best.option.label, before, best.held_out, merit.p_value, tuple(rivals))
+def _step(now: Fitted, gap: float, records: _Records) -> _Step | None:
+    """The best extension of a hypothesis and those it was chosen from; None where there is none to try."""
+    tried = records.extensions(now)
+    if not tried:
+        return None
+    for best in _simplest_first(tried, records):
+        merit = _merit(now, best, records)
+        if merit is not None and merit.equal - best.held_out >= SHARE * gap:
+            return _Step(now, tried, best, merit)
+    return _Step(now, tried, tried[0], None)
+
+
+def _with_rival(latest: _Step, now: Fitted, gap: float, records: _Records) -> tuple[_Step, _Step] | None:
+    """The latest step with another of those that cannot be told from its best, and the step that this makes possible.
+
+    Where nothing more qualifies behind the one that was taken, it may have been the wrong one of several.
+    """
+    best = latest.best
+    others: dict[str, Tried] = {}
+    for each in latest.tried:
+        if each.name != best.name and _alike(each, best, records.noise):
+            others.setdefault(each.name, each)
+    left = list(others.values())[:RIVALS]
+    while left:
+        first = _simplest_first(left, records)[0]
+        left.remove(first)
+        merit = _merit(latest.now, first, records)
+        step = _step(first.fitted, gap, records) if merit is not None else None
+        if step is not None and step.merit is not None and step.best.held_out <= (1.0 - EXCHANGE) * records.left(now):
+            return replace(latest, best=first, merit=merit), step
+    return None
+
+
+def _found(step: _Step, records: _Records) -> Found:
+    best, merit = step.best, step.merit
+    assert merit is not None
+    alike = [t.name for t in step.tried if t.name != best.name and _alike(t, best, records.noise)]
+    rivals = tuple(dict.fromkeys([*best.names[1:], *alike]))
+    return Found(best.name, best.option.label, records.left(step.now), best.held_out, merit.p_value, rivals)
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
@@ -283,20 +342,28 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
         if fitted.rms >= now.rms:
             continue
         errors = fitted.errors(records.held)
-        name = option.name
+        names: tuple[str, ...] = (option.name,)
         if option.front:
             shape, _ = fitted.structure.pieces(fitted.shape)
-            name = front_name(fitted.structure.front, shape, records.known.drive)
-        tried.append(Tried(option, fitted, name, fits.rms(errors), errors))
+            names = front_names(fitted.structure.front, shape, records.known.drive)
+        tried.append(Tried(option, fitted, names, fits.rms(errors), errors))
     return sorted(tried, key=lambda each: each.held_out)
 
 
-def _simplest(tried: Sequence[Tried], held: Sequence[Item]) -> Tried:
-    """The best, or one of fewer numbers that is about as good where both leave the same free in every record."""
-    best = tried[0]
-    enough = (1.0 + SIMPLER) * best.held_out
-    near = [each for each in tried if fits.rms(each.fitted.errors(held, best.fitted)) <= enough]
-    return min(near or [best], key=lambda each: (each.numbers, each.held_out))
+def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
+    """The best and those about as good, where all leave the same free in every record: of fewer numbers first.
+
+    Held-out records have to find them alike within a few per cent, and fitted ones by chance.
+    """
+    best, held = tried[0], records.held
+    enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
+    near = [best]
+    for each in tried[1:]:
+        if fits.rms(each.fitted.errors(held, best.fitted)) > enough:
+            continue
+        if difference(each.fitted.errors(records.to_fit, best.fitted), fitted) > SURE:
+            near.append(each)
+    return sorted(near, key=lambda each: (each.numbers(held), each.held_out))
 
 
 def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
@@ -318,19 +385,14 @@ def _exchanged(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitt
     """
     for k in range(len(found) - 1):
         fitted = _without(now, found[k].name, records)
-        tried = [] if fitted is None else records.extensions(fitted)
-        if fitted is None or not tried:
+        step = None if fitted is None else _step(fitted, 0.0, records)
+        if step is None or step.merit is None or step.best.held_out > (1.0 - EXCHANGE) * records.left(now):
             continue
-        best = _simplest(tried, records.held)
-        if best.held_out > (1.0 - EXCHANGE) * records.left(now):
-            continue
-        without = records.left(fitted)
-        merit = _merit(fitted, best, records)
-        if merit is not None:
-            other = _found(best, tried, without, merit, records)
-            chain = _in_place(best.fitted, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
-            chain = chain or [*_rest(found, k, without), other]
-            return _exchanged(*_without_needless(best.fitted, chain, records), records)
+        other = _found(step, records)
+        best = step.best.fitted
+        chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
+        chain = chain or [*_rest(found, k, other.before), other]
+        return _exchanged(*_without_needless(best, chain, records), records)
     return now, found
 
 

@@ -28,6 +28,10 @@ REMEMBERED, MOST_BYTES = 3, 2**28
 """Movements of the plays that are remembered for a record, and the size of one that is."""
 
 
+SETTLED = 3
+"""Steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
+
+
 @dataclass(frozen=True)
 class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
@@ -196,6 +200,19 @@ class Actuator:
                 h = effect.mapped(h, item.run)
         return h
 
+    def level(self, h: Array, item: Item) -> tuple[float, Array]:
+        """The best offset in front of a sensor and behind a limit, and how the output changes with it (N,)."""
+        known = item.known
+        level = float(np.mean((item.y - h)[known]))
+        step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
+        for _ in range(SETTLED):
+            bent = self.mapped(h, level, item)
+            moved = (self.mapped(h, level + step, item) - bent) / step
+            if not np.any(moved[known]):
+                break
+            level += float(moved[known] @ (item.y - bent)[known] / (moved[known] @ moved[known]))
+        return level, moved
+
     def added(self, item: Item) -> Array:
         """What is added at the very end."""
         total = np.zeros(len(item.run.t))
@@ -208,9 +225,12 @@ class Actuator:
         """Whether there is an output map."""
         return any(effect.place is Place.OUTPUT for effect in self.effects)
 
-    def nuisances(self, item: Item) -> Array:
-        """(k, N) what is free in every record: its offset, and responses to an unknown start state."""
-        free = [np.ones((1, len(item.run.t)))]
+    def nuisances(self, item: Item, offset: Array | None = None) -> Array:
+        """(k, N) what is free in every record: its offset, and responses to an unknown start state.
+
+        `offset`: what the offset does to the output, where a map lies between them.
+        """
+        free = [np.ones((1, len(item.run.t))) if offset is None else offset[None, :]]
         if item.history is None:
             free += [found for effect in self.effects if len(found := effect.transients(item.run))]
         return np.concatenate(free)
@@ -222,12 +242,13 @@ class Actuator:
         """
         rows, constant = self.columns(item, p)
         h = rows[0] + constant
+        offset = None
         if self.bends:
-            level = float(np.nanmean(item.y - h))
+            level, offset = self.level(h, item)
             h = self.mapped(h, level, item)
         e = item.y - h - self.added(item)
         known = np.isfinite(e)
-        free = (self.nuisances(item) if free is None else free)[:, known].T
+        free = (self.nuisances(item, offset) if free is None else free)[:, known].T
         solution, *_ = np.linalg.lstsq(free, e[known], rcond=1e-10)
         e[known] -= free @ solution
         return np.asarray(e)
@@ -251,10 +272,10 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         rows, constant = here.columns(item)
         h = p @ rows + constant
         slope: Array | float = 1.0
-        level = 0.0
+        level, offset = 0.0, None
         target = item.y - constant
         if here.bends:
-            level = float(np.nanmean(item.y - h))
+            level, offset = here.level(h, item)
             bent = here.mapped(h, level, item)
             step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
             slope = (here.mapped(h + step, level, item) - bent) / step
@@ -269,7 +290,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
             if other.bends:
                 moved = other.mapped(moved, level, item)
             differences[j] = (moved + other.added(item) - h - added) / DIFFERENCE
-        free = here.nuisances(item)
+        free = here.nuisances(item, offset)
         table = np.concatenate([free, rows * slope, differences, target[None, :]])[:, known].T
         block = np.asarray(np.linalg.qr(table, mode="r"))[len(free) :, len(free) :]
         whole = np.asarray(np.linalg.qr(np.concatenate([whole, block]), mode="r"))

@@ -8,6 +8,7 @@ meaning they have without one.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -25,6 +26,13 @@ DIGITS = 10
 
 STEEPEST = math.log(20.0)
 """Largest ratio of two slopes of a dead-zone sum, as its logarithm."""
+
+FLATTER = math.log(200.0)
+"""Largest ratio of the slopes of a limiter, as its logarithm."""
+
+SMOOTH = 16
+"""Pieces of a dead-zone sum that stands for a smooth curve: its slope changes by at most a fifth from one to the next
+where the whole range has a ratio of 20."""
 
 FLATTEST = 3.0
 """Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
@@ -134,6 +142,76 @@ class DeadZones:
 
 
 @dataclass(frozen=True)
+class Ends:
+    """A limiter: a straight line that is flatter near the ends of the drive range, two dead zones (41).
+
+    The shape is how far inside the range each place lies where that begins, as a share of it, and the logarithm of the
+    slope beyond them over that between them.
+    """
+
+    drive: tuple[float, float]
+    name: str = "gpi-deadzone"
+
+    @property
+    def straight(self) -> Array:
+        """Hardly flatter, so that the derivatives to the places are not zero."""
+        return np.array([0.1, 0.1, -0.1])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """A place may lie at its end, where it does nothing; the two do not meet."""
+        return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
+
+    def slack(self, shape: Array) -> Array:
+        """Every piece rises."""
+        return np.empty(0)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The dead-zone sum."""
+        low, high = self.drive
+        ends = low + shape[0] * (high - low), high - shape[1] * (high - low)
+        breaks = aside([float(x) for x in ends], 1e-3 * (high - low))
+        return DeadZones(self.drive, breaks).stages(np.array([-shape[2], 0.0]))
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A front whose slope changes smoothly over the drive range, as a dead-zone sum (41) of many equal pieces.
+
+    The shape is the coefficients of u, u^2, .. up to `degree` in the logarithm of the slope; u runs from -1 to 1.
+    """
+
+    drive: tuple[float, float]
+    degree: int
+    name: str = "gpi-deadzone"
+
+    @property
+    def straight(self) -> Array:
+        """The same slope everywhere."""
+        return np.zeros(self.degree)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """No slope is steeper against another than where they are sought piece by piece."""
+        most = np.full(self.degree, 0.5 * STEEPEST / self.degree)
+        return -most, most
+
+    def slack(self, shape: Array) -> Array:
+        """The logarithms keep all slopes positive."""
+        return np.empty(0)
+
+    @cached_property
+    def _pieces(self) -> DeadZones:
+        return DeadZones(self.drive, even_breaks(self.drive, SMOOTH - 1))
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The dead-zone sum."""
+        u = np.linspace(-1.0, 1.0, 2 * SMOOTH + 1)[1::2]
+        logs = u * np.polynomial.polynomial.polyval(u, shape)
+        return self._pieces.stages(logs[1:] - logs[0])
+
+
+@dataclass(frozen=True)
 class Tanh:
     """Tanh envelopes with one branch or two (45).
 
@@ -222,5 +300,9 @@ def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
     """So many breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside by a little."""
     low, high = drive
     step = (high - low) / (count + 1)
-    places = [rounded(low + step * (j + 1), 6) for j in range(count)]
-    return tuple(rounded(0.05 * step, 6) if abs(x) < 0.05 * step else x for x in places)
+    return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)
+
+
+def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
+    """The places, one within `least` of 0 moved to `least`: a dead zone of threshold 0 is the line itself."""
+    return tuple(rounded(least, 6) if abs(x) < least else x for x in places)
