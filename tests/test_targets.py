@@ -12,6 +12,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,10 +25,10 @@ from hystgen.api import Model, emitted_files
 from hystgen.cli import main
 from hystgen.emission import module
 from hystgen.params import parse_parameters
-from hystgen.verification import Row, compilers, cross, emulator, firmware, sources, targets
+from hystgen.verification import Row, avr, compilers, cross, emulator, firmware, sources, targets
 from hystgen.verification.comparison import REALS
 
-CORES = targets.NAMES[1:]
+CORES = tuple(target.name for target in targets.TARGETS)
 REQUIRED = bool(os.environ.get("CI"))  # CI installs the second compiler and emulator; elsewhere they may be absent
 
 
@@ -73,6 +74,8 @@ def test_ci_has_the_second_compiler_and_emulator() -> None:
     if REQUIRED:
         assert shutil.which(targets.ARM_GCC)
         assert shutil.which(firmware.QEMU)
+        assert shutil.which(targets.AVR.gcc)
+        assert shutil.which(targets.AVR.simulator)
 
 
 @pytest.mark.parametrize("engine", ["corners", "loop"])
@@ -164,6 +167,42 @@ def test_a_self_test_that_fails_on_the_core_is_found(changed_c: Callable[..., No
     words = "plain_selftest() returned 1"
     expected = {("strict", "selftest", words), ("defaults", "selftest", words)}
     assert failed == expected | ({("firmware", "selftest", words)} if shutil.which(firmware.QEMU) else set())
+
+
+def needs_avr() -> None:
+    if not REQUIRED and not (shutil.which(targets.AVR.gcc) and shutil.which(targets.AVR.simulator)):
+        pytest.skip("no AVR here")
+
+
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("name", ["plain", "bent", "curved", "two_branches"])
+def test_the_self_test_passes_where_an_int_has_16_bits(name: str, arithmetic: str, engine: str) -> None:
+    needs_avr()
+    board = targets.AVR.name
+    report = hystgen.verify(model(name), operator="both", arithmetic=arithmetic, engine=engine, targets=[board])
+    assert report.ok, report.table()
+    assert [(row.target, row.compiler, row.build, row.operator) for row in report.rows] == [
+        (board, "gcc", "firmware", "selftest")
+    ]
+
+
+def test_failures_on_the_avr(changed_c: Callable[..., None], monkeypatch: pytest.MonkeyPatch) -> None:
+    needs_avr()
+
+    def error(**options: Any) -> str:
+        (row,) = hystgen.verify(model("plain"), targets=[targets.AVR.name], **options).rows
+        return str(row.error)
+
+    assert error(compiler=["zig"]) == "zig does not build for atmega1284p; use gcc"
+    assert "double is not IEEE binary64 here" in error(arithmetic="float64")
+    changed_c("plain_selftest.c", lambda text: re.sub(r"(\{'s', [^,]+, )-?[\d.e-]+f", r"\g<1>77.0f", text, count=1))
+    assert error() == "plain_selftest() returned 1"
+    changed_c("plain_selftest.c", lambda text: text.replace("int index = 0;", "int index = 0; for (;;) { }"))
+    monkeypatch.setattr(avr, "SECONDS", 2)
+    assert error() == "simavr -m atmega1284p did not end within 2 s"
+    monkeypatch.setenv("PATH", "")
+    assert error() == "avr-gcc and simavr not installed"
 
 
 def test_c_that_does_not_compile_for_a_core_is_a_failure(changed_c: Callable[..., None]) -> None:

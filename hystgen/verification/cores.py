@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hystgen.verification import compilers, cross, emulator, firmware
 from hystgen.verification.comparison import Expected, compare
-from hystgen.verification.report import Row
+from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Target
 
@@ -51,9 +51,9 @@ def rows(
             try:
                 place = folder / f"firmware-{target.name}-{name}-{next(_fresh)}"
                 image = firmware.build(found, target, machine, sources, place, compilers.USER)
-                yield _selftest(row, sources, firmware.run(machine, image))
+                yield selftest(row, sources.name, firmware.run(machine, image))
             except (compilers.CompileError, emulator.EmulatorError) as error:
-                yield _failed(row, error)
+                yield failed(row, error)
 
 
 def _emulated(
@@ -69,7 +69,7 @@ def _emulated(
         path = compiler.image(sources, folder, flags, cross.Layout(), f"{sources.name}_selftest")
         image = emulator.Image.load(path)
     except compilers.CompileError as error:
-        yield _failed(Row(target.name, compiler.name, build, "-"), error)
+        yield failed(Row(target.name, compiler.name, build, "-"), error)
         return
     for op in sources.operators:
         row = Row(target.name, compiler.name, build, op)
@@ -78,7 +78,7 @@ def _emulated(
             size = core.call(f"hystgen_harness_{op}_size")
             outcome = compare(functools.partial(core.run, sources.name, op), records(op))
         except emulator.EmulatorError as error:
-            yield _failed(row, error)
+            yield failed(row, error)
             continue
         yield Row(
             target.name,
@@ -95,16 +95,9 @@ def _emulated(
         )
     row = Row(target.name, compiler.name, build, "selftest")
     try:
-        row = _selftest(row, sources, emulator.Core(target, image).call(f"{sources.name}_selftest"))
+        row = selftest(row, sources.name, emulator.Core(target, image).call(f"{sources.name}_selftest"))
     except emulator.EmulatorError as error:
-        row = _failed(row, error)
+        row = failed(row, error)
     if build == "defaults" or not row.ok:
         yield row
 
-
-def _selftest(row: Row, sources: Sources, result: int) -> Row:
-    return _failed(row, f"{sources.name}_selftest() returned {result}") if result else row
-
-
-def _failed(row: Row, error: object) -> Row:
-    return Row(row.target, row.compiler, row.build, row.operator, error=str(error))

@@ -53,6 +53,16 @@ class Row:
         return f"{self.different} differ, {self._most}; first: {self.first}"
 
 
+def failed(row: Row, error: object) -> Row:
+    """The row of a build that could not be built or run."""
+    return Row(row.target, row.compiler, row.build, row.operator, error=str(error))
+
+
+def selftest(row: Row, name: str, result: int) -> Row:
+    """The row of a self-test, by what it returned."""
+    return failed(row, f"{name}_selftest() returned {result}") if result else row
+
+
 def _number(value: int | None) -> str:
     return "-" if value is None else str(value)
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hystgen.api import Model, emit_options
-from hystgen.verification import cores, host, sources
+from hystgen.verification import avr, cores, host, sources
 from hystgen.verification.comparison import REALS, Expected, expected_records
 from hystgen.verification.report import Report
-from hystgen.verification.targets import HOST, find
+from hystgen.verification.targets import AVR, HOST, Board, find
 
 
 def verify_model(
@@ -31,15 +31,16 @@ def verify_model(
     On the host with every compiler that is installed (or those named in `compiler`: 'gcc', 'clang', 'zig'), each under
     the strict flags and under its own default dialect, over records of `length` calls. On the cores of
     `verification.targets` with zig and, where installed, Debian's cross gcc, emulated, over records of `target_length`
-    calls (default: as many as that core is fast enough for), with the instructions of every sample counted. A compiler
-    or target that is asked for and missing is a failed row. Raises what `emit` raises, and ValueError for a target that
-    does not exist.
+    calls (default: as many as that core is fast enough for), with the instructions of every sample counted. On the AVR
+    the emitted self-test alone. A compiler or target that is asked for and missing is a failed row. Raises what `emit`
+    raises, and ValueError for a target that does not exist.
     """
     options = emit_options(model, operator, arithmetic, engine, layout)
     numbers = model.tables(options.arithmetic, options.engine)
     real = REALS[options.arithmetic]
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
-    chosen = [None if name == HOST else find(name) for name in targets]
+    known = {HOST: None, AVR.name: AVR}
+    chosen = [known[name] if name in known else find(name) for name in targets]
 
     @functools.cache
     def records(length: int, op: str) -> list[Expected]:
@@ -53,6 +54,8 @@ def verify_model(
             if target is None:
                 wanted = functools.partial(records, length)
                 report.rows.extend(host.rows(written, wanted, real, compiler, folder, progress))
+            elif isinstance(target, Board):
+                report.rows.extend(avr.rows(target, written, compiler, folder, progress))
             else:
                 wanted = functools.partial(records, target_length or target.calls)
                 report.rows.extend(cores.rows(target, written, wanted, compiler, folder, progress))
