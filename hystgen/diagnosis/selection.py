@@ -132,10 +132,14 @@ class _Records:
     noise: float
     tick: Callable[[], None]
 
-    def extensions(self, now: Fitted) -> list[Tried]:
-        """One effect more, the best shapes of all, the best one first."""
+    def extensions(self, now: Fitted, like: Sequence[Tried] = ()) -> list[Tried]:
+        """One effect more, the best shapes of all, the best one first; `like`: of those that were followed up there."""
         known = replace(self.known, ringing=periodic.ringing(self.to_fit, now.errors(self.to_fit), RINGING))
-        return _followed_up(now, _screened(now, self, options(now, known, self.user)), self)
+        found = options(now, known, self.user)
+        if like:
+            labels = {label for each in like for label in (each.option.label, each.option.beyond)}
+            found = [option for option in found if option.label in labels]
+        return _followed_up(now, _screened(now, self, found), self)
 
     def left(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
@@ -176,8 +180,8 @@ def select(
         if records.left(now) <= AT_FLOOR * noise:
             break
         step = _step(now, gap, records)
-        if latest is not None and (step is None or step.merit is None):
-            pair = _with_rival(latest, now, gap, records)
+        if latest is not None and step is not None and step.merit is None:
+            pair = _with_rival(latest, step, gap, records)
             if pair is not None:
                 other, step = pair
                 found[-1] = _found(other, records)
@@ -228,9 +232,9 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     return _Merit(equal, p_value) if sure else None
 
 
-def _step(now: Fitted, gap: float, records: _Records) -> _Step | None:
+def _step(now: Fitted, gap: float, records: _Records, like: Sequence[Tried] = ()) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None where there is none to try."""
-    tried = records.extensions(now)
+    tried = records.extensions(now, like)
     if not tried:
         return None
     for best in _simplest_first(tried, records):
@@ -240,7 +244,7 @@ def _step(now: Fitted, gap: float, records: _Records) -> _Step | None:
     return _Step(now, tried, tried[0], None)
 
 
-def _with_rival(latest: _Step, now: Fitted, gap: float, records: _Records) -> tuple[_Step, _Step] | None:
+def _with_rival(latest: _Step, failed: _Step, gap: float, records: _Records) -> tuple[_Step, _Step] | None:
     """The latest step with another of those that cannot be told from its best, and the step that this makes possible.
 
     Where nothing more qualifies behind the one that was taken, it may have been the wrong one of several.
@@ -251,12 +255,13 @@ def _with_rival(latest: _Step, now: Fitted, gap: float, records: _Records) -> tu
         if each.name != best.name and _alike(each, best, records.noise):
             others.setdefault(each.name, each)
     left = list(others.values())[:RIVALS]
+    enough = (1.0 - EXCHANGE) * records.left(failed.now)
     while left:
         first = _simplest_first(left, records)[0]
         left.remove(first)
         merit = _merit(latest.now, first, records)
-        step = _step(first.fitted, gap, records) if merit is not None else None
-        if step is not None and step.merit is not None and step.best.held_out <= (1.0 - EXCHANGE) * records.left(now):
+        step = _step(first.fitted, gap, records, failed.tried) if merit is not None else None
+        if step is not None and step.merit is not None and step.best.held_out <= enough:
             return replace(latest, best=first, merit=merit), step
     return None
 
