@@ -597,7 +597,8 @@ def main() -> int:
     """Measure, write, print; with --check say by the exit code whether the goals are met."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--n", default=",".join(map(str, PLAYS)), help="plays, comma separated")
-    parser.add_argument("--targets", default=",".join(targets.NAMES[1:]), help="cores, comma separated")
+    cores = ",".join(core.name for core in targets.TARGETS)
+    parser.add_argument("--targets", default=cores, help="cores, comma separated")
     parser.add_argument("--compilers", default=",".join(cross.NAMES), help="zig, gcc")
     parser.add_argument("--arithmetics", default="float32,float64,q31,q15", help="comma separated")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="of the multisine")

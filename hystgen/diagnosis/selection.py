@@ -233,7 +233,11 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
 
 
 def _step(now: Fitted, gap: float, records: _Records, like: Sequence[Tried] = ()) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None where there is none to try."""
+    """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
+
+    What explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is
+    the next one's turn.
+    """
     tried = records.extensions(now, like)
     if not tried:
         return None
@@ -356,19 +360,21 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
 
 
 def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
-    """The best and those about as good, where all leave the same free in every record: of fewer numbers first.
+    """All, the best and those about as good before the others, and of these the ones of fewer numbers first.
 
-    Held-out records have to find them alike within a few per cent, and fitted ones by chance.
+    About as good: where all leave the same free in every record, held-out records find them alike within a few per
+    cent, and fitted ones by chance.
     """
     best, held = tried[0], records.held
     enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
-    near = [best]
+    near, others = [best], []
     for each in tried[1:]:
-        if fits.rms(each.fitted.errors(held, best.fitted)) > enough:
-            continue
-        if difference(each.fitted.errors(records.to_fit, best.fitted), fitted) > SURE:
+        alike = fits.rms(each.fitted.errors(held, best.fitted)) <= enough
+        if alike and difference(each.fitted.errors(records.to_fit, best.fitted), fitted) > SURE:
             near.append(each)
-    return sorted(near, key=lambda each: (each.numbers(held), each.held_out))
+        else:
+            others.append(each)
+    return [*sorted(near, key=lambda each: (each.numbers(held), each.held_out)), *others]
 
 
 def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
