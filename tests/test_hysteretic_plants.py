@@ -195,6 +195,7 @@ def test_inputs_that_are_none_are_refused(name: str) -> None:
         (lambda: plants.Preisach(lambda a, b: a - b + 1.0, 0.0, 1.0), "0 for alpha = beta"),
         (lambda: plants.Preisach(lambda a, b: (a - b) * (1.5 - (a - b)), 0.0, 1.0), "rises in alpha"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0]]), "2 edges but 1 rows"),
+        (lambda: EverettTable([0.0, 1.0], 3.0), "2 edges but 0 rows"),  # type: ignore[arg-type]
         (lambda: EverettTable([0.0, 0.0], [[0.0, 0.0]] * 2), "rise strictly"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [0.0]]), "every row has 2 values"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [1.0, 0.5]]), "0 on the diagonal"),

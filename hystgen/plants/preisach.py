@@ -72,11 +72,12 @@ class EverettTable:
         edges = numbers(self.edges, "edges")
         if len(edges) < 2 or any(b <= a for a, b in itertools.pairwise(edges)):
             raise ValueError("edges rise strictly and are at least two")
-        if len(self.values) != len(edges):
-            raise ValueError(f"{len(edges)} edges but {len(self.values)} rows")
-        if any(np.shape(row) != (len(edges),) for row in self.values):
+        given = list(self.values) if np.iterable(self.values) else []
+        if len(given) != len(edges):
+            raise ValueError(f"{len(edges)} edges but {len(given)} rows")
+        if any(np.shape(row) != (len(edges),) for row in given):
             raise ValueError(f"every row has {len(edges)} values")
-        below = [numbers(row[: i + 1], "values up to the diagonal") for i, row in enumerate(self.values)]
+        below = [numbers(row[: i + 1], "values up to the diagonal") for i, row in enumerate(given)]
         if any(row[-1] != 0.0 for row in below):
             raise ValueError("an Everett table is 0 on the diagonal, where alpha = beta")
         rows = tuple((*row, *[0.0] * (len(edges) - len(row))) for row in below)
