@@ -201,8 +201,13 @@ def test_failures_on_the_avr(changed_c: Callable[..., None], monkeypatch: pytest
     changed_c("plain_selftest.c", lambda text: text.replace("int index = 0;", "int index = 0; for (;;) { }"))
     monkeypatch.setattr(avr, "SECONDS", 2)
     assert error() == "simavr -m atmega1284p did not end within 2 s"
-    monkeypatch.setenv("PATH", "")
-    assert error() == "avr-gcc and simavr not installed"
+
+
+def test_an_avr_without_its_tools_is_a_failure(tmp_path: Path) -> None:
+    board = targets.Board("atmega1284p", "no-such-gcc", (), "no-such-simulator")
+    nothing = sources.Sources("plain", (), (), tmp_path / "harness.c")
+    (row,) = avr.rows(board, nothing, (), tmp_path, lambda _: None)
+    assert row.error == "no-such-gcc and no-such-simulator not installed"
 
 
 def test_c_that_does_not_compile_for_a_core_is_a_failure(changed_c: Callable[..., None]) -> None:
