@@ -253,16 +253,10 @@ def _with_rival(latest: _Step, failed: _Step, gap: float, records: _Records) -> 
 
     Where nothing more qualifies behind the one that was taken, it may have been the wrong one of several.
     """
-    best = latest.best
-    others: dict[str, Tried] = {}
-    for each in latest.tried:
-        if each.name != best.name and _alike(each, best, records.noise):
-            others.setdefault(each.name, each)
-    left = list(others.values())[:RIVALS]
+    others = {each.name: each for each in reversed(_rivals(latest, records))}  # of each name the best one
+    left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
     enough = (1.0 - EXCHANGE) * records.left(failed.now)
-    while left:
-        first = _simplest_first(left, records)[0]
-        left.remove(first)
+    for first in _simplest_first(left, records):
         merit = _merit(latest.now, first, records)
         step = _step(first.fitted, gap, records, failed.tried) if merit is not None else None
         if step is not None and step.merit is not None and step.best.held_out <= enough:
@@ -270,11 +264,16 @@ def _with_rival(latest: _Step, failed: _Step, gap: float, records: _Records) -> 
     return None
 
 
+def _rivals(step: _Step, records: _Records) -> list[Tried]:
+    """Effects of other names that cannot be told from the one that is taken, the best one first."""
+    best = step.best
+    return [each for each in step.tried if each.name != best.name and _alike(each, best, records.noise)]
+
+
 def _found(step: _Step, records: _Records) -> Found:
     best, merit = step.best, step.merit
     assert merit is not None
-    alike = [t.name for t in step.tried if t.name != best.name and _alike(t, best, records.noise)]
-    rivals = tuple(dict.fromkeys([*best.names[1:], *alike]))
+    rivals = tuple(dict.fromkeys([*best.names[1:], *(each.name for each in _rivals(step, records))]))
     return Found(best.name, best.option.label, records.left(step.now), best.held_out, merit.p_value, rivals)
 
 
@@ -365,6 +364,8 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     About as good: where all leave the same free in every record, held-out records find them alike within a few per
     cent, and fitted ones by chance.
     """
+    if not tried:
+        return []
     best, held = tried[0], records.held
     enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
     near, others = [best], []

@@ -57,9 +57,8 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array) ->
         multipliers, rest = nnls(dual_matrix, dual_target, maxiter=100 * (k + len(bounds)))
         if rest < INFEASIBLE:
             raise InfeasibleError("the inequalities contradict each other")
-        residual = dual_target - dual_matrix @ multipliers
-        # its last component is the square of its length; computed as that it does not cancel to 0
-        shortest = -residual[:k] / rest**2 * scale
+        # over the last component of the residual, which is the square of its length, and as that does not cancel to 0
+        shortest = dual_matrix[:k] @ multipliers / rest**2 * scale
     return np.asarray(solve_triangular(triangle, shortest + free) / size)
 
 

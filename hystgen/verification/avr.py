@@ -50,7 +50,7 @@ def build(board: Board, sources: Sources, folder: Path) -> Path:
     main.write_text(module.render("firmware_avr.c.j2", values), encoding="ascii")
     gcc = compilers.Compiler("gcc", (board.gcc, *board.gcc_flags))
     objects = []
-    for source in (*sources.module, *sources.callers[:-1]):
+    for source in sources.emitted:
         output = folder / f"{source.stem}.o"
         gcc.object(source, output, compilers.USER)
         objects.append(output)

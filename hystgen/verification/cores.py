@@ -100,4 +100,3 @@ def _emulated(
         row = failed(row, error)
     if build == "defaults" or not row.ok:
         yield row
-

@@ -74,7 +74,7 @@ class CrossCompiler:
         values = SimpleNamespace(
             **vars(layout),
             module=[f"{path.stem}.o" for path in sources.module],
-            harness=[f"{path.stem}.o" for path in (*sources.callers, *more)],
+            harness=[f"{path.stem}.o" for path in (*sources.all, *more) if path not in sources.module],
         )
         script.write_text(module.render("image.ld.j2", values), encoding="ascii")
         image = folder / "image.elf"

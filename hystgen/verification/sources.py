@@ -24,14 +24,14 @@ class Sources:
     selftest: Path | None = None  # not all that is run is emitted
 
     @property
-    def callers(self) -> tuple[Path, ...]:
-        """Self-test, where there is one, and harness."""
-        return (self.harness,) if self.selftest is None else (self.selftest, self.harness)
+    def emitted(self) -> tuple[Path, ...]:
+        """What a user gets: the module, and its self-test where there is one."""
+        return self.module if self.selftest is None else (*self.module, self.selftest)
 
     @property
     def all(self) -> tuple[Path, ...]:
         """Every C file."""
-        return (*self.module, *self.callers)
+        return (*self.emitted, self.harness)
 
 
 def harness(name: str, operators: tuple[str, ...]) -> str:
