@@ -6,8 +6,10 @@
 Emitted code of both engines and operators against the textbook loop (`textbook/textbook.c`: formula (35) as ternaries
 with the same care for NaN, range and status), same compiler, flags (-std=c99 -O2) and signal: a decaying multisine over
 the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
-one among them, then a sample after which the next one has to do more (`ways`), then jumps to everywhere; and what lies
-near the dearest of these. Every answer that is counted has been compared with the bit reference.
+one among them, then a sample after which the next one has to do more (`ways`), then jumps to everywhere; what lies
+near the dearest of these; and the same with a NaN, an infinity or a `commit` before the jump (`interrupted`). A sample
+that is no number right behind a commit, which sends the answer before the commit once more, is counted apart. Every
+answer that is counted has been compared with the bit reference.
 
 Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed. All plays, cores and
 arithmetics take hours: `--parts` puts the tables of shorter runs together.
@@ -23,7 +25,7 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -42,6 +44,7 @@ PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 SEARCHED = 200_000  # samples of a round of the search for the worst case
 RANGE = 10.0
+BEHIND = "no number behind a commit"
 # of the textbook loop: what numbers are and what sums are
 TYPES = {
     "float32": ("float", "float"),
@@ -273,6 +276,62 @@ def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
     return np.clip(codes, np.iinfo(real).min, np.iinfo(real).max).astype(real)
 
 
+def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
+    """Operations, arguments in the operator's own numbers, and where those of each trial end: trials with something
+    between what they jump from and the jump.
+
+    What is no number; a commit of the drive that is jumped from, behind a step elsewhere; and both, where the answer of
+    the step before the commit is asked for again, which leads where the trial jumps to, and a step from there.
+    """
+    odd = [np.nan, np.inf, -np.inf] if comparison.REALS[case.arithmetic].kind == "f" else []
+    paths: list[Reals] = []  # what the plays see, to know what the inverse has to be asked for
+    for trial in found:
+        paths += [trial, np.append(trial[:-2], trial[-1])]
+        paths += [np.append(trial, on) for on in (trial[-2], -trial[-1])]
+    call, drive = together(paths)
+    asked = iter(np.split(given(case, drive, call=call), np.cumsum([len(path) + 1 for path in paths[:-1]])))
+    step, commit = reference.OP_STEP, reference.OP_COMMIT
+    operations: list[int] = []
+    arguments: list[Any] = []
+    ends = []
+
+    def add(head: Any, *tail: tuple[int, Any]) -> None:
+        operations.extend([reference.OP_RESET, *[step] * (len(head) - 1), *(op for op, _ in tail)])
+        arguments.extend([*head, *(x for _, x in tail)])
+
+    for trial in found:
+        jump, aside, *on = itertools.islice(asked, 4)
+        for x in odd:
+            add(jump[:-1], (step, x), (step, jump[-1]))
+        if case.operator == "inverse" and len(trial) > 2:
+            applied = trial[-2] / lsbs(case)[0]
+            add(jump[:-2], (step, aside[-1]), (commit, applied), (step, jump[-1]))
+            add(jump[:-2], (commit, applied), (step, jump[-1]))
+            for x, (*_, last) in itertools.product(odd, on):
+                add(jump[:-2], (step, aside[-1]), (commit, applied), (step, x), (step, last))
+        ends.append(len(operations))
+    real = comparison.REALS[case.arithmetic]
+    x = np.array(arguments)
+    if real.kind == "i":
+        x = np.clip(np.rint(x), np.iinfo(real).min, np.iinfo(real).max)
+    return np.array(operations, dtype=np.uint8), x.astype(real), ends
+
+
+def behind_commit(call: Any, x: Any) -> Any:
+    """Which operations are steps of what is no number right behind a commit."""
+    return (call == reference.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == reference.OP_COMMIT)
+
+
+def plain(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
+    """Operations, arguments and where those of each trial end, of trials as they are."""
+    call, drive = together(found)
+    return call, given(case, drive, call=call), list(np.cumsum([len(trial) + 1 for trial in found]))
+
+
+Form = Callable[[Case, Sequence[Reals]], tuple[Any, Any, list[int]]]
+"""What is made of trials: operations, arguments, and where those of each end."""
+
+
 class Bench:
     """Builds, runs and counts in a folder of its own; remembers the worst trials found."""
 
@@ -281,6 +340,7 @@ class Bench:
         self._number = itertools.count()
         self._emitted: dict[tuple[int, str, str], sources.Sources] = {}
         self._worst: dict[Case, list[Reals]] = {}
+        self._worst_odd: dict[tuple[Case, bool], list[Reals]] = {}
 
     def image(self, case: Case, engine: str) -> emulator.Image:
         """A strict build of emitted code with both operators, or of the textbook loop with one."""
@@ -358,57 +418,121 @@ class Bench:
         x = given(case, drive)
         return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
-    def worst(self, case: Case) -> Figures:
-        """Engine corners over the worst trials."""
+    def worst(self, case: Case) -> list[Figures]:
+        """Engine corners over the worst trials; apart, where there is that, what is no number behind a commit, and
+        the calls of `commit`."""
         image = self.image(case, "corners")
-        call, drive = together(self._worst_trials(case))
-        core = self.run(case, image, "corners", given(case, drive, call=call), call)
-        return figures_of(case, "corners", "worst case", core, image)
+        stack = 0
+        steps, returns = [], []
+        best = self._worst_trials(case)
+        forms: list[tuple[Form, bool]] = [(plain, False)]
+        odd, inverse = comparison.REALS[case.arithmetic].kind == "f", case.operator == "inverse"
+        if odd or inverse:
+            forms.append((interrupted, False))
+        if odd and inverse:
+            forms.append((interrupted, True))
+        for form, behind in forms:
+            if form is interrupted:
+                best = self._worst_interrupted(case, behind)
+            call, x, _ = form(case, best)
+            core = self.run(case, image, "corners", x, call)
+            returning = behind_commit(call, x)[call == reference.OP_STEP]
+            steps.append(core.counts[~returning])
+            returns.append(core.counts[returning])
+            stack = max(stack, core.stack)
+        found = [figures_of(case, "corners", "worst case", core, image, np.concatenate(steps), stack)]
+        if sum(map(len, returns)):
+            found.append(figures_of(case, "corners", BEHIND, core, image, np.concatenate(returns), stack))
+        if inverse:
+            core = self.run(case, image, "corners", x, call, "commit")
+            found.append(figures_of(case, "corners", "commit", core, image, stack=stack))
+        return found
 
-    def run(self, case: Case, image: emulator.Image, engine: str, x: Any, call: Any = None) -> emulator.Core:
+    def run(
+        self,
+        case: Case,
+        image: emulator.Image,
+        engine: str,
+        x: Any,
+        call: Any = None,
+        counted: str = "step",
+    ) -> emulator.Core:
         """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
         numbers = model(case.n).tables(case.arithmetic, engine)
         calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8) if call is None else call, x)
         real = comparison.REALS[case.arithmetic]
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)
-        outcome = comparison.compare(functools.partial(core.run, "bench", case.operator), [record])
+        run = functools.partial(core.run, "bench", case.operator, counted=counted)
+        outcome = comparison.compare(run, [record])
         assert not outcome.different, f"{case}, {engine}: {outcome}"
         return core
 
     def _worst_trials(self, case: Case) -> list[Reals]:
         """The trials with the dearest samples on a Cortex-M4F or, for cores without FPU, on a Cortex-M0+; other cores
         differ little. What is built is searched, then the neighbours of what is found for dearer ones."""
-        case = replace(case, target=targets.find("cortex-m4f" if case.target.fpu else "cortex-m0plus"))
+        case = self._searched(case)
         if case not in self._worst:
             real = comparison.REALS[case.arithmetic]
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
-            in_software = real.kind == "f" and not (case.target.fpu and case.arithmetic == "float32")
-            most, rounds = SEARCHED // (8 if in_software else 1), 6
+            most, rounds = self._most(case), 6
             if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
                 best, rounds = self._worst_trials(replace(case, arithmetic="float32")), 1
             else:
-                _, best = self._dearest(case, within(SEARCHED // (1 + in_software), trials(case.n)), 20)
+                _, best = self._dearest(case, within(SEARCHED // (1 + (most < SEARCHED)), trials(case.n)), 20)
                 best += within(most, (x for trial in best for x in longer(case.n, trial, hair)))
-            before, (dear, best) = 0, self._dearest(case, best, 10)
-            for _ in range(rounds):
-                if dear == before:
-                    break
-                before, near = dear, (x for trial in best for x in neighbours(case.n, trial, hair))
-                dear, best = self._dearest(case, [*best, *within(most, near)], 10)
-            self._worst[case] = best
+            self._worst[case] = self._better(case, best, rounds, most, hair, plain)
         return self._worst[case]
 
-    def _dearest(self, case: Case, found: list[Reals], number: int) -> tuple[int, list[Reals]]:
+    def _worst_interrupted(self, case: Case, behind: bool) -> list[Reals]:
+        """The same of interrupted trials, those that are the worst without among them; `behind`: by the samples that
+        are no number behind a commit, and by all others otherwise."""
+        case = self._searched(case)
+        if (case, behind) not in self._worst_odd:
+            real = comparison.REALS[case.arithmetic]
+            hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
+            most = self._most(case) // 8  # each has several forms
+            best = list(self._worst_trials(case))
+            if case.arithmetic == "float64":
+                best += self._worst_interrupted(replace(case, arithmetic="float32"), behind)
+            else:
+                every = max(1, sum(len(trial) for trial in trials(case.n)) // most)
+                best += within(most, itertools.islice(trials(case.n), None, None, every))
+            rounds = 1 if case.arithmetic == "float64" else 3
+            self._worst_odd[case, behind] = self._better(case, best, rounds, most, hair, interrupted, behind)
+        return self._worst_odd[case, behind]
+
+    @staticmethod
+    def _searched(case: Case) -> Case:
+        return replace(case, target=targets.find("cortex-m4f" if case.target.fpu else "cortex-m0plus"))
+
+    @staticmethod
+    def _most(case: Case) -> int:
+        """Samples of a round of the search: fewer where floating point is computed in software."""
+        in_software = case.arithmetic in REALS and not (case.target.fpu and case.arithmetic == "float32")
+        return SEARCHED // (8 if in_software else 1)
+
+    def _better(
+        self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False
+    ) -> list[Reals]:
+        """The dearest of trials and of what lies near the dearest of them, as long as that is dearer."""
+        before, (dear, best) = 0, self._dearest(case, best, 10, form, behind)
+        for _ in range(rounds):
+            if dear == before:
+                break
+            before, near = dear, (x for trial in best for x in neighbours(case.n, trial, hair))
+            dear, best = self._dearest(case, [*best, *within(most, near)], 10, form, behind)
+        return best
+
+    def _dearest(
+        self, case: Case, found: list[Reals], number: int, form: Form = plain, behind: bool = False
+    ) -> tuple[int, list[Reals]]:
         """Instructions of the dearest sample, and so many trials with the dearest ones, those first, and one of those
         that jump from the same place."""
-        call, drive = together(found)
+        call, x, ends = form(case, found)
         counts = np.zeros(len(call))
-        image = self.image(case, "corners")
-        counts[call == reference.OP_STEP] = self.run(
-            case, image, "corners", given(case, drive, call=call), call
-        ).counts
-        ends = np.cumsum([len(trial) + 1 for trial in found])
+        counts[call == reference.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
+        counts[behind_commit(call, x) != behind] = 0
         dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
         kept: dict[bytes, Reals] = {}
         for i in np.argsort(dear, kind="stable")[::-1]:
@@ -416,9 +540,17 @@ class Bench:
         return max(dear), list(kept.values())[:number]
 
 
-def figures_of(case: Case, engine: str, signal: str, core: emulator.Core, image: emulator.Image) -> Figures:
-    """What was counted and measured."""
-    counts = core.counts
+def figures_of(
+    case: Case,
+    engine: str,
+    signal: str,
+    core: emulator.Core,
+    image: emulator.Image,
+    counts: Any = None,
+    stack: int | None = None,
+) -> Figures:
+    """What was counted and measured; by this core, unless it is given."""
+    counts = core.counts if counts is None else counts
     return Figures(
         target=case.target.name,
         compiler=case.compiler,
@@ -433,7 +565,7 @@ def figures_of(case: Case, engine: str, signal: str, core: emulator.Core, image:
         flash=image.sections[".module"],
         library=image.sections.get(".library", 0),
         ram=core.call(f"hystgen_harness_{'forward' if engine == 'textbook' else case.operator}_size"),
-        stack=core.stack,
+        stack=core.stack if stack is None else stack,
     )
 
 
@@ -464,7 +596,7 @@ def measure(
                     found.append(bench.textbook(case, some))
                     found.append(bench.engine(case, "loop", some))
                     found.append(bench.engine(case, "corners", all_of_it))
-                    found.append(bench.worst(case))
+                    found += bench.worst(case)
                 seconds = time.monotonic() - began
                 print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
     return found
@@ -487,12 +619,13 @@ def key(f: Figures) -> tuple[Any, ...]:
 
 
 def table_text(figures: Iterable[Figures]) -> str:
-    """Mean / max over the multisine, and the worst case, a row an operator and n."""
+    """A row an operator and n: mean / max over the multisine, and the worst cases, of a NaN behind a commit and of a
+    commit too."""
     rows: dict[tuple[Any, ...], dict[str, Figures]] = {}
     for f in figures:
-        rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else "worst"] = f
-    head = ("target", "compiler", "arithmetic", "operator", "n", "textbook", "loop", "corners", "worst", "flash",
-            "library", "RAM", "stack", "textbook/corners")  # fmt: skip
+        rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else f.signal] = f
+    head = ("target", "compiler", "arithmetic", "operator", "n", "textbook", "loop", "corners", "worst", "NaN",
+            "commit", "flash", "library", "RAM", "stack", "textbook/corners")  # fmt: skip
     lines = [head]
     for about, row in rows.items():
         text, corners = row["textbook"], row["corners"]
@@ -502,11 +635,12 @@ def table_text(figures: Iterable[Figures]) -> str:
                 f"{text.mean:.0f} / {text.max}",
                 f"{row['loop'].mean:.0f} / {row['loop'].max}",
                 f"{corners.mean:.1f} / {corners.max}",
-                str(row["worst"].max),
+                str(row["worst case"].max),
+                *(str(row[what].max) if what in row else "" for what in (BEHIND, "commit")),
                 str(corners.flash),
                 str(corners.library),
                 str(corners.ram),
-                str(max(corners.stack, row["worst"].stack)),
+                str(max(corners.stack, row["worst case"].stack)),
                 f"{text.mean / corners.mean:.1f}",
             )
         )
@@ -539,6 +673,8 @@ def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
                 wanted.append((f"{core} n = {n}: worst, textbook's is {text.max}", f.max, text.max))
                 if n == 128:
                     wanted.append((f"{core} n = 128: worst", f.max, 400))
+                    if odd := get("cortex-m4f", "corners", n, BEHIND):
+                        wanted.append((f"{core} n = 128: a NaN behind a commit", odd.max, 400))
         f, text = get("cortex-m0plus", "corners", 16), get("cortex-m0plus", "textbook", 16)
         if f and text:
             words = f"cortex-m0plus {compiler} n = 16: mean, a ninth of textbook's {text.mean}"

@@ -359,7 +359,7 @@ def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(
 ) -> None:
     """Neither the benchmark's multisine nor jumps and steps at random."""
     made, case = bench.Bench(tmp_path), bench.Case(targets.find(core), "zig", n, operator, arithmetic)
-    worst = made.worst(case).max
+    worst = made.worst(case)[0].max
     rng = np.random.default_rng(5)
     jumps = rng.uniform(-10.5, 10.5, 6000) * rng.choice([1, 0.5, 0.1], 6000)
     walk = np.clip(np.cumsum(rng.normal(0, 0.6, 6000)), -10.5, 10.5)

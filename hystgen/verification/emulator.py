@@ -147,7 +147,7 @@ class Core:
 
     @property
     def counts(self) -> NDArray[np.uint32]:
-        """Instructions of every call of `step` that the harness made, in order."""
+        """Instructions of every call that the harness made of what is counted, in order."""
         return np.concatenate(self._counts) if self._counts else np.zeros(0, dtype=np.uint32)
 
     @property
@@ -186,8 +186,11 @@ class Core:
                 return name
         return "no function"
 
-    def run(self, name: str, op: str, call: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
-        """Have the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step."""
+    def run(
+        self, name: str, op: str, call: Bytes, x: NDArray[Any], counted: str = "step"
+    ) -> tuple[NDArray[Any], Bytes]:
+        """Have the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step, or of
+        NAME_OP_commit."""
         sizes = (len(x), x.nbytes, x.nbytes, len(x))
         places, end = [], RECORDS
         for size in sizes:
@@ -199,25 +202,25 @@ class Core:
             self._records = needed
         self._uc.mem_write(places[0], call.tobytes())
         self._uc.mem_write(places[1], x.tobytes())
-        steps = int(np.count_nonzero(call == reference.OP_STEP))
-        with_counter = self._counting(name, op, steps)
+        code = reference.OP_STEP if counted == "step" else reference.OP_COMMIT
+        with_counter = self._counting(f"{name}_{op}_{counted}", op, int(np.count_nonzero(call == code)))
         with_counter(lambda: self.call(f"hystgen_harness_{op}", *places, len(x)))
         answer = np.frombuffer(bytes(self._uc.mem_read(places[2], x.nbytes)), dtype=x.dtype)
         status = np.frombuffer(bytes(self._uc.mem_read(places[3], len(x))), dtype=np.uint8)
         return answer, status
 
-    def _counting(self, name: str, op: str, steps: int) -> Callable[[Callable[[], object]], None]:
+    def _counting(self, function: str, op: str, calls: int) -> Callable[[Callable[[], object]], None]:
         """What runs an action with the hook in place."""
         from unicorn import UC_HOOK_CODE
         from unicorn.unicorn_py3.unicorn import uc_hook_h, uclib
 
-        counts = np.zeros(steps, dtype=np.uint32)
+        counts = np.zeros(calls, dtype=np.uint32)
         caller, size = self._image.symbols[f"hystgen_harness_{op}"]
         counter = _Counter(
-            entry=self._image.symbols[f"{name}_{op}_step"][0] & ~1,
+            entry=self._image.symbols[function][0] & ~1,
             caller=caller & ~1,
             caller_end=(caller & ~1) + size,
-            capacity=steps,
+            capacity=calls,
             counts=counts.ctypes.data,
             read_register=ctypes.cast(uclib.uc_reg_read, ctypes.c_void_p).value,
             stack_register=self._registers.stack,
@@ -236,8 +239,8 @@ class Core:
                 action()
             finally:
                 uclib.uc_hook_del(self._uc._uch, handle)
-            if counter.calls != steps:
-                raise EmulatorError(f"counted {counter.calls} calls of {name}_{op}_step where {steps} were made")
+            if counter.calls != calls:
+                raise EmulatorError(f"counted {counter.calls} calls of {function} where {calls} were made")
             self._counts.append(counts)
             self._stack_at_step = int(counter.stack_pointer) or self._stack_at_step
 
