@@ -29,16 +29,18 @@ static hystgen_reach_t hystgen_activation(const hystgen_tables_t *t, const hystg
 
 /* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
    from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p, const hystgen_corner_t *corner)
+HYSTGEN_INLINE static inline void hystgen_corners_settle_way(const hystgen_tables_t *t, hystgen_place_t *p,
+                                                             const hystgen_corner_t *corner, unsigned int depth,
+                                                             unsigned int k, bool rising)
 {
-    if (p->depth > 0) {
-        const hystgen_corner_t *c = &corner[p->depth - 1];
+    if (depth > 0) {
+        const hystgen_corner_t *c = &corner[depth - 1];
         const hystgen_reach_t e = c->extremum;
         const hystgen_sum_t y = hystgen_held(c);
-        const hystgen_play_t *r = &t->threshold[p->k];
-        const hystgen_sum_t *z = &t->start_level[p->k];
+        const hystgen_play_t *r = &t->threshold[k];
+        const hystgen_sum_t *z = &t->start_level[k];
         const int side = c->side;
-        if (p->rising ? side < 0 : side > 0) {
+        if (rising ? side < 0 : side > 0) {
             p->anchor = e;
             p->anchor_output = y;
             p->next = e;
@@ -54,7 +56,7 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p
                 to_anchor_output = to_anchor_output + to_anchor_output;
                 to_next_output = to_next_output + to_next_output;
             }
-            if (p->rising) {
+            if (rising) {
                 p->anchor = e + to_anchor;
                 p->anchor_output = y + to_anchor_output;
                 p->next = e + to_next;
@@ -68,9 +70,18 @@ static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p
         }
     } else { /* every play follows */
         p->anchor = 0;
-        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
-        p->next = p->rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
-        p->next_output = p->rising ? HYSTGEN_SUM_MAX : -HYSTGEN_SUM_MAX;
+        p->anchor_output = rising ? -t->all_lift : t->all_lift;
+        p->next = rising ? HYSTGEN_REACH_MAX : -HYSTGEN_REACH_MAX;
+        p->next_output = rising ? HYSTGEN_SUM_MAX : -HYSTGEN_SUM_MAX;
+    }
+}
+
+static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p, const hystgen_corner_t *corner)
+{
+    if (p->rising) {
+        hystgen_corners_settle_way(t, p, corner, p->depth, p->k, true);
+    } else {
+        hystgen_corners_settle_way(t, p, corner, p->depth, p->k, false);
     }
 }
 
@@ -92,34 +103,41 @@ static bool hystgen_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
-static unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, unsigned int k, unsigned int high,
-                                                  hystgen_sum_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high. */
+HYSTGEN_INLINE static inline unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, unsigned int k,
+                                                                        unsigned int high, hystgen_sum_t x)
 {
-    if (k < high && x >= step[k]) {
-        ++k;
-        if (k < high && x >= step[k]) {
-            ++k;
-            while (k < high) {
-                const unsigned int middle = (k + high) / 2;
-                if (x >= step[middle]) {
-                    k = middle + 1;
-                } else {
-                    high = middle;
-                }
-            }
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (x >= step[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
         }
     }
     return k;
 }
 
-/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, by bisection, then the plays of one block. */
-static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int depth,
-                                  unsigned int k, hystgen_reach_t w, hystgen_place_t *p)
+/* The same where it mostly is one of the first two. */
+static unsigned int hystgen_threshold_not_reached_near(const hystgen_play_t *step, unsigned int k, unsigned int high,
+                                                       hystgen_sum_t x)
 {
-    const bool rising = p->rising;
-    const hystgen_sum_t x = rising ? w : -w; /* everything as a rising move sees it */
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            k = hystgen_threshold_not_reached(step, k + 1, high, x);
+        }
+    }
+    return k;
+}
+
+/* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
+HYSTGEN_INLINE static inline unsigned int hystgen_find_input(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                             unsigned int depth, unsigned int *k, hystgen_sum_t x,
+                                                             bool rising, bool near)
+{
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
@@ -127,17 +145,18 @@ static void hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corne
         const hystgen_corner_t *c = &corner[middle];
         if (x >= hystgen_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = middle;
-            k = c->end;
+            *k = c->end;
         } else {
             low = middle + 1;
         }
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];
-        k = hystgen_threshold_not_reached(t->threshold, k, c->end - 1u, hystgen_way(x, rising ? c->extremum : -c->extremum, c->side));
+        const hystgen_sum_t way = hystgen_way(x, rising ? c->extremum : -c->extremum, c->side);
+        *k = near ? hystgen_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                  : hystgen_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
-    p->depth = (uint_least16_t)left;
-    p->k = (uint_least16_t)k;
+    return left;
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -148,19 +167,26 @@ static const hystgen_corner_t *hystgen_entered_by(const hystgen_corner_t *corner
     return left == 0 || (left < depth && corner[left].end == k) ? &corner[left] : &corner[left - 1];
 }
 
-/* Whether the place that solving found is where the move has come to. */
-static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner)
+static bool hystgen_turns(const hystgen_memory_t *m, hystgen_play_t w)
+{
+    return m->here.rising ? w < m->w : w > m->w;
+}
+
+/* Whether the place that is known beforehand, if any, is where a move to w ends. */
+static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner,
+                             hystgen_play_t w)
 {
     const hystgen_place_t *there = &m->there;
-    const hystgen_corner_t *owner;
-    if (there->rising != m->here.rising || hystgen_past(m->w, there->next, there->rising)) {
+    const bool turned = hystgen_turns(m, w);
+    if (there->k == 0 || there->rising != (m->here.rising != turned) || hystgen_past(w, there->next, there->rising)) {
         return false;
     }
-    if (there->k == 1) {
-        return true;
+    if (there->k > 1) {
+        const unsigned int depth = turned && m->here.k > 1 ? m->here.depth + 1u : m->here.depth;
+        const hystgen_corner_t *owner = hystgen_entered_by(corner, there->depth, depth, there->k);
+        return hystgen_reached(w, hystgen_activation(t, owner, there->k - 1u, there->rising), there->rising);
     }
-    owner = hystgen_entered_by(corner, there->depth, m->here.depth, there->k);
-    return hystgen_reached(m->w, hystgen_activation(t, owner, there->k - 1u, there->rising), there->rising);
+    return true;
 }
 
 /* Field by field, since compilers may call memcpy for a whole one. */
@@ -184,6 +210,7 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->told = false;
     m->start = 0;
     if (t->n > 0) {
         hystgen_write_corner(t, corner, w, (hystgen_sum_t)w * t->slope[t->n + 1u], t->n + 1u, 0);
@@ -204,6 +231,7 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
     m->here.depth = t->n;
     m->here.rising = true;
     m->there.k = 0;
+    m->told = false;
     m->start = t->n;
     for (j = 0; j < t->n; ++j) {
         const unsigned int k = t->n - j;
@@ -225,30 +253,79 @@ static void hystgen_push_corner(const hystgen_tables_t *t, hystgen_memory_t *m, 
     hystgen_leave_corner(t, m, corner, hystgen_corners_output(t, m));
 }
 
+/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
+HYSTGEN_INLINE static inline void hystgen_corners_turn(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                       hystgen_corner_t *corner, hystgen_play_t w, hystgen_place_t *p,
+                                                       bool rising)
+{
+    unsigned int depth = p->depth;
+    unsigned int k = 1;
+    if (p->k > 1) { /* a corner that owns no play but the input itself is none */
+        hystgen_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        depth = depth + 1;
+    }
+    if (depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
+        k = 2; /* right at its activation it would not follow yet */
+        depth = hystgen_find_input(t, corner, depth, &k, rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, false);
+    }
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+    hystgen_corners_settle_way(t, p, corner, depth, k, rising);
+}
+
+HYSTGEN_INLINE static inline void hystgen_corners_go_on(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                        hystgen_play_t w, hystgen_place_t *p, bool rising)
+{
+    if (hystgen_past(w, p->next, rising)) {
+        unsigned int k = p->k + 1u;
+        const unsigned int left = hystgen_find_input(t, corner, p->depth, &k,
+            rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, true);
+        p->depth = (uint_least16_t)left;
+        p->k = (uint_least16_t)k;
+        hystgen_corners_settle_way(t, p, corner, left, k, rising);
+    }
+}
+
+/* Takes a place, where the plays are before a move, to where the move to w ends. */
+HYSTGEN_API void hystgen_corners_go(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                    hystgen_play_t w, hystgen_place_t *p)
+{
+    if (p->rising) {
+        if (w < m->w) {
+            hystgen_corners_turn(t, m, corner, w, p, false);
+        } else {
+            hystgen_corners_go_on(t, corner, w, p, true);
+        }
+    } else {
+        if (w > m->w) {
+            hystgen_corners_turn(t, m, corner, w, p, true);
+        } else {
+            hystgen_corners_go_on(t, corner, w, p, false);
+        }
+    }
+}
+
 /* Moves the input of the plays to w. */
 HYSTGEN_API void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                                         hystgen_play_t w)
 {
-    const bool turned = m->here.rising ? w < m->w : w > m->w;
-    if (turned) {       /* the plays that followed stay where they are */
-        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            hystgen_push_corner(t, m, corner);
-            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
-        }
-        m->here.rising = !m->here.rising;
-        m->here.k = 1;
+    if (m->told || hystgen_foretold(t, m, corner, w)) {
+        hystgen_copy_place(&m->here, &m->there);
+        m->told = false;
+    } else {
+        hystgen_corners_go(t, m, corner, w, &m->here);
     }
     m->w = w;
-    if (m->there.k > 0 && hystgen_foretold(t, m, corner)) {
-        hystgen_copy_place(&m->here, &m->there);
-    } else {
-        if (turned) {
-            hystgen_corners_settle(t, &m->here, corner);
-        }
-        if (hystgen_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
-            hystgen_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
-            hystgen_corners_settle(t, &m->here, corner);
-        }
-    }
     m->there.k = 0;
+}
+
+/* Finds beforehand where a move to w ends. Moves nothing; the free slot above the corners is scratch space. */
+HYSTGEN_API void hystgen_corners_foretell(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                          hystgen_play_t w)
+{
+    if (!hystgen_foretold(t, m, corner, w)) {
+        hystgen_copy_place(&m->there, &m->here);
+        hystgen_corners_go(t, m, corner, w, &m->there);
+    }
 }

@@ -1,11 +1,26 @@
 #include "hystgen_runtime.h"
 
-/* A rising move to `output` from where the first k plays follow and `depth` corners, `start` of them of the start, hold
-   the others: fills in the place where it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
-   that follow are those that will. */
+static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output, hystgen_real_t next_output,
+                                hystgen_real_t anchor, hystgen_real_t next, unsigned int k, unsigned int depth,
+                                bool rising)
+{
+    p->anchor_output = anchor_output;
+    p->next_output = next_output;
+    p->anchor = anchor;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+}
+
+/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. Rounding is
+   kept from leading out of that place: then the plays that follow are those that will; *room is false where it is too
+   narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
 HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner,
                                                 unsigned int start, unsigned int depth, unsigned int k,
-                                                hystgen_real_t output, hystgen_place_t *p)
+                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
+                                                bool *room)
 {
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, output, true);
@@ -14,6 +29,8 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
     hystgen_real_t level;
     hystgen_real_t next;
     hystgen_real_t next_level;
+    const hystgen_real_t *r = &t->threshold[k];
+    const hystgen_real_t last = r[-1];
     if (left > 0) {
         const hystgen_corner_t *c = &corner[left - 1];
         const hystgen_real_t e = c->extremum;
@@ -24,15 +41,14 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
             next_level = level;
         } else {
             const hystgen_real_t y = c->pass[0]; /* with its sign changed */
-            const hystgen_real_t *r = &t->threshold[k];
             const hystgen_real_t *z = &t->start_level[k];
             if (c->side != 0) {
-                first = e + (r[-1] + r[-1]);
+                first = e + (last + last);
                 level = (z[-1] + z[-1]) - y;
                 next = e + (r[0] + r[0]);
                 next_level = (z[0] + z[0]) - y;
             } else {
-                first = e + r[-1];
+                first = e + last;
                 level = z[-1] - y;
                 next = e + r[0];
                 next_level = z[0] - y;
@@ -44,32 +60,35 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
         next = HYSTGEN_REACH_MAX;
         next_level = HYSTGEN_SUM_MAX;
     }
-    p->anchor_output = level;
-    p->next_output = next_level;
-    p->anchor = first;
-    p->next = next;
-    p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)left;
-    p->rising = true;
     w = first + (output - level) * t->inverse_slope[k];
     if (w > next) {
-        return next;
+        w = next;
+    } else {
+        hystgen_real_t least = first;
+        if (k == end) { /* the last one taken along was held by a corner that was left */
+            least = hystgen_from(corner[left].extremum, corner[left].side, last, true);
+        }
+        if (w < least && k > 1) { /* later answers of the same move must not lie before this one */
+            if (!(least > from)) {
+                return from;
+            }
+            hystgen_write_place(p, output, next_level, least, next, k, left, true);
+            *room = !(least > next);
+            return least;
+        }
     }
-    if (k == end) { /* the last one taken along was held by a corner that was left */
-        first = hystgen_activation(t, &corner[left], k - 1, true);
+    if (!(w > from)) {
+        return from;
     }
-    if (w < first && k > 1) {
-        p->anchor = first; /* so that later answers of the same move do not lie before this one */
-        p->anchor_output = output;
-        return first;
-    }
+    hystgen_write_place(p, level, next_level, first, next, k, left, true);
     return w;
 }
 
 /* The same for a falling move. */
 HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner,
                                                 unsigned int start, unsigned int depth, unsigned int k,
-                                                hystgen_real_t output, hystgen_place_t *p)
+                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
+                                                bool *room)
 {
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, -output, false);
@@ -78,6 +97,8 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const
     hystgen_real_t level;
     hystgen_real_t next;
     hystgen_real_t next_level;
+    const hystgen_real_t *r = &t->threshold[k];
+    const hystgen_real_t last = r[-1];
     if (left > 0) {
         const hystgen_corner_t *c = &corner[left - 1];
         const hystgen_real_t e = c->extremum;
@@ -88,15 +109,14 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const
             next_level = level;
         } else {
             const hystgen_real_t y = c->pass[1];
-            const hystgen_real_t *r = &t->threshold[k];
             const hystgen_real_t *z = &t->start_level[k];
             if (c->side != 0) {
-                first = e - (r[-1] + r[-1]);
+                first = e - (last + last);
                 level = y - (z[-1] + z[-1]);
                 next = e - (r[0] + r[0]);
                 next_level = y - (z[0] + z[0]);
             } else {
-                first = e - r[-1];
+                first = e - last;
                 level = y - z[-1];
                 next = e - r[0];
                 next_level = y - z[0];
@@ -108,25 +128,27 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const
         next = -HYSTGEN_REACH_MAX;
         next_level = -HYSTGEN_SUM_MAX;
     }
-    p->anchor_output = level;
-    p->next_output = next_level;
-    p->anchor = first;
-    p->next = next;
-    p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)left;
-    p->rising = false;
     w = first + (output - level) * t->inverse_slope[k];
     if (w < next) {
-        return next;
+        w = next;
+    } else {
+        hystgen_real_t least = first;
+        if (k == end) { /* the last one taken along was held by a corner that was left */
+            least = hystgen_from(corner[left].extremum, corner[left].side, last, false);
+        }
+        if (w > least && k > 1) { /* later answers of the same move must not lie before this one */
+            if (!(least < from)) {
+                return from;
+            }
+            hystgen_write_place(p, output, next_level, least, next, k, left, false);
+            *room = !(least < next);
+            return least;
+        }
     }
-    if (k == end) { /* the last one taken along was held by a corner that was left */
-        first = hystgen_activation(t, &corner[left], k - 1, false);
+    if (!(w < from)) {
+        return from;
     }
-    if (w > first && k > 1) {
-        p->anchor = first; /* so that later answers of the same move do not lie before this one */
-        p->anchor_output = output;
-        return first;
-    }
+    hystgen_write_place(p, level, next_level, first, next, k, left, false);
     return w;
 }
 
@@ -166,15 +188,12 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     unsigned int depth;
     unsigned int k;
     bool rising;
+    bool room;
     hystgen_real_t w;
     if (!hystgen_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    w = rising ? hystgen_corners_rise(t, corner, m->start, depth, k, output, &m->there)
-               : hystgen_corners_fall(t, corner, m->start, depth, k, output, &m->there);
-    if (!hystgen_past(w, m->w, rising)) { /* rounding is kept from leading back */
-        m->there.k = 0;
-        return m->w;
-    }
-    return w;
+    m->there.k = 0;
+    return rising ? hystgen_corners_rise(t, corner, m->start, depth, k, m->w, output, &m->there, &room)
+                  : hystgen_corners_fall(t, corner, m->start, depth, k, m->w, output, &m->there, &room);
 }

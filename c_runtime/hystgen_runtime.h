@@ -64,9 +64,11 @@ bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory_t *m, hystg
                            hystgen_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
                            hystgen_real_t *w);
 hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
-                                    unsigned int depth, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
+                                    unsigned int depth, unsigned int k, hystgen_real_t from, hystgen_real_t output,
+                                    hystgen_place_t *p, bool *room);
 hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
-                                    unsigned int depth, unsigned int k, hystgen_real_t output, hystgen_place_t *p);
+                                    unsigned int depth, unsigned int k, hystgen_real_t from, hystgen_real_t output,
+                                    hystgen_place_t *p, bool *room);
 #endif
 
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
@@ -76,6 +78,10 @@ void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystg
                            const hystgen_play_t *play);
 void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                             hystgen_play_t w);
+void hystgen_corners_go(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner, hystgen_play_t w,
+                        hystgen_place_t *p);
+void hystgen_corners_foretell(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                              hystgen_play_t w);
 hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
 hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
                                       hystgen_corner_t *corner, hystgen_sum_t output);

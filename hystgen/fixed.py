@@ -238,8 +238,8 @@ _COMMON = [function for function in reference.COMPILED if function.__name__ not 
 _LOWER = {
     "multiple", "activation", "level", "past", "all_follow", "reached", "corners_settle", "hint", "way",
     "not_reached", "opposite", "corners_left", "corners_find", "entered_by", "foretold", "corners_rest",
-    "corners_start", "push_corner", "corners_absorb", "corners_output", "loop_rest", "loop_start", "loop_absorb",
-    "loop_output",
+    "corners_start", "push_corner", "turns", "corners_absorb", "corners_foretell", "corners_output", "loop_rest",
+    "loop_start", "loop_absorb", "loop_output",
 }  # fmt: skip
 
 # Callees before callers: the memory, then what is written here, then what a step means

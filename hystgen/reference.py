@@ -243,19 +243,17 @@ def entered_by(s: State, left: int, depth: int, k: int) -> int:
     return left - 1
 
 
-def foretold(t: PlayTables, s: State) -> bool:
-    """Whether the place that solving found is where the move has come to."""
+def foretold(t: PlayTables, s: State, depth: int, rising: int, w: Any) -> bool:
+    """Whether a move to w, which `depth` corners stand before, ends in the place that word was left of."""
     k = s.counts[HINT_K]
     left = s.counts[HINT_DEPTH]
-    rising = s.counts[RISING]
-    if rising != s.counts[HINT_RISING]:
+    if k == 0 or rising != s.counts[HINT_RISING]:
         return False
-    w = s.real[W]
     if left > 0 and past(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
         return False
     if k == 1:
         return True
-    owner = entered_by(s, left, s.counts[DEPTH], k)
+    owner = entered_by(s, left, depth, k)
     return reached(w, activation(t, s, owner, t.threshold[k - 1], rising), rising)
 
 
@@ -315,18 +313,24 @@ def push_corner(t: PlayTables, s: State, c: int) -> None:
         s.side[c] = 1
 
 
+def turns(s: State, w: Any) -> bool:
+    """Whether a move to w turns back."""
+    if s.counts[RISING]:
+        return bool(w < s.real[W])
+    return bool(w > s.real[W])
+
+
 def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     """Move the input of the plays to w."""
-    rising = s.counts[RISING]
-    turned = (rising and w < s.real[W]) or (not rising and w > s.real[W])
+    turned = turns(s, w)
     if turned:
         if s.counts[K] > 1:
             push_corner(t, s, s.counts[DEPTH])
             s.counts[DEPTH] += 1
-        s.counts[RISING] = 1 - rising
+        s.counts[RISING] = 1 - s.counts[RISING]
         s.counts[K] = 1
     s.real[W] = w
-    if s.counts[HINT_K] > 0 and foretold(t, s):
+    if foretold(t, s, s.counts[DEPTH], s.counts[RISING], w):
         s.counts[DEPTH] = s.counts[HINT_DEPTH]
         s.counts[K] = s.counts[HINT_K]
         corners_settle(t, s)
@@ -345,11 +349,8 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
     s.counts[HINT_K] = 0
 
 
-# ---------------------------------------------------------------- corners_solve.c
-
-
 def hint(t: PlayTables, s: State, left: int, k: int, rising: int) -> None:
-    """Leave word of the place where the answer lies."""
+    """Leave word of the place where a move ends."""
     s.counts[HINT_K] = k
     s.counts[HINT_DEPTH] = left
     s.counts[HINT_RISING] = rising
@@ -359,6 +360,32 @@ def hint(t: PlayTables, s: State, left: int, k: int, rising: int) -> None:
     else:
         s.real[HINT_ANCHOR] = t.limits[ZERO]
         s.real[HINT_ANCHOR_OUTPUT] = all_follow(t, rising)
+
+
+def corners_foretell(t: PlayTables, s: State, w: Any) -> None:
+    """Leave word of the place where a move to w ends, unless that which was left holds for it too; moves nothing."""
+    depth = s.counts[DEPTH]
+    k = s.counts[K]
+    rising = s.counts[RISING]
+    turned = turns(s, w)
+    if turned:
+        if k > 1:
+            push_corner(t, s, depth)
+            depth = depth + 1
+        k = 1
+        rising = 1 - rising
+    if foretold(t, s, depth, rising, w):
+        return
+    if depth > 0 and past(w, activation(t, s, depth - 1, t.threshold[k], rising), rising):
+        left, k = corners_find(t, s, 0, depth, k + 1, rising, w, s.extremum, t.threshold)
+        hint(t, s, left, k, rising)
+    elif turned:
+        hint(t, s, depth, k, rising)
+    else:
+        s.counts[HINT_K] = 0  # a move that goes on as it was
+
+
+# ---------------------------------------------------------------- corners_solve.c
 
 
 def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> Any:
@@ -604,6 +631,15 @@ def see_drive(t: Tables, s: State, v: Any) -> None:
     absorb(t, s, front_forward(t, v, s.counts[ASCENDING]))
 
 
+def foretell(t: Tables, s: State, v: Any) -> None:
+    """Look up what drive v does to the plays before it has done so."""
+    if t.engine == CORNERS:
+        ascending = s.counts[ASCENDING]
+        if t.branches and v != s.real[APPLIED]:
+            ascending = 1 if v > s.real[APPLIED] else 0
+        corners_foretell(t, s, front_forward(t, v, ascending))
+
+
 def finite(t: Tables, x: Any) -> bool:
     """Neither NaN nor infinite."""
     return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])
@@ -676,9 +712,9 @@ def inverse_step(t: Tables, s: State, u: Any) -> Any:
         s.counts[HAS_PENDING] = 0
     if not finite(t, u):
         s.counts[STATUS] |= HELD
-        if s.counts[STEPPED]:
-            return answer(s, s.real[ANSWER])
-        return answer(s, clamp_drive(t, s.real[APPLIED]))
+        v = s.real[ANSWER] if s.counts[STEPPED] else clamp_drive(t, s.real[APPLIED])
+        foretell(t, s, v)
+        return answer(s, v)
     if s.counts[REPEAT] and u == s.real[REFERENCE]:
         s.counts[STATUS] |= s.counts[BITS]
         return answer(s, s.real[ANSWER])
@@ -718,6 +754,7 @@ def inverse_commit(t: Tables, s: State, applied: Any) -> None:
     s.real[PENDING] = v
     s.counts[HAS_PENDING] = 1
     s.counts[REPEAT] = 0
+    foretell(t, s, v)
 
 
 def reset(t: Tables, s: State) -> None:
@@ -748,10 +785,10 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
-    corners_absorb, hint, corners_locate, corners_solve,
+    turns, corners_absorb, hint, corners_foretell, corners_locate, corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
-    front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, finite, forward_step, answer,
-    clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,
+    front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, foretell, finite,
+    forward_step, answer, clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through

@@ -221,9 +221,11 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     if options.forward or values.branches or known:
         roots.add(f"hystgen_{engine}_output")
     if options.inverse and values.fast and not family.fixed:
-        roots |= {f"hystgen_corners_{part}" for part in ("begin", "find", "rise", "fall")}
+        roots |= {f"hystgen_corners_{part}" for part in ("begin", "find", "rise", "fall", "go")}
     elif options.inverse:
         roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
+    if options.inverse and engine == "corners":
+        roots.add("hystgen_corners_foretell")
     if values.fast:
         roots.add("hystgen_copy_place")
     if values.fast and family.fixed:

@@ -298,6 +298,13 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v)
     return v;
 }
 
+/* The next step takes drive v into the memory; where that leads is looked up now, when there is nothing else to do. */
+static void bent_inverse_expect(bent_inverse_t *self, bent_real_t v)
+{
+    self->pending = v;
+    self->has_pending = true;
+}
+
 /* A sample in which the plays are looked at, once they have seen the drive before. */
 static bent_real_t bent_inverse_look(bent_inverse_t *self, bent_real_t u)
 {
@@ -311,7 +318,8 @@ static bent_real_t bent_inverse_look(bent_inverse_t *self, bent_real_t u)
     if (!(u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX)) {
         if (!bent_finite(u)) {
             self->status |= BENT_STATUS_HELD;
-            return bent_inverse_answer(self, self->stepped ? self->answer : bent_clamp_drive(self->applied));
+            bent_inverse_expect(self, self->stepped ? self->answer : bent_clamp_drive(self->applied));
+            return bent_inverse_answer(self, self->pending);
         }
         u = u < BENT_OUTPUT_MIN ? BENT_OUTPUT_MIN : BENT_OUTPUT_MAX;
         bits = BENT_STATUS_INPUT_CLAMPED;
@@ -347,16 +355,17 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
 
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied)
 {
+    bent_real_t v;
     if (!bent_finite(applied)) {
         self->status |= BENT_STATUS_HELD;
         return;
     }
-    self->pending = bent_clamp_drive(applied);
-    if (self->pending < applied || self->pending > applied) {
+    v = bent_clamp_drive(applied);
+    if (v < applied || v > applied) {
         self->status |= BENT_STATUS_INPUT_CLAMPED;
     }
-    self->has_pending = true;
     self->repeat = false;
+    bent_inverse_expect(self, v);
 }
 
 void bent_inverse_init(bent_inverse_t *self)

@@ -128,16 +128,21 @@ static curved_reach_t curved_activation(const curved_tables_t *t, const curved_c
 
 /* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
    from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, const curved_corner_t *corner)
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void curved_corners_settle_way(const curved_tables_t *t, curved_place_t *p,
+                                                             const curved_corner_t *corner, unsigned int depth,
+                                                             unsigned int k, bool rising)
 {
-    if (p->depth > 0) {
-        const curved_corner_t *c = &corner[p->depth - 1];
+    if (depth > 0) {
+        const curved_corner_t *c = &corner[depth - 1];
         const curved_reach_t e = c->extremum;
         const curved_sum_t y = curved_held(c);
-        const curved_play_t *r = &t->threshold[p->k];
-        const curved_sum_t *z = &t->start_level[p->k];
+        const curved_play_t *r = &t->threshold[k];
+        const curved_sum_t *z = &t->start_level[k];
         const int side = c->side;
-        if (p->rising ? side < 0 : side > 0) {
+        if (rising ? side < 0 : side > 0) {
             p->anchor = e;
             p->anchor_output = y;
             p->next = e;
@@ -153,7 +158,7 @@ static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, c
                 to_anchor_output = to_anchor_output + to_anchor_output;
                 to_next_output = to_next_output + to_next_output;
             }
-            if (p->rising) {
+            if (rising) {
                 p->anchor = e + to_anchor;
                 p->anchor_output = y + to_anchor_output;
                 p->next = e + to_next;
@@ -167,9 +172,18 @@ static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, c
         }
     } else { /* every play follows */
         p->anchor = 0;
-        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
-        p->next = p->rising ? INT32_MAX : -INT32_MAX;
-        p->next_output = p->rising ? (INT64_MAX / 2) : -(INT64_MAX / 2);
+        p->anchor_output = rising ? -t->all_lift : t->all_lift;
+        p->next = rising ? INT32_MAX : -INT32_MAX;
+        p->next_output = rising ? (INT64_MAX / 2) : -(INT64_MAX / 2);
+    }
+}
+
+static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, const curved_corner_t *corner)
+{
+    if (p->rising) {
+        curved_corners_settle_way(t, p, corner, p->depth, p->k, true);
+    } else {
+        curved_corners_settle_way(t, p, corner, p->depth, p->k, false);
     }
 }
 
@@ -191,34 +205,47 @@ static bool curved_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
-static unsigned int curved_threshold_not_reached(const curved_play_t *step, unsigned int k, unsigned int high,
-                                                  curved_sum_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int curved_threshold_not_reached(const curved_play_t *step, unsigned int k,
+                                                                        unsigned int high, curved_sum_t x)
 {
-    if (k < high && x >= step[k]) {
-        ++k;
-        if (k < high && x >= step[k]) {
-            ++k;
-            while (k < high) {
-                const unsigned int middle = (k + high) / 2;
-                if (x >= step[middle]) {
-                    k = middle + 1;
-                } else {
-                    high = middle;
-                }
-            }
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (x >= step[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
         }
     }
     return k;
 }
 
-/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, by bisection, then the plays of one block. */
-static void curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner, unsigned int depth,
-                                  unsigned int k, curved_reach_t w, curved_place_t *p)
+/* The same where it mostly is one of the first two. */
+static unsigned int curved_threshold_not_reached_near(const curved_play_t *step, unsigned int k, unsigned int high,
+                                                       curved_sum_t x)
 {
-    const bool rising = p->rising;
-    const curved_sum_t x = rising ? w : -w; /* everything as a rising move sees it */
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            k = curved_threshold_not_reached(step, k + 1, high, x);
+        }
+    }
+    return k;
+}
+
+/* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int curved_find_input(const curved_tables_t *t, const curved_corner_t *corner,
+                                                             unsigned int depth, unsigned int *k, curved_sum_t x,
+                                                             bool rising, bool near)
+{
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
@@ -226,17 +253,18 @@ static void curved_find_by_input(const curved_tables_t *t, const curved_corner_t
         const curved_corner_t *c = &corner[middle];
         if (x >= curved_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = middle;
-            k = c->end;
+            *k = c->end;
         } else {
             low = middle + 1;
         }
     }
     if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
         const curved_corner_t *c = &corner[left - 1];
-        k = curved_threshold_not_reached(t->threshold, k, c->end - 1u, curved_way(x, rising ? c->extremum : -c->extremum, c->side));
+        const curved_sum_t way = curved_way(x, rising ? c->extremum : -c->extremum, c->side);
+        *k = near ? curved_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                  : curved_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
-    p->depth = (uint_least16_t)left;
-    p->k = (uint_least16_t)k;
+    return left;
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -247,19 +275,26 @@ static const curved_corner_t *curved_entered_by(const curved_corner_t *corner, u
     return left == 0 || (left < depth && corner[left].end == k) ? &corner[left] : &corner[left - 1];
 }
 
-/* Whether the place that solving found is where the move has come to. */
-static bool curved_foretold(const curved_tables_t *t, const curved_memory_t *m, const curved_corner_t *corner)
+static bool curved_turns(const curved_memory_t *m, curved_play_t w)
+{
+    return m->here.rising ? w < m->w : w > m->w;
+}
+
+/* Whether the place that is known beforehand, if any, is where a move to w ends. */
+static bool curved_foretold(const curved_tables_t *t, const curved_memory_t *m, const curved_corner_t *corner,
+                             curved_play_t w)
 {
     const curved_place_t *there = &m->there;
-    const curved_corner_t *owner;
-    if (there->rising != m->here.rising || curved_past(m->w, there->next, there->rising)) {
+    const bool turned = curved_turns(m, w);
+    if (there->k == 0 || there->rising != (m->here.rising != turned) || curved_past(w, there->next, there->rising)) {
         return false;
     }
-    if (there->k == 1) {
-        return true;
+    if (there->k > 1) {
+        const unsigned int depth = turned && m->here.k > 1 ? m->here.depth + 1u : m->here.depth;
+        const curved_corner_t *owner = curved_entered_by(corner, there->depth, depth, there->k);
+        return curved_reached(w, curved_activation(t, owner, there->k - 1u, there->rising), there->rising);
     }
-    owner = curved_entered_by(corner, there->depth, m->here.depth, there->k);
-    return curved_reached(m->w, curved_activation(t, owner, there->k - 1u, there->rising), there->rising);
+    return true;
 }
 
 /* Field by field, since compilers may call memcpy for a whole one. */
@@ -283,6 +318,7 @@ static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, cu
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->told = false;
     m->start = 0;
     if (t->n > 0) {
         curved_write_corner(t, corner, w, (curved_sum_t)w * t->slope[t->n + 1u], t->n + 1u, 0);
@@ -304,32 +340,87 @@ static void curved_push_corner(const curved_tables_t *t, curved_memory_t *m, cur
     curved_leave_corner(t, m, corner, curved_corners_output(t, m));
 }
 
+/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t *m,
+                                                       curved_corner_t *corner, curved_play_t w, curved_place_t *p,
+                                                       bool rising)
+{
+    unsigned int depth = p->depth;
+    unsigned int k = 1;
+    if (p->k > 1) { /* a corner that owns no play but the input itself is none */
+        curved_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        depth = depth + 1;
+    }
+    if (depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising)) {
+        k = 2; /* right at its activation it would not follow yet */
+        depth = curved_find_input(t, corner, depth, &k, rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, false);
+    }
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+    curved_corners_settle_way(t, p, corner, depth, k, rising);
+}
+
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void curved_corners_go_on(const curved_tables_t *t, const curved_corner_t *corner,
+                                                        curved_play_t w, curved_place_t *p, bool rising)
+{
+    if (curved_past(w, p->next, rising)) {
+        unsigned int k = p->k + 1u;
+        const unsigned int left = curved_find_input(t, corner, p->depth, &k,
+            rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, true);
+        p->depth = (uint_least16_t)left;
+        p->k = (uint_least16_t)k;
+        curved_corners_settle_way(t, p, corner, left, k, rising);
+    }
+}
+
+/* Takes a place, where the plays are before a move, to where the move to w ends. */
+static void curved_corners_go(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
+                                    curved_play_t w, curved_place_t *p)
+{
+    if (p->rising) {
+        if (w < m->w) {
+            curved_corners_turn(t, m, corner, w, p, false);
+        } else {
+            curved_corners_go_on(t, corner, w, p, true);
+        }
+    } else {
+        if (w > m->w) {
+            curved_corners_turn(t, m, corner, w, p, true);
+        } else {
+            curved_corners_go_on(t, corner, w, p, false);
+        }
+    }
+}
+
 /* Moves the input of the plays to w. */
 static void curved_corners_absorb(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
                                         curved_play_t w)
 {
-    const bool turned = m->here.rising ? w < m->w : w > m->w;
-    if (turned) {       /* the plays that followed stay where they are */
-        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            curved_push_corner(t, m, corner);
-            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
-        }
-        m->here.rising = !m->here.rising;
-        m->here.k = 1;
+    if (m->told || curved_foretold(t, m, corner, w)) {
+        curved_copy_place(&m->here, &m->there);
+        m->told = false;
+    } else {
+        curved_corners_go(t, m, corner, w, &m->here);
     }
     m->w = w;
-    if (m->there.k > 0 && curved_foretold(t, m, corner)) {
-        curved_copy_place(&m->here, &m->there);
-    } else {
-        if (turned) {
-            curved_corners_settle(t, &m->here, corner);
-        }
-        if (curved_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
-            curved_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
-            curved_corners_settle(t, &m->here, corner);
-        }
-    }
     m->there.k = 0;
+}
+
+/* Finds beforehand where a move to w ends. Moves nothing; the free slot above the corners is scratch space. */
+static void curved_corners_foretell(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
+                                          curved_play_t w)
+{
+    if (!curved_foretold(t, m, corner, w)) {
+        curved_copy_place(&m->there, &m->here);
+        curved_corners_go(t, m, corner, w, &m->there);
+    }
 }
 
 static bool curved_passed(curved_sum_t output, curved_sum_t level, bool rising)
@@ -663,6 +754,15 @@ static curved_real_t curved_inverse_answer(curved_inverse_t *self, curved_real_t
     return v;
 }
 
+/* The next step takes drive v into the memory; where that leads is looked up now, when there is nothing else to do. */
+static void curved_inverse_expect(curved_inverse_t *self, curved_real_t v)
+{
+    self->pending = v;
+    self->has_pending = true;
+    curved_corners_foretell(&curved_tables, &self->memory, self->corner, curved_front(v));
+    self->memory.told = true;
+}
+
 /* A sample in which the plays are looked at, once they have seen the drive before. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that not all that it needs is on the stack at once */
@@ -711,12 +811,13 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
 
 void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied)
 {
-    self->pending = curved_clamp_drive(applied);
-    if (self->pending < applied || self->pending > applied) {
+    curved_real_t v;
+    v = curved_clamp_drive(applied);
+    if (v < applied || v > applied) {
         self->status |= CURVED_STATUS_INPUT_CLAMPED;
     }
-    self->has_pending = true;
     self->repeat = false;
+    curved_inverse_expect(self, v);
 }
 
 void curved_inverse_init(curved_inverse_t *self)

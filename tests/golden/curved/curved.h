@@ -85,9 +85,10 @@ typedef struct {
 /* The plays of one instance, with its corners. */
 typedef struct {
     curved_place_t here;
-    curved_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
+    curved_place_t there; /* where the next move is known to end, mostly by solving; k = 0 where no other plays follow */
     curved_play_t w;      /* input of the plays, w = G[v] */
     uint_least16_t start;  /* corners at the bottom that are of the start, where no more than `depth` are left of them */
+    bool told;             /* the next move does end there, without another look */
 } curved_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */

@@ -104,16 +104,21 @@ static plain_real_t plain_activation(const plain_tables_t *t, const plain_corner
 
 /* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
    from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, const plain_corner_t *corner)
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void plain_corners_settle_way(const plain_tables_t *t, plain_place_t *p,
+                                                             const plain_corner_t *corner, unsigned int depth,
+                                                             unsigned int k, bool rising)
 {
-    if (p->depth > 0) {
-        const plain_corner_t *c = &corner[p->depth - 1];
+    if (depth > 0) {
+        const plain_corner_t *c = &corner[depth - 1];
         const plain_real_t e = c->extremum;
         const plain_real_t y = plain_held(c);
-        const plain_real_t *r = &t->threshold[p->k];
-        const plain_real_t *z = &t->start_level[p->k];
+        const plain_real_t *r = &t->threshold[k];
+        const plain_real_t *z = &t->start_level[k];
         const int side = c->side;
-        if (p->rising ? side < 0 : side > 0) {
+        if (rising ? side < 0 : side > 0) {
             p->anchor = e;
             p->anchor_output = y;
             p->next = e;
@@ -129,7 +134,7 @@ static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, cons
                 to_anchor_output = to_anchor_output + to_anchor_output;
                 to_next_output = to_next_output + to_next_output;
             }
-            if (p->rising) {
+            if (rising) {
                 p->anchor = e + to_anchor;
                 p->anchor_output = y + to_anchor_output;
                 p->next = e + to_next;
@@ -143,9 +148,18 @@ static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, cons
         }
     } else { /* every play follows */
         p->anchor = 0;
-        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
-        p->next = p->rising ? FLT_MAX : -FLT_MAX;
-        p->next_output = p->rising ? FLT_MAX : -FLT_MAX;
+        p->anchor_output = rising ? -t->all_lift : t->all_lift;
+        p->next = rising ? FLT_MAX : -FLT_MAX;
+        p->next_output = rising ? FLT_MAX : -FLT_MAX;
+    }
+}
+
+static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, const plain_corner_t *corner)
+{
+    if (p->rising) {
+        plain_corners_settle_way(t, p, corner, p->depth, p->k, true);
+    } else {
+        plain_corners_settle_way(t, p, corner, p->depth, p->k, false);
     }
 }
 
@@ -167,34 +181,47 @@ static bool plain_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
-static unsigned int plain_threshold_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
-                                                  plain_real_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int plain_threshold_not_reached(const plain_real_t *step, unsigned int k,
+                                                                        unsigned int high, plain_real_t x)
 {
-    if (k < high && x >= step[k]) {
-        ++k;
-        if (k < high && x >= step[k]) {
-            ++k;
-            while (k < high) {
-                const unsigned int middle = (k + high) / 2;
-                if (x >= step[middle]) {
-                    k = middle + 1;
-                } else {
-                    high = middle;
-                }
-            }
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (x >= step[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
         }
     }
     return k;
 }
 
-/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, by bisection, then the plays of one block. */
-static void plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner, unsigned int depth,
-                                  unsigned int k, plain_real_t w, plain_place_t *p)
+/* The same where it mostly is one of the first two. */
+static unsigned int plain_threshold_not_reached_near(const plain_real_t *step, unsigned int k, unsigned int high,
+                                                       plain_real_t x)
 {
-    const bool rising = p->rising;
-    const plain_real_t x = rising ? w : -w; /* everything as a rising move sees it */
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            k = plain_threshold_not_reached(step, k + 1, high, x);
+        }
+    }
+    return k;
+}
+
+/* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int plain_find_input(const plain_tables_t *t, const plain_corner_t *corner,
+                                                             unsigned int depth, unsigned int *k, plain_real_t x,
+                                                             bool rising, bool near)
+{
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
@@ -202,17 +229,18 @@ static void plain_find_by_input(const plain_tables_t *t, const plain_corner_t *c
         const plain_corner_t *c = &corner[middle];
         if (x >= plain_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = middle;
-            k = c->end;
+            *k = c->end;
         } else {
             low = middle + 1;
         }
     }
     if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
         const plain_corner_t *c = &corner[left - 1];
-        k = plain_threshold_not_reached(t->threshold, k, c->end - 1u, plain_way(x, rising ? c->extremum : -c->extremum, c->side));
+        const plain_real_t way = plain_way(x, rising ? c->extremum : -c->extremum, c->side);
+        *k = near ? plain_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                  : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
-    p->depth = (uint_least16_t)left;
-    p->k = (uint_least16_t)k;
+    return left;
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -223,19 +251,26 @@ static const plain_corner_t *plain_entered_by(const plain_corner_t *corner, unsi
     return left == 0 || (left < depth && corner[left].end == k) ? &corner[left] : &corner[left - 1];
 }
 
-/* Whether the place that solving found is where the move has come to. */
-static bool plain_foretold(const plain_tables_t *t, const plain_memory_t *m, const plain_corner_t *corner)
+static bool plain_turns(const plain_memory_t *m, plain_real_t w)
+{
+    return m->here.rising ? w < m->w : w > m->w;
+}
+
+/* Whether the place that is known beforehand, if any, is where a move to w ends. */
+static bool plain_foretold(const plain_tables_t *t, const plain_memory_t *m, const plain_corner_t *corner,
+                             plain_real_t w)
 {
     const plain_place_t *there = &m->there;
-    const plain_corner_t *owner;
-    if (there->rising != m->here.rising || plain_past(m->w, there->next, there->rising)) {
+    const bool turned = plain_turns(m, w);
+    if (there->k == 0 || there->rising != (m->here.rising != turned) || plain_past(w, there->next, there->rising)) {
         return false;
     }
-    if (there->k == 1) {
-        return true;
+    if (there->k > 1) {
+        const unsigned int depth = turned && m->here.k > 1 ? m->here.depth + 1u : m->here.depth;
+        const plain_corner_t *owner = plain_entered_by(corner, there->depth, depth, there->k);
+        return plain_reached(w, plain_activation(t, owner, there->k - 1u, there->rising), there->rising);
     }
-    owner = plain_entered_by(corner, there->depth, m->here.depth, there->k);
-    return plain_reached(m->w, plain_activation(t, owner, there->k - 1u, there->rising), there->rising);
+    return true;
 }
 
 /* Field by field, since compilers may call memcpy for a whole one. */
@@ -259,6 +294,7 @@ static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->told = false;
     m->start = 0;
     if (t->n > 0) {
         plain_write_corner(t, corner, w, w * t->slope[t->n + 1u], t->n + 1u, 0);
@@ -280,32 +316,87 @@ static void plain_push_corner(const plain_tables_t *t, plain_memory_t *m, plain_
     plain_leave_corner(t, m, corner, plain_corners_output(t, m));
 }
 
+/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m,
+                                                       plain_corner_t *corner, plain_real_t w, plain_place_t *p,
+                                                       bool rising)
+{
+    unsigned int depth = p->depth;
+    unsigned int k = 1;
+    if (p->k > 1) { /* a corner that owns no play but the input itself is none */
+        plain_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        depth = depth + 1;
+    }
+    if (depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising)) {
+        k = 2; /* right at its activation it would not follow yet */
+        depth = plain_find_input(t, corner, depth, &k, rising ? w : -w, rising, false);
+    }
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+    plain_corners_settle_way(t, p, corner, depth, k, rising);
+}
+
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void plain_corners_go_on(const plain_tables_t *t, const plain_corner_t *corner,
+                                                        plain_real_t w, plain_place_t *p, bool rising)
+{
+    if (plain_past(w, p->next, rising)) {
+        unsigned int k = p->k + 1u;
+        const unsigned int left = plain_find_input(t, corner, p->depth, &k,
+            rising ? w : -w, rising, true);
+        p->depth = (uint_least16_t)left;
+        p->k = (uint_least16_t)k;
+        plain_corners_settle_way(t, p, corner, left, k, rising);
+    }
+}
+
+/* Takes a place, where the plays are before a move, to where the move to w ends. */
+static void plain_corners_go(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                    plain_real_t w, plain_place_t *p)
+{
+    if (p->rising) {
+        if (w < m->w) {
+            plain_corners_turn(t, m, corner, w, p, false);
+        } else {
+            plain_corners_go_on(t, corner, w, p, true);
+        }
+    } else {
+        if (w > m->w) {
+            plain_corners_turn(t, m, corner, w, p, true);
+        } else {
+            plain_corners_go_on(t, corner, w, p, false);
+        }
+    }
+}
+
 /* Moves the input of the plays to w. */
 static void plain_corners_absorb(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
                                         plain_real_t w)
 {
-    const bool turned = m->here.rising ? w < m->w : w > m->w;
-    if (turned) {       /* the plays that followed stay where they are */
-        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            plain_push_corner(t, m, corner);
-            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
-        }
-        m->here.rising = !m->here.rising;
-        m->here.k = 1;
+    if (m->told || plain_foretold(t, m, corner, w)) {
+        plain_copy_place(&m->here, &m->there);
+        m->told = false;
+    } else {
+        plain_corners_go(t, m, corner, w, &m->here);
     }
     m->w = w;
-    if (m->there.k > 0 && plain_foretold(t, m, corner)) {
-        plain_copy_place(&m->here, &m->there);
-    } else {
-        if (turned) {
-            plain_corners_settle(t, &m->here, corner);
-        }
-        if (plain_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
-            plain_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
-            plain_corners_settle(t, &m->here, corner);
-        }
-    }
     m->there.k = 0;
+}
+
+/* Finds beforehand where a move to w ends. Moves nothing; the free slot above the corners is scratch space. */
+static void plain_corners_foretell(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                          plain_real_t w)
+{
+    if (!plain_foretold(t, m, corner, w)) {
+        plain_copy_place(&m->there, &m->here);
+        plain_corners_go(t, m, corner, w, &m->there);
+    }
 }
 
 /* First of the start levels k .. high-1 that a way x has not reached, or high. */
@@ -378,12 +469,27 @@ static inline unsigned int plain_corners_find(const plain_tables_t *t,
     return left;
 }
 
-/* A rising move to `output` from where the first k plays follow and `depth` corners, `start` of them of the start, hold
-   the others: fills in the place where it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
-   that follow are those that will. */
+static void plain_write_place(plain_place_t *p, plain_real_t anchor_output, plain_real_t next_output,
+                                plain_real_t anchor, plain_real_t next, unsigned int k, unsigned int depth,
+                                bool rising)
+{
+    p->anchor_output = anchor_output;
+    p->next_output = next_output;
+    p->anchor = anchor;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+}
+
+/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. Rounding is
+   kept from leading out of that place: then the plays that follow are those that will; *room is false where it is too
+   narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
 static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corner_t *corner,
                                                 unsigned int start, unsigned int depth, unsigned int k,
-                                                plain_real_t output, plain_place_t *p)
+                                                plain_real_t from, plain_real_t output, plain_place_t *p,
+                                                bool *room)
 {
     unsigned int end;
     const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, output, true);
@@ -392,6 +498,8 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
     plain_real_t level;
     plain_real_t next;
     plain_real_t next_level;
+    const plain_real_t *r = &t->threshold[k];
+    const plain_real_t last = r[-1];
     if (left > 0) {
         const plain_corner_t *c = &corner[left - 1];
         const plain_real_t e = c->extremum;
@@ -402,15 +510,14 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
             next_level = level;
         } else {
             const plain_real_t y = c->pass[0]; /* with its sign changed */
-            const plain_real_t *r = &t->threshold[k];
             const plain_real_t *z = &t->start_level[k];
             if (c->side != 0) {
-                first = e + (r[-1] + r[-1]);
+                first = e + (last + last);
                 level = (z[-1] + z[-1]) - y;
                 next = e + (r[0] + r[0]);
                 next_level = (z[0] + z[0]) - y;
             } else {
-                first = e + r[-1];
+                first = e + last;
                 level = z[-1] - y;
                 next = e + r[0];
                 next_level = z[0] - y;
@@ -422,32 +529,35 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
         next = FLT_MAX;
         next_level = FLT_MAX;
     }
-    p->anchor_output = level;
-    p->next_output = next_level;
-    p->anchor = first;
-    p->next = next;
-    p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)left;
-    p->rising = true;
     w = first + (output - level) * t->inverse_slope[k];
     if (w > next) {
-        return next;
+        w = next;
+    } else {
+        plain_real_t least = first;
+        if (k == end) { /* the last one taken along was held by a corner that was left */
+            least = plain_from(corner[left].extremum, corner[left].side, last, true);
+        }
+        if (w < least && k > 1) { /* later answers of the same move must not lie before this one */
+            if (!(least > from)) {
+                return from;
+            }
+            plain_write_place(p, output, next_level, least, next, k, left, true);
+            *room = !(least > next);
+            return least;
+        }
     }
-    if (k == end) { /* the last one taken along was held by a corner that was left */
-        first = plain_activation(t, &corner[left], k - 1, true);
+    if (!(w > from)) {
+        return from;
     }
-    if (w < first && k > 1) {
-        p->anchor = first; /* so that later answers of the same move do not lie before this one */
-        p->anchor_output = output;
-        return first;
-    }
+    plain_write_place(p, level, next_level, first, next, k, left, true);
     return w;
 }
 
 /* The same for a falling move. */
 static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corner_t *corner,
                                                 unsigned int start, unsigned int depth, unsigned int k,
-                                                plain_real_t output, plain_place_t *p)
+                                                plain_real_t from, plain_real_t output, plain_place_t *p,
+                                                bool *room)
 {
     unsigned int end;
     const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, -output, false);
@@ -456,6 +566,8 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corn
     plain_real_t level;
     plain_real_t next;
     plain_real_t next_level;
+    const plain_real_t *r = &t->threshold[k];
+    const plain_real_t last = r[-1];
     if (left > 0) {
         const plain_corner_t *c = &corner[left - 1];
         const plain_real_t e = c->extremum;
@@ -466,15 +578,14 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corn
             next_level = level;
         } else {
             const plain_real_t y = c->pass[1];
-            const plain_real_t *r = &t->threshold[k];
             const plain_real_t *z = &t->start_level[k];
             if (c->side != 0) {
-                first = e - (r[-1] + r[-1]);
+                first = e - (last + last);
                 level = y - (z[-1] + z[-1]);
                 next = e - (r[0] + r[0]);
                 next_level = y - (z[0] + z[0]);
             } else {
-                first = e - r[-1];
+                first = e - last;
                 level = y - z[-1];
                 next = e - r[0];
                 next_level = y - z[0];
@@ -486,25 +597,27 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corn
         next = -FLT_MAX;
         next_level = -FLT_MAX;
     }
-    p->anchor_output = level;
-    p->next_output = next_level;
-    p->anchor = first;
-    p->next = next;
-    p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)left;
-    p->rising = false;
     w = first + (output - level) * t->inverse_slope[k];
     if (w < next) {
-        return next;
+        w = next;
+    } else {
+        plain_real_t least = first;
+        if (k == end) { /* the last one taken along was held by a corner that was left */
+            least = plain_from(corner[left].extremum, corner[left].side, last, false);
+        }
+        if (w > least && k > 1) { /* later answers of the same move must not lie before this one */
+            if (!(least < from)) {
+                return from;
+            }
+            plain_write_place(p, output, next_level, least, next, k, left, false);
+            *room = !(least < next);
+            return least;
+        }
     }
-    if (k == end) { /* the last one taken along was held by a corner that was left */
-        first = plain_activation(t, &corner[left], k - 1, false);
+    if (!(w < from)) {
+        return from;
     }
-    if (w > first && k > 1) {
-        p->anchor = first; /* so that later answers of the same move do not lie before this one */
-        p->anchor_output = output;
-        return first;
-    }
+    plain_write_place(p, level, next_level, first, next, k, left, false);
     return w;
 }
 
@@ -590,7 +703,7 @@ static void plain_inverse_begin(plain_inverse_t *self, plain_real_t applied)
     self->edge[1] = 0;
     self->before = 0;
     self->gain = 0;
-    self->fast = false;
+    self->fast = 0;
     self->falling = false;
     self->status = 0;
 }
@@ -608,13 +721,14 @@ static plain_real_t plain_inverse_answer(plain_inverse_t *self, plain_real_t v)
 /* What the fast steps have left undone, all but taking the drives to memory. */
 static void plain_inverse_leave_fast(plain_inverse_t *self)
 {
-    self->fast = false;
-    self->reference = self->edge[self->falling ? 1 : 0];
-    self->answer = self->pending;
+    if (self->fast == 1) {
+        self->reference = self->edge[self->falling ? 1 : 0];
+        self->answer = self->pending;
+        self->repeat = true;
+        self->stepped = true;
+    }
+    self->fast = 0;
     self->edge[0] = self->edge[1];
-    self->has_pending = true;
-    self->repeat = true;
-    self->stepped = true;
 }
 
 /* The actuator has seen w, which lies where solving put it. */
@@ -641,6 +755,43 @@ static plain_real_t plain_inverse_send(plain_inverse_t *self, plain_real_t v)
     return v;
 }
 
+/* The actuator is about to see drive v, which no step gave just now, and where that leads is known: the next step goes
+   on from there. */
+static void plain_inverse_expect(plain_inverse_t *self, plain_real_t v)
+{
+    const plain_place_t *p = &self->memory.there;
+    self->falling = !p->rising;
+    self->edge[0] = self->falling ? FLT_MAX : -FLT_MAX; /* no sample is the usual one */
+    self->edge[1] = self->edge[0];
+    self->gain = plain_reciprocal[p->k];
+    self->fast = 2;
+    self->pending = v;
+}
+
+/* The last answer once more where the actuator has come to something else; the place that is known is that of the
+   memory, but for the number of its plays. */
+static plain_real_t plain_inverse_return(plain_inverse_t *self)
+{
+    plain_memory_t *m = &self->memory;
+    if (!self->stepped) {
+        self->answer = plain_clamp_drive(self->applied);
+        self->stepped = true;
+    }
+    m->there.k = m->here.k;
+    plain_corners_go(&plain_tables, &self->memory, self->corner, self->answer, &m->there);
+    plain_inverse_expect(self, self->answer);
+    return self->answer;
+}
+
+/* Repeats the drive of a fast step, which the actuator has come to; the last reference still stands. */
+static plain_real_t plain_inverse_hold(plain_inverse_t *self)
+{
+    plain_copy_place(&self->memory.here, &self->memory.there);
+    self->memory.w = self->pending;
+    self->reference = self->edge[self->falling];
+    return self->pending;
+}
+
 /* A drive that is not what solving gave, or that is no move. */
 static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 {
@@ -650,12 +801,13 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
         self->status |= PLAIN_STATUS_OUTPUT_CLAMPED;
     }
     self->repeat = true;
-    self->fast = false;
+    self->fast = 0;
     self->edge[0] = self->edge[1];
     return plain_inverse_send(self, inside);
 }
 
-/* A move by so little that rounding leaves the drive where it is: fast for what follows, which no sample is up to. */
+/* A move by so little that rounding leaves the drive where it is: fast for what follows, which no sample is up to. The
+   place that is known is that of the memory, but for the number of its plays. */
 static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
@@ -663,60 +815,73 @@ static plain_real_t plain_inverse_rest(plain_inverse_t *self)
         m->there.k = 0;
         return plain_inverse_stay(self, m->w);
     }
-    plain_copy_place(&m->there, &m->here);
+    m->there.k = m->here.k;
     self->falling = !m->here.rising;
     self->edge[self->falling] = self->reference;
     self->edge[!self->falling] = self->falling ? FLT_MAX : -FLT_MAX;
     self->gain = plain_reciprocal[m->here.k];
-    self->fast = true;
+    self->fast = 1;
     self->pending = m->w;
     return m->w;
 }
 
-/* A move to u once what begins it is known: k plays follow, `depth` corners hold the others. From where it ends samples
-   are fast up to the reference at which another play follows, so that they need not look; a little short of it, by more
-   than rounding can be. */
+/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. From where it ends
+   samples are fast up to the reference at which another play follows, so that they need not look; a little short of it,
+   by more than rounding can be. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that shorter ways save no registers for it */
 #endif
-static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth, unsigned int k, bool rising,
+static plain_real_t plain_inverse_rise(plain_inverse_t *self, unsigned int depth, unsigned int k,
     plain_real_t u)
 {
     const plain_place_t *p = &self->memory.there;
-    const plain_real_t output = u;
-    plain_real_t v;
+    const plain_real_t from = self->memory.w;
+    bool room = true;
+    const plain_real_t v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, from, u,
+        &self->memory.there, &room);
     plain_real_t edge;
-    if (rising) {
-        v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
-        if (!(v > self->memory.w)) { /* rounding is kept from leading back */
-            return plain_inverse_rest(self);
-        }
-        if (v > p->next) { /* nor is there room for the place */
-            return plain_inverse_stay(self, v);
-        }
-        edge = p->next_output;
-        if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
-            if (v > PLAIN_DRIVE_MAX) {
-                return plain_inverse_stay(self, v);
-            }
-            edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
-        }
-        if (edge > PLAIN_OUTPUT_MAX) {
-            edge = PLAIN_OUTPUT_MAX;
-        }
-        self->edge[0] = self->reference;
-        self->edge[1] = edge - 2.2984315e-05f;
-        self->gain = plain_reciprocal[p->k];
-        self->falling = false;
-        self->fast = true;
-        self->pending = v;
-        return v;
-    }
-    v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, output, &self->memory.there);
-    if (!(v < self->memory.w)) { /* rounding is kept from leading back */
+    if (!(v > from)) {
         return plain_inverse_rest(self);
     }
-    if (v < p->next) { /* nor is there room for the place */
+    if (!room) {
+        return plain_inverse_stay(self, v);
+    }
+    edge = p->next_output;
+    if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
+        if (v > PLAIN_DRIVE_MAX) {
+            return plain_inverse_stay(self, v);
+        }
+        edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
+    }
+    if (edge > PLAIN_OUTPUT_MAX) {
+        edge = PLAIN_OUTPUT_MAX;
+    }
+    self->edge[0] = self->reference;
+    self->edge[1] = edge - 2.2984315e-05f;
+    self->gain = plain_reciprocal[p->k];
+    self->falling = false;
+    self->fast = 1;
+    self->pending = v;
+    return v;
+}
+
+/* The same for a falling move. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that shorter ways save no registers for it */
+#endif
+static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth, unsigned int k,
+    plain_real_t u)
+{
+    const plain_place_t *p = &self->memory.there;
+    const plain_real_t from = self->memory.w;
+    bool room = true;
+    const plain_real_t v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, from, u,
+        &self->memory.there, &room);
+    plain_real_t edge;
+    if (!(v < from)) {
+        return plain_inverse_rest(self);
+    }
+    if (!room) {
         return plain_inverse_stay(self, v);
     }
     edge = p->next_output;
@@ -733,18 +898,15 @@ static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth,
     self->edge[0] = edge + 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = true;
-    self->fast = true;
+    self->fast = 1;
     self->pending = v;
     return v;
 }
 
-/* The same where the reference u lies beyond the range that way. */
-static plain_real_t plain_inverse_limited(plain_inverse_t *self, unsigned int depth, unsigned int k,
-    bool rising, plain_real_t u)
+static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth, unsigned int k, bool rising,
+    plain_real_t u)
 {
-    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
-    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
-    return plain_inverse_far(self, depth, k, rising, rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
+    return rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
 }
 
 /* A rising move that takes no more plays along, and is fast from there on. */
@@ -770,7 +932,7 @@ static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t v)
     self->edge[1] = edge - 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = false;
-    self->fast = true;
+    self->fast = 1;
     self->pending = v;
     return v;
 }
@@ -798,7 +960,7 @@ static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t v)
     self->edge[0] = edge + 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = true;
-    self->fast = true;
+    self->fast = 1;
     self->pending = v;
     return v;
 }
@@ -814,17 +976,21 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
     unsigned int k;
     bool rising;
     plain_real_t v;
-    if (self->fast) {
+    if (self->fast != 0) {
         plain_inverse_leave_fast(self);
         plain_inverse_take(self, self->pending);
-    } else if (self->has_pending) { /* what was sent last is what the actuator has seen */
-        plain_inverse_see(self, self->pending);
+    } else {
+        if (self->has_pending) { /* what was sent last is what the actuator has seen */
+            plain_inverse_see(self, self->pending);
+        }
+        plain_copy_place(&self->memory.there, &self->memory.here);
+        self->memory.there.k = 0;
     }
     self->has_pending = false;
     if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
         if (!plain_finite(u)) {
             self->status |= PLAIN_STATUS_HELD;
-            return plain_inverse_send(self, self->stepped ? self->answer : plain_clamp_drive(self->applied));
+            return self->repeat ? self->answer : plain_inverse_return(self);
         }
         u = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
     }
@@ -839,10 +1005,87 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
     } else {
         v = rising ? plain_inverse_up(self, v) : plain_inverse_down(self, v);
     }
-    if (self->fast && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
+    if (self->fast != 0 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
         plain_inverse_leave_fast(self);
     }
     return v;
+}
+
+/* What is no number, within a fast move or behind a commit. */
+static plain_real_t plain_inverse_odd(plain_inverse_t *self)
+{
+    self->status |= PLAIN_STATUS_HELD;
+    if (self->fast == 1) {
+        return plain_inverse_hold(self);
+    }
+    plain_inverse_take(self, self->pending);
+    return plain_inverse_return(self);
+}
+
+/* Where a rising fast move turns back to a reference beyond the range, or to an infinite one. */
+static plain_real_t plain_inverse_turn_down_beyond(plain_inverse_t *self, plain_real_t u)
+{
+    plain_memory_t *m = &self->memory;
+    unsigned int depth = m->there.depth;
+    const plain_real_t output = PLAIN_OUTPUT_MIN;
+    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
+    if (!(u >= -FLT_MAX)) {
+        return plain_inverse_odd(self);
+    }
+    if (!(v < self->pending)) { /* a commit has led beyond what may be asked for: no turn */
+        return plain_inverse_look(self, u);
+    }
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    plain_inverse_take(self, self->pending);
+    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    if (m->here.k > 1) {
+        plain_corner_t *c = &self->corner[depth];
+        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
+        const plain_real_t z = plain_start_level[m->here.k - 1];
+        if (m->start > depth) {
+            m->start = (uint_least16_t)depth;
+        }
+        c->pass[0] = (z + z) - y;
+        c->pass[1] = y;
+        c->extremum = m->w;
+        c->end = m->here.k;
+        c->side = -1;
+        depth = depth + 1;
+    }
+    return plain_inverse_fall(self, depth, 1, PLAIN_OUTPUT_MIN);
+}
+
+/* Where a falling fast move turns back to a reference beyond the range, or to an infinite one. */
+static plain_real_t plain_inverse_turn_up_beyond(plain_inverse_t *self, plain_real_t u)
+{
+    plain_memory_t *m = &self->memory;
+    unsigned int depth = m->there.depth;
+    const plain_real_t output = PLAIN_OUTPUT_MAX;
+    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
+    if (!(u <= FLT_MAX)) {
+        return plain_inverse_odd(self);
+    }
+    if (!(v > self->pending)) { /* a commit has led beyond what may be asked for: no turn */
+        return plain_inverse_look(self, u);
+    }
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    plain_inverse_take(self, self->pending);
+    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    if (m->here.k > 1) {
+        plain_corner_t *c = &self->corner[depth];
+        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
+        const plain_real_t z = plain_start_level[m->here.k - 1];
+        if (m->start > depth) {
+            m->start = (uint_least16_t)depth;
+        }
+        c->pass[0] = -y;
+        c->pass[1] = (z + z) + y;
+        c->extremum = m->w;
+        c->end = m->here.k;
+        c->side = 1;
+        depth = depth + 1;
+    }
+    return plain_inverse_rise(self, depth, 1, PLAIN_OUTPUT_MAX);
 }
 
 /* Where a fast move turns back, or takes just one more play of the same corner along, the usual ones among the samples
@@ -858,7 +1101,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
     plain_real_t last;
     plain_real_t edge;
     plain_real_t v;
-    if (!self->fast) {
+    if (self->fast == 0) {
         return plain_inverse_look(self, u);
     }
     if (p->rising) {
@@ -866,11 +1109,16 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
             const plain_corner_t *c;
             const unsigned int k = p->k + 1u;
             if (u > PLAIN_OUTPUT_MAX) {
-                if (!(PLAIN_OUTPUT_MAX >= p->next_output) || !plain_finite(u)) {
+                if (!plain_finite(u)) {
+                    return plain_inverse_odd(self);
+                }
+                if (!(PLAIN_OUTPUT_MAX >= p->next_output)) {
                     return plain_inverse_look(self, u);
                 }
                 plain_inverse_take(self, self->pending);
-                return plain_inverse_limited(self, m->here.depth, k, true, u);
+                plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+                self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+                return plain_inverse_rise(self, m->here.depth, k, PLAIN_OUTPUT_MAX);
             }
             c = &self->corner[p->depth - 1];
             if (k < c->end && !(c->side < 0)) {
@@ -887,8 +1135,12 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                 r = c->extremum + r;
                 z = z - y; /* the last play of a corner goes by this output, the others by the way */
                 v = p->next + (output - p->next_output) * plain_reciprocal[k];
-                if (first && output < z && v < r && v > self->pending
-                    && v <= PLAIN_DRIVE_MAX) {
+                if (first && output < z && v < r && v <= PLAIN_DRIVE_MAX) {
+                    if (!(v > self->pending)) {
+                        plain_inverse_take(self, self->pending);
+                        plain_inverse_ask(self, u, 0);
+                        return plain_inverse_rest(self);
+                    }
                     plain_copy_place(&m->here, p);
                     m->w = self->pending;
                     p->anchor = p->next;
@@ -908,7 +1160,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     self->edge[1] = edge - 2.2984315e-05f;
                     self->gain = plain_reciprocal[p->k];
                     self->falling = false;
-                    self->fast = true;
+                    self->fast = 1;
                     self->pending = v;
                     return v;
 
@@ -916,13 +1168,17 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
             }
             plain_inverse_take(self, self->pending);
             plain_inverse_ask(self, u, 0);
-            return plain_inverse_far(self, m->here.depth, k, true, u);
+            return plain_inverse_rise(self, m->here.depth, k, u);
         }
 
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v < self->pending) {
             unsigned int depth = p->depth;
+            if (u < PLAIN_OUTPUT_MIN) {
+                return plain_inverse_turn_down_beyond(self, u);
+            }
             plain_inverse_take(self, self->pending);
+            plain_inverse_ask(self, u, 0);
             if (m->here.k > 1) {
                 plain_corner_t *c = &self->corner[depth];
                 const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
@@ -937,27 +1193,23 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                 c->side = -1;
                 depth = depth + 1;
             }
-            if (u < PLAIN_OUTPUT_MIN) {
-                if (!plain_finite(u)) {
-                    plain_inverse_leave_fast(self);
-                    self->has_pending = false;
-                    return plain_inverse_look(self, u);
-                }
-                return plain_inverse_limited(self, depth, 1, false, u);
-            }
-            plain_inverse_ask(self, u, 0);
-            return plain_inverse_far(self, depth, 1, false, u);
+    return plain_inverse_fall(self, depth, 1, u);
         }
 } else {
         if (output <= p->next_output && u < self->edge[1]) {
             const plain_corner_t *c;
             const unsigned int k = p->k + 1u;
             if (u < PLAIN_OUTPUT_MIN) {
-                if (!(PLAIN_OUTPUT_MIN <= p->next_output) || !plain_finite(u)) {
+                if (!plain_finite(u)) {
+                    return plain_inverse_odd(self);
+                }
+                if (!(PLAIN_OUTPUT_MIN <= p->next_output)) {
                     return plain_inverse_look(self, u);
                 }
                 plain_inverse_take(self, self->pending);
-                return plain_inverse_limited(self, m->here.depth, k, false, u);
+                plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+                self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+                return plain_inverse_fall(self, m->here.depth, k, PLAIN_OUTPUT_MIN);
             }
             c = &self->corner[p->depth - 1];
             if (k < c->end && !(c->side > 0)) {
@@ -974,8 +1226,12 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                 r = c->extremum - r;
                 z = y - z; /* the last play of a corner goes by this output, the others by the way */
                 v = p->next + (output - p->next_output) * plain_reciprocal[k];
-                if (first && output > z && v > r && v < self->pending
-                    && v >= PLAIN_DRIVE_MIN) {
+                if (first && output > z && v > r && v >= PLAIN_DRIVE_MIN) {
+                    if (!(v < self->pending)) {
+                        plain_inverse_take(self, self->pending);
+                        plain_inverse_ask(self, u, 0);
+                        return plain_inverse_rest(self);
+                    }
                     plain_copy_place(&m->here, p);
                     m->w = self->pending;
                     p->anchor = p->next;
@@ -995,7 +1251,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     self->edge[0] = edge + 2.2984315e-05f;
                     self->gain = plain_reciprocal[p->k];
                     self->falling = true;
-                    self->fast = true;
+                    self->fast = 1;
                     self->pending = v;
                     return v;
 
@@ -1003,13 +1259,17 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
             }
             plain_inverse_take(self, self->pending);
             plain_inverse_ask(self, u, 0);
-            return plain_inverse_far(self, m->here.depth, k, false, u);
+            return plain_inverse_fall(self, m->here.depth, k, u);
         }
 
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v > self->pending) {
             unsigned int depth = p->depth;
+            if (u > PLAIN_OUTPUT_MAX) {
+                return plain_inverse_turn_up_beyond(self, u);
+            }
             plain_inverse_take(self, self->pending);
+            plain_inverse_ask(self, u, 0);
             if (m->here.k > 1) {
                 plain_corner_t *c = &self->corner[depth];
                 const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
@@ -1024,29 +1284,20 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                 c->side = 1;
                 depth = depth + 1;
             }
-            if (u > PLAIN_OUTPUT_MAX) {
-                if (!plain_finite(u)) {
-                    plain_inverse_leave_fast(self);
-                    self->has_pending = false;
-                    return plain_inverse_look(self, u);
-                }
-                return plain_inverse_limited(self, depth, 1, true, u);
-            }
-            plain_inverse_ask(self, u, 0);
-            return plain_inverse_far(self, depth, 1, true, u);
+    return plain_inverse_rise(self, depth, 1, u);
         }
 }
+    if (!plain_finite(u)) {
+        return plain_inverse_odd(self);
+    }
     last = self->edge[self->falling];
-    if ((u >= last && u <= last) || (plain_finite(u) && (p->rising
+    if ((u >= last && u <= last) || (p->rising
         ? u > PLAIN_OUTPUT_MAX && last > PLAIN_OUTPUT_MAX && PLAIN_OUTPUT_MAX < p->next_output
-        : u < PLAIN_OUTPUT_MIN && last < PLAIN_OUTPUT_MIN && PLAIN_OUTPUT_MIN > p->next_output))) {
+        : u < PLAIN_OUTPUT_MIN && last < PLAIN_OUTPUT_MIN && PLAIN_OUTPUT_MIN > p->next_output)) {
         /* the last answer once more, for the same reference or one with the same limit; the drive has come to it */
-        plain_copy_place(&m->here, p);
-        m->w = self->pending;
         self->edge[self->falling] = u;
-        self->reference = u;
         self->status |= self->bits;
-        return self->pending;
+        return plain_inverse_hold(self);
     }
     return plain_inverse_look(self, u);
 }
@@ -1066,7 +1317,12 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
 
 void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
 {
-    if (self->fast) {
+    plain_real_t v;
+    if (!plain_finite(applied)) {
+        self->status |= PLAIN_STATUS_HELD;
+        return;
+    }
+    if (self->fast == 1) {
         const bool more = self->edge[self->falling] < self->reference || self->edge[self->falling] > self->reference;
         plain_inverse_leave_fast(self);
         if (more) { /* than the step that looked */
@@ -1075,16 +1331,15 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
             self->memory.there.k = 0; /* it found nothing new */
         }
     }
-    if (!plain_finite(applied)) {
-        self->status |= PLAIN_STATUS_HELD;
-        return;
-    }
-    self->pending = plain_clamp_drive(applied);
-    if (self->pending < applied || self->pending > applied) {
+    v = plain_clamp_drive(applied);
+    if (v < applied || v > applied) {
         self->status |= PLAIN_STATUS_INPUT_CLAMPED;
     }
-    self->has_pending = true;
     self->repeat = false;
+    self->applied = v;
+    self->has_pending = false;
+    plain_corners_foretell(&plain_tables, &self->memory, self->corner, v);
+    plain_inverse_expect(self, v);
 }
 
 void plain_inverse_init(plain_inverse_t *self)

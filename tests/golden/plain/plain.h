@@ -83,9 +83,10 @@ typedef struct {
 /* The plays of one instance, with its corners. */
 typedef struct {
     plain_place_t here;
-    plain_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
+    plain_place_t there; /* where the next move is known to end, mostly by solving; k = 0 where no other plays follow */
     plain_real_t w;      /* input of the plays, w = G[v] */
     uint_least16_t start;  /* corners at the bottom that are of the start, where no more than `depth` are left of them */
+    bool told;             /* the next move does end there, without another look */
 } plain_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
@@ -97,7 +98,7 @@ typedef struct {
     plain_real_t applied;   /* drive seen last */
     plain_real_t reference; /* input of the last step */
     plain_real_t answer;    /* drive returned last */
-    bool fast;                   /* edges hold */
+    uint_least8_t fast;          /* 1: edges hold; 2: `pending` is no answer of the last step */
     bool falling;
     bool has_pending;
     bool repeat;                 /* the last answer still stands for `reference` */

@@ -86,9 +86,10 @@ typedef struct {
 /* The plays of one instance, with its corners. */
 typedef struct {
     two_branches_place_t here;
-    two_branches_place_t there; /* where the answer that solving found last lies; k = 0 where the same plays follow */
+    two_branches_place_t there; /* where the next move is known to end, mostly by solving; k = 0 where no other plays follow */
     two_branches_real_t w;      /* input of the plays, w = G[v] */
     uint_least16_t start;  /* corners at the bottom that are of the start, where no more than `depth` are left of them */
+    bool told;             /* the next move does end there, without another look */
 } two_branches_memory_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
@@ -380,16 +381,21 @@ static two_branches_real_t two_branches_activation(const two_branches_tables_t *
 
 /* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
    from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-static void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_place_t *p, const two_branches_corner_t *corner)
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void two_branches_corners_settle_way(const two_branches_tables_t *t, two_branches_place_t *p,
+                                                             const two_branches_corner_t *corner, unsigned int depth,
+                                                             unsigned int k, bool rising)
 {
-    if (p->depth > 0) {
-        const two_branches_corner_t *c = &corner[p->depth - 1];
+    if (depth > 0) {
+        const two_branches_corner_t *c = &corner[depth - 1];
         const two_branches_real_t e = c->extremum;
         const two_branches_real_t y = two_branches_held(c);
-        const two_branches_real_t *r = &t->threshold[p->k];
-        const two_branches_real_t *z = &t->start_level[p->k];
+        const two_branches_real_t *r = &t->threshold[k];
+        const two_branches_real_t *z = &t->start_level[k];
         const int side = c->side;
-        if (p->rising ? side < 0 : side > 0) {
+        if (rising ? side < 0 : side > 0) {
             p->anchor = e;
             p->anchor_output = y;
             p->next = e;
@@ -405,7 +411,7 @@ static void two_branches_corners_settle(const two_branches_tables_t *t, two_bran
                 to_anchor_output = to_anchor_output + to_anchor_output;
                 to_next_output = to_next_output + to_next_output;
             }
-            if (p->rising) {
+            if (rising) {
                 p->anchor = e + to_anchor;
                 p->anchor_output = y + to_anchor_output;
                 p->next = e + to_next;
@@ -419,9 +425,18 @@ static void two_branches_corners_settle(const two_branches_tables_t *t, two_bran
         }
     } else { /* every play follows */
         p->anchor = 0;
-        p->anchor_output = p->rising ? -t->all_lift : t->all_lift;
-        p->next = p->rising ? FLT_MAX : -FLT_MAX;
-        p->next_output = p->rising ? FLT_MAX : -FLT_MAX;
+        p->anchor_output = rising ? -t->all_lift : t->all_lift;
+        p->next = rising ? FLT_MAX : -FLT_MAX;
+        p->next_output = rising ? FLT_MAX : -FLT_MAX;
+    }
+}
+
+static void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_place_t *p, const two_branches_corner_t *corner)
+{
+    if (p->rising) {
+        two_branches_corners_settle_way(t, p, corner, p->depth, p->k, true);
+    } else {
+        two_branches_corners_settle_way(t, p, corner, p->depth, p->k, false);
     }
 }
 
@@ -443,34 +458,47 @@ static bool two_branches_opposite(int side, bool rising)
     return rising ? side >= 0 : side <= 0;
 }
 
-/* First of the rising thresholds k .. high-1 that x has not reached, or high; mostly it is one of the first two. */
-static unsigned int two_branches_threshold_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
-                                                  two_branches_real_t x)
+/* First of the rising thresholds k .. high-1 that x has not reached, or high. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int two_branches_threshold_not_reached(const two_branches_real_t *step, unsigned int k,
+                                                                        unsigned int high, two_branches_real_t x)
 {
-    if (k < high && x >= step[k]) {
-        ++k;
-        if (k < high && x >= step[k]) {
-            ++k;
-            while (k < high) {
-                const unsigned int middle = (k + high) / 2;
-                if (x >= step[middle]) {
-                    k = middle + 1;
-                } else {
-                    high = middle;
-                }
-            }
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (x >= step[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
         }
     }
     return k;
 }
 
-/* Where a move to w leads: corners it leaves of `depth`, plays that follow then; plays 0 .. k-1 are known to. First
-   the blocks that are passed whole, by bisection, then the plays of one block. */
-static void two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner, unsigned int depth,
-                                  unsigned int k, two_branches_real_t w, two_branches_place_t *p)
+/* The same where it mostly is one of the first two. */
+static unsigned int two_branches_threshold_not_reached_near(const two_branches_real_t *step, unsigned int k, unsigned int high,
+                                                       two_branches_real_t x)
 {
-    const bool rising = p->rising;
-    const two_branches_real_t x = rising ? w : -w; /* everything as a rising move sees it */
+    if (k < high && x >= step[k]) {
+        ++k;
+        if (k < high && x >= step[k]) {
+            k = two_branches_threshold_not_reached(step, k + 1, high, x);
+        }
+    }
+    return k;
+}
+
+/* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline unsigned int two_branches_find_input(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                             unsigned int depth, unsigned int *k, two_branches_real_t x,
+                                                             bool rising, bool near)
+{
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
@@ -478,17 +506,18 @@ static void two_branches_find_by_input(const two_branches_tables_t *t, const two
         const two_branches_corner_t *c = &corner[middle];
         if (x >= two_branches_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
             left = middle;
-            k = c->end;
+            *k = c->end;
         } else {
             low = middle + 1;
         }
     }
     if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
         const two_branches_corner_t *c = &corner[left - 1];
-        k = two_branches_threshold_not_reached(t->threshold, k, c->end - 1u, two_branches_way(x, rising ? c->extremum : -c->extremum, c->side));
+        const two_branches_real_t way = two_branches_way(x, rising ? c->extremum : -c->extremum, c->side);
+        *k = near ? two_branches_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                  : two_branches_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
-    p->depth = (uint_least16_t)left;
-    p->k = (uint_least16_t)k;
+    return left;
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -499,19 +528,26 @@ static const two_branches_corner_t *two_branches_entered_by(const two_branches_c
     return left == 0 || (left < depth && corner[left].end == k) ? &corner[left] : &corner[left - 1];
 }
 
-/* Whether the place that solving found is where the move has come to. */
-static bool two_branches_foretold(const two_branches_tables_t *t, const two_branches_memory_t *m, const two_branches_corner_t *corner)
+static bool two_branches_turns(const two_branches_memory_t *m, two_branches_real_t w)
+{
+    return m->here.rising ? w < m->w : w > m->w;
+}
+
+/* Whether the place that is known beforehand, if any, is where a move to w ends. */
+static bool two_branches_foretold(const two_branches_tables_t *t, const two_branches_memory_t *m, const two_branches_corner_t *corner,
+                             two_branches_real_t w)
 {
     const two_branches_place_t *there = &m->there;
-    const two_branches_corner_t *owner;
-    if (there->rising != m->here.rising || two_branches_past(m->w, there->next, there->rising)) {
+    const bool turned = two_branches_turns(m, w);
+    if (there->k == 0 || there->rising != (m->here.rising != turned) || two_branches_past(w, there->next, there->rising)) {
         return false;
     }
-    if (there->k == 1) {
-        return true;
+    if (there->k > 1) {
+        const unsigned int depth = turned && m->here.k > 1 ? m->here.depth + 1u : m->here.depth;
+        const two_branches_corner_t *owner = two_branches_entered_by(corner, there->depth, depth, there->k);
+        return two_branches_reached(w, two_branches_activation(t, owner, there->k - 1u, there->rising), there->rising);
     }
-    owner = two_branches_entered_by(corner, there->depth, m->here.depth, there->k);
-    return two_branches_reached(m->w, two_branches_activation(t, owner, there->k - 1u, there->rising), there->rising);
+    return true;
 }
 
 /* Field by field, since compilers may call memcpy for a whole one. */
@@ -535,6 +571,7 @@ static void two_branches_corners_rest(const two_branches_tables_t *t, two_branch
     m->here.depth = 0;
     m->here.rising = true;
     m->there.k = 0;
+    m->told = false;
     m->start = 0;
     if (t->n > 0) {
         two_branches_write_corner(t, corner, w, w * t->slope[t->n + 1u], t->n + 1u, 0);
@@ -556,32 +593,87 @@ static void two_branches_push_corner(const two_branches_tables_t *t, two_branche
     two_branches_leave_corner(t, m, corner, two_branches_corners_output(t, m));
 }
 
+/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void two_branches_corners_turn(const two_branches_tables_t *t, two_branches_memory_t *m,
+                                                       two_branches_corner_t *corner, two_branches_real_t w, two_branches_place_t *p,
+                                                       bool rising)
+{
+    unsigned int depth = p->depth;
+    unsigned int k = 1;
+    if (p->k > 1) { /* a corner that owns no play but the input itself is none */
+        two_branches_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        depth = depth + 1;
+    }
+    if (depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising)) {
+        k = 2; /* right at its activation it would not follow yet */
+        depth = two_branches_find_input(t, corner, depth, &k, rising ? w : -w, rising, false);
+    }
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+    two_branches_corners_settle_way(t, p, corner, depth, k, rising);
+}
+
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void two_branches_corners_go_on(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                        two_branches_real_t w, two_branches_place_t *p, bool rising)
+{
+    if (two_branches_past(w, p->next, rising)) {
+        unsigned int k = p->k + 1u;
+        const unsigned int left = two_branches_find_input(t, corner, p->depth, &k,
+            rising ? w : -w, rising, true);
+        p->depth = (uint_least16_t)left;
+        p->k = (uint_least16_t)k;
+        two_branches_corners_settle_way(t, p, corner, left, k, rising);
+    }
+}
+
+/* Takes a place, where the plays are before a move, to where the move to w ends. */
+static void two_branches_corners_go(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                    two_branches_real_t w, two_branches_place_t *p)
+{
+    if (p->rising) {
+        if (w < m->w) {
+            two_branches_corners_turn(t, m, corner, w, p, false);
+        } else {
+            two_branches_corners_go_on(t, corner, w, p, true);
+        }
+    } else {
+        if (w > m->w) {
+            two_branches_corners_turn(t, m, corner, w, p, true);
+        } else {
+            two_branches_corners_go_on(t, corner, w, p, false);
+        }
+    }
+}
+
 /* Moves the input of the plays to w. */
 static void two_branches_corners_absorb(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
                                         two_branches_real_t w)
 {
-    const bool turned = m->here.rising ? w < m->w : w > m->w;
-    if (turned) {       /* the plays that followed stay where they are */
-        if (m->here.k > 1) { /* a corner that owns no play but the input itself is none */
-            two_branches_push_corner(t, m, corner);
-            m->here.depth = (uint_least16_t)(m->here.depth + 1u);
-        }
-        m->here.rising = !m->here.rising;
-        m->here.k = 1;
+    if (m->told || two_branches_foretold(t, m, corner, w)) {
+        two_branches_copy_place(&m->here, &m->there);
+        m->told = false;
+    } else {
+        two_branches_corners_go(t, m, corner, w, &m->here);
     }
     m->w = w;
-    if (m->there.k > 0 && two_branches_foretold(t, m, corner)) {
-        two_branches_copy_place(&m->here, &m->there);
-    } else {
-        if (turned) {
-            two_branches_corners_settle(t, &m->here, corner);
-        }
-        if (two_branches_past(w, m->here.next, m->here.rising)) { /* right there the next play does not move yet */
-            two_branches_find_by_input(t, corner, m->here.depth, m->here.k + 1u, w, &m->here);
-            two_branches_corners_settle(t, &m->here, corner);
-        }
-    }
     m->there.k = 0;
+}
+
+/* Finds beforehand where a move to w ends. Moves nothing; the free slot above the corners is scratch space. */
+static void two_branches_corners_foretell(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                          two_branches_real_t w)
+{
+    if (!two_branches_foretold(t, m, corner, w)) {
+        two_branches_copy_place(&m->there, &m->here);
+        two_branches_corners_go(t, m, corner, w, &m->there);
+    }
 }
 
 /* First of the start levels k .. high-1 that a way x has not reached, or high. */
@@ -654,12 +746,27 @@ static inline unsigned int two_branches_corners_find(const two_branches_tables_t
     return left;
 }
 
-/* A rising move to `output` from where the first k plays follow and `depth` corners, `start` of them of the start, hold
-   the others: fills in the place where it ends, and returns the input of the plays there. Rounding is kept from leading out of that place: then the plays
-   that follow are those that will. */
+static void two_branches_write_place(two_branches_place_t *p, two_branches_real_t anchor_output, two_branches_real_t next_output,
+                                two_branches_real_t anchor, two_branches_real_t next, unsigned int k, unsigned int depth,
+                                bool rising)
+{
+    p->anchor_output = anchor_output;
+    p->next_output = next_output;
+    p->anchor = anchor;
+    p->next = next;
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+}
+
+/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. Rounding is
+   kept from leading out of that place: then the plays that follow are those that will; *room is false where it is too
+   narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
 static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, const two_branches_corner_t *corner,
                                                 unsigned int start, unsigned int depth, unsigned int k,
-                                                two_branches_real_t output, two_branches_place_t *p)
+                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
+                                                bool *room)
 {
     unsigned int end;
     const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, output, true);
@@ -668,6 +775,8 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
     two_branches_real_t level;
     two_branches_real_t next;
     two_branches_real_t next_level;
+    const two_branches_real_t *r = &t->threshold[k];
+    const two_branches_real_t last = r[-1];
     if (left > 0) {
         const two_branches_corner_t *c = &corner[left - 1];
         const two_branches_real_t e = c->extremum;
@@ -678,15 +787,14 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
             next_level = level;
         } else {
             const two_branches_real_t y = c->pass[0]; /* with its sign changed */
-            const two_branches_real_t *r = &t->threshold[k];
             const two_branches_real_t *z = &t->start_level[k];
             if (c->side != 0) {
-                first = e + (r[-1] + r[-1]);
+                first = e + (last + last);
                 level = (z[-1] + z[-1]) - y;
                 next = e + (r[0] + r[0]);
                 next_level = (z[0] + z[0]) - y;
             } else {
-                first = e + r[-1];
+                first = e + last;
                 level = z[-1] - y;
                 next = e + r[0];
                 next_level = z[0] - y;
@@ -698,32 +806,35 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
         next = FLT_MAX;
         next_level = FLT_MAX;
     }
-    p->anchor_output = level;
-    p->next_output = next_level;
-    p->anchor = first;
-    p->next = next;
-    p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)left;
-    p->rising = true;
     w = first + (output - level) * t->inverse_slope[k];
     if (w > next) {
-        return next;
+        w = next;
+    } else {
+        two_branches_real_t least = first;
+        if (k == end) { /* the last one taken along was held by a corner that was left */
+            least = two_branches_from(corner[left].extremum, corner[left].side, last, true);
+        }
+        if (w < least && k > 1) { /* later answers of the same move must not lie before this one */
+            if (!(least > from)) {
+                return from;
+            }
+            two_branches_write_place(p, output, next_level, least, next, k, left, true);
+            *room = !(least > next);
+            return least;
+        }
     }
-    if (k == end) { /* the last one taken along was held by a corner that was left */
-        first = two_branches_activation(t, &corner[left], k - 1, true);
+    if (!(w > from)) {
+        return from;
     }
-    if (w < first && k > 1) {
-        p->anchor = first; /* so that later answers of the same move do not lie before this one */
-        p->anchor_output = output;
-        return first;
-    }
+    two_branches_write_place(p, level, next_level, first, next, k, left, true);
     return w;
 }
 
 /* The same for a falling move. */
 static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, const two_branches_corner_t *corner,
                                                 unsigned int start, unsigned int depth, unsigned int k,
-                                                two_branches_real_t output, two_branches_place_t *p)
+                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
+                                                bool *room)
 {
     unsigned int end;
     const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, -output, false);
@@ -732,6 +843,8 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
     two_branches_real_t level;
     two_branches_real_t next;
     two_branches_real_t next_level;
+    const two_branches_real_t *r = &t->threshold[k];
+    const two_branches_real_t last = r[-1];
     if (left > 0) {
         const two_branches_corner_t *c = &corner[left - 1];
         const two_branches_real_t e = c->extremum;
@@ -742,15 +855,14 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
             next_level = level;
         } else {
             const two_branches_real_t y = c->pass[1];
-            const two_branches_real_t *r = &t->threshold[k];
             const two_branches_real_t *z = &t->start_level[k];
             if (c->side != 0) {
-                first = e - (r[-1] + r[-1]);
+                first = e - (last + last);
                 level = y - (z[-1] + z[-1]);
                 next = e - (r[0] + r[0]);
                 next_level = y - (z[0] + z[0]);
             } else {
-                first = e - r[-1];
+                first = e - last;
                 level = y - z[-1];
                 next = e - r[0];
                 next_level = y - z[0];
@@ -762,25 +874,27 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
         next = -FLT_MAX;
         next_level = -FLT_MAX;
     }
-    p->anchor_output = level;
-    p->next_output = next_level;
-    p->anchor = first;
-    p->next = next;
-    p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)left;
-    p->rising = false;
     w = first + (output - level) * t->inverse_slope[k];
     if (w < next) {
-        return next;
+        w = next;
+    } else {
+        two_branches_real_t least = first;
+        if (k == end) { /* the last one taken along was held by a corner that was left */
+            least = two_branches_from(corner[left].extremum, corner[left].side, last, false);
+        }
+        if (w > least && k > 1) { /* later answers of the same move must not lie before this one */
+            if (!(least < from)) {
+                return from;
+            }
+            two_branches_write_place(p, output, next_level, least, next, k, left, false);
+            *room = !(least < next);
+            return least;
+        }
     }
-    if (k == end) { /* the last one taken along was held by a corner that was left */
-        first = two_branches_activation(t, &corner[left], k - 1, false);
+    if (!(w < from)) {
+        return from;
     }
-    if (w > first && k > 1) {
-        p->anchor = first; /* so that later answers of the same move do not lie before this one */
-        p->anchor_output = output;
-        return first;
-    }
+    two_branches_write_place(p, level, next_level, first, next, k, left, false);
     return w;
 }
 
@@ -820,17 +934,14 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
     unsigned int depth;
     unsigned int k;
     bool rising;
+    bool room;
     two_branches_real_t w;
     if (!two_branches_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    w = rising ? two_branches_corners_rise(t, corner, m->start, depth, k, output, &m->there)
-               : two_branches_corners_fall(t, corner, m->start, depth, k, output, &m->there);
-    if (!two_branches_past(w, m->w, rising)) { /* rounding is kept from leading back */
-        m->there.k = 0;
-        return m->w;
-    }
-    return w;
+    m->there.k = 0;
+    return rising ? two_branches_corners_rise(t, corner, m->start, depth, k, m->w, output, &m->there, &room)
+                  : two_branches_corners_fall(t, corner, m->start, depth, k, m->w, output, &m->there, &room);
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
@@ -955,6 +1066,15 @@ static two_branches_real_t two_branches_inverse_choose(const two_branches_invers
     return two_branches_inverse_fits(self, v, !up) ? v : self->applied;
 }
 
+/* The next step takes drive v into the memory; where that leads is looked up now, when there is nothing else to do. */
+static void two_branches_inverse_expect(two_branches_inverse_t *self, two_branches_real_t v)
+{
+    self->pending = v;
+    self->has_pending = true;
+    two_branches_corners_foretell(&two_branches_tables, &self->memory, self->corner, two_branches_front(v, v > self->applied ? true : v < self->applied ? false : self->ascending));
+    self->memory.told = true;
+}
+
 /* Answers with the drive for w on the branch of its own move, and with the status it has. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that not all that it needs is on the stack at once */
@@ -991,7 +1111,8 @@ static two_branches_real_t two_branches_inverse_look(two_branches_inverse_t *sel
     if (!(u >= TWO_BRANCHES_OUTPUT_MIN && u <= TWO_BRANCHES_OUTPUT_MAX)) {
         if (!two_branches_finite(u)) {
             self->status |= TWO_BRANCHES_STATUS_HELD;
-            return two_branches_inverse_answer(self, self->stepped ? self->answer : two_branches_clamp_drive(self->applied));
+            two_branches_inverse_expect(self, self->stepped ? self->answer : two_branches_clamp_drive(self->applied));
+            return two_branches_inverse_answer(self, self->pending);
         }
         u = u < TWO_BRANCHES_OUTPUT_MIN ? TWO_BRANCHES_OUTPUT_MIN : TWO_BRANCHES_OUTPUT_MAX;
         bits = TWO_BRANCHES_STATUS_INPUT_CLAMPED;
@@ -1018,16 +1139,17 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
 
 void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real_t applied)
 {
+    two_branches_real_t v;
     if (!two_branches_finite(applied)) {
         self->status |= TWO_BRANCHES_STATUS_HELD;
         return;
     }
-    self->pending = two_branches_clamp_drive(applied);
-    if (self->pending < applied || self->pending > applied) {
+    v = two_branches_clamp_drive(applied);
+    if (v < applied || v > applied) {
         self->status |= TWO_BRANCHES_STATUS_INPUT_CLAMPED;
     }
-    self->has_pending = true;
     self->repeat = false;
+    two_branches_inverse_expect(self, v);
 }
 
 void two_branches_inverse_init(two_branches_inverse_t *self)
