@@ -165,6 +165,15 @@ class Effect(BaseModel):
         """Whether it says how the plays move."""
         return cls.plays is not Effect.plays
 
+    def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """PLAYS: sum (N,) of the plays with weights `p`, in which those of weight 0 need not move."""
+        return operators.play_sum(w, thresholds, start, p)
+
+    @classmethod
+    def bends_plays(cls) -> bool:
+        """Whether it says what becomes of their rows."""
+        return cls.bent is not Effect.bent
+
     def bent(self, rows: Array, thresholds: Array) -> Array:
         """PLAYS: what becomes of the plays' rows (n+1, N) before the weights sum them."""
         return rows
