@@ -109,8 +109,8 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         return 0.0, duration - taken if taken < duration else 0.0
     left = duration
     step = left
+    fall = scale / tau * (e / scale) ** exponent
     for _ in range(MOST_PIECES):
-        fall = scale / tau * (e / scale) ** exponent
         if not fall < 1e200:
             return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
@@ -121,6 +121,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
                 return e + speed * left, 0.0
             e = little
             left -= taken
+            fall = scale / tau * (e / scale) ** exponent
             continue
         if not e > 0.0:
             return 0.0, left if speed < 0.0 else 0.0
@@ -150,6 +151,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if left <= 1e-12 * duration or not e > 0.0:
             break
         step *= 4.0
+        fall = scale / tau * (e / scale) ** exponent
     return e, 0.0
 
 
@@ -194,3 +196,15 @@ COMPILED: list[Callable[..., Any]] = [follow, creep, limit, ring, dilated_play, 
 def code() -> Any:
     """The compiled recursions."""
     return compiled.compile_together(COMPILED)
+
+
+def load() -> None:
+    """Have them compiled, or read from the cache, by running each of them on two samples."""
+    u, step, table, state = np.arange(2.0), np.ones(1), np.ones((1, 1)), np.ones((1, 1))
+    run, out = code(), np.empty(2)
+    run.follow(u, step, step, step, 0.0, out)
+    run.creep(u[:, None], table, table, table, step, state, out[:, None])
+    run.limit(u, step, step, out)
+    run.ring(u, step, step, step, step, 1.0, out)
+    run.dilated_play(u, u, 1.0, 1.0, 0.0, out)
+    run.relaxing_play(u, step, 1.0, 1.0, 1.0, 1.0, 0.0, out)
