@@ -215,7 +215,7 @@ class Actuator:
             return chain.summed(self.at(Place.PLAYS), p, *self._input(item))
         moved = item.recalled((self._moving, self._bending))
         if moved is None and (moved := item.recalled((self._moving, ()))) is not None:
-            moved = chain.bent(self._bending, moved, self.thresholds)  # not worth remembering: numbers tried once
+            return chain.bent_sum(self._bending, p, moved, self.thresholds)  # of numbers that are tried once
         return p @ (self._plays(item) if moved is None else moved)
 
     @cached_property

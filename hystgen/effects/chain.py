@@ -193,6 +193,14 @@ def bent(effects: Sequence[Effect], rows: Array, thresholds: Array) -> Array:
     return rows
 
 
+def bent_sum(effects: Sequence[Effect], p: Array, rows: Array, thresholds: Array) -> Array:
+    """The weighted sum (N,) of the rows of `bent`."""
+    *first, last = (effect for effect in effects if effect.bends_plays())
+    if type(last).bent_sum is Effect.bent_sum:
+        return np.asarray(p @ bent(effects, rows, thresholds))
+    return last.bent_sum(p, bent(first, rows, thresholds), thresholds)
+
+
 def summed(effects: Sequence[Effect], p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
     """The weighted sum (N,) of the rows of `moved`."""
     mover = _mover(effects)

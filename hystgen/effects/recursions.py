@@ -33,25 +33,19 @@ def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Arr
 
 
 def creep(
-    u: Array, decay: Array, early: Array, late: Array, weight: Array, state: Array, total: Array
+    u: Array, decay: Array, early: Array, late: Array, weight: float, state: Array, total: Array
 ) -> None:
-    """Weighted sum of first-order filters from `state` (m, R), each of every column of `u` (N, R); factors (m, N - 1).
+    """Add `weight` times the first-order filter of every column of `u` (N, R), from `state` (R,), to `total`.
 
-    Filters and columns side by side, since each by itself waits for its own last sample.
+    Columns side by side, since each by itself waits for its own last sample.
     """
     for i in range(u.shape[1]):
-        total[0, i] = 0.0
-        for j in range(len(weight)):
-            total[0, i] += weight[j] * state[j, i]
+        total[0, i] += weight * state[i]
     for k in range(len(u) - 1):
         for i in range(u.shape[1]):
-            total[k + 1, i] = 0.0
-        for j in range(len(weight)):
-            d, b, c, w = decay[j, k], early[j, k], late[j, k], weight[j]
-            for i in range(u.shape[1]):
-                x = d * state[j, i] + b * u[k, i] + c * u[k + 1, i]
-                state[j, i] = x
-                total[k + 1, i] += w * x
+            x = decay[k] * state[i] + early[k] * u[k, i] + late[k] * u[k + 1, i]
+            state[i] = x
+            total[k + 1, i] += weight * x
 
 
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
@@ -200,10 +194,10 @@ def code() -> Any:
 
 def load() -> None:
     """Have them compiled, or read from the cache, by running each of them on two samples."""
-    u, step, table, state = np.arange(2.0), np.ones(1), np.ones((1, 1)), np.ones((1, 1))
+    u, step = np.arange(2.0), np.ones(1)
     run, out = code(), np.empty(2)
     run.follow(u, step, step, step, 0.0, out)
-    run.creep(u[:, None], table, table, table, step, state, out[:, None])
+    run.creep(u[:, None], step, step, step, 1.0, np.ones(1), out[:, None])
     run.limit(u, step, step, out)
     run.ring(u, step, step, step, step, 1.0, out)
     run.dilated_play(u, u, 1.0, 1.0, 0.0, out)

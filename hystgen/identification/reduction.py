@@ -8,6 +8,7 @@ The column of ones stands first: what is left below its row is the system with t
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -206,7 +207,13 @@ def reflected(table: Array) -> Reflected:
     if not len(table):
         return Reflected(table, table, np.empty(0))
     found, factors, _, _ = lapack.dgeqrf(table, lwork=BLOCKED * table.shape[1], overwrite_a=1)
-    return Reflected(np.triu(found[: table.shape[1]]), found, factors)
+    return Reflected(np.where(_upper(table.shape[1])[: len(found)], found[: table.shape[1]], 0.0), found, factors)
+
+
+@functools.cache
+def _upper(size: int) -> NDArray[np.bool_]:
+    """Where a triangular factor has its numbers."""
+    return np.triu(np.ones((size, size), dtype=bool))
 
 
 def _without_offset(triangle: Array) -> Array:
