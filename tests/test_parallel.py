@@ -95,8 +95,8 @@ class TestInterrupt:
     def test_ends_all_processes_and_is_told_once(self, to_all: bool) -> None:
         program = there("""
             def work(k):
-                print(os.getpid(), flush=True)
-                time.sleep(60)
+                os.write(1, b"%d\\n" % os.getpid())
+                time.sleep(30)
         """)
         with subprocess.Popen([sys.executable, "-c", program], cwd=HERE, stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, text=True, start_new_session=True) as began:  # fmt: skip
