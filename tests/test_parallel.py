@@ -98,8 +98,10 @@ class TestInterrupt:
                 os.write(1, b"%d\\n" % os.getpid())
                 time.sleep(30)
         """)
-        with subprocess.Popen([sys.executable, "-c", program], cwd=HERE, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, start_new_session=True) as began:  # fmt: skip
+        with subprocess.Popen(
+            [sys.executable, "-c", program], cwd=HERE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        ) as began:  # fmt: skip
             assert began.stdout is not None
             copies = [int(began.stdout.readline()) for _ in range(2)]
             (os.killpg if to_all else os.kill)(began.pid, signal.SIGINT)
