@@ -36,6 +36,22 @@ def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
         _play_into(v, r[i], states[i], out[i])
 
 
+def _play_sum_into(v: Array, r: Array, states: Array, p: Array, out: Array) -> None:
+    for k in range(len(v)):
+        out[k] = 0.0
+    for i in range(len(r)):
+        if p[i] != 0.0:
+            state = states[i]
+            for k in range(len(v)):
+                low = v[k] - r[i]
+                high = v[k] + r[i]
+                if state > high:
+                    state = high
+                if state < low:
+                    state = low
+                out[k] += p[i] * state
+
+
 def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) -> None:
     for k in range(len(v)):
         state = state + (v[k] - previous)  # a repeated sample adds nothing
@@ -47,7 +63,7 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _stop_into]
+COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _play_sum_into, _stop_into]
 
 
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
@@ -76,6 +92,14 @@ def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
     states = np.full(r.shape, start, dtype=np.float64)
     out = np.empty((len(r), len(signal)))
     compiled.operators()._plays_into(signal, r, states, out)
+    return out
+
+
+def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array:
+    """`weights @ plays(v, thresholds, start)`, without the plays of weight 0."""
+    signal = samples(v)
+    out = np.empty_like(signal)
+    compiled.operators()._play_sum_into(signal, thresholds, start, weights, out)
     return out
 
 

@@ -10,6 +10,10 @@ from typing import Any
 PATIENCE = 1.0
 """Seconds before the bar appears."""
 
+OFTEN = 0.1
+"""Seconds between two pictures of it; drawn by `tick`, since a thread of the bar's own would forbid copies of the
+process (`parallel`)."""
+
 
 class Progress:
     """Context manager; `tick` counts work, in the unit of `total`, under a `title`.
@@ -22,7 +26,7 @@ class Progress:
         self._shown = shown and sys.stderr.isatty()
         self._title = title
         self._done = 0.0
-        self._began = time.monotonic()
+        self._next = time.monotonic() + PATIENCE
         self._bar: Any = None
         self._task: Any = None
 
@@ -38,13 +42,15 @@ class Progress:
     def tick(self, work: float) -> None:
         """So much more is done."""
         self._done += work
-        if not self._shown or time.monotonic() - self._began < PATIENCE:
+        now = time.monotonic()
+        if not self._shown or now < self._next:
             return
+        self._next = now + OFTEN
         if self._bar is None:
             from rich.console import Console
             from rich.progress import Progress as Bar
 
-            self._bar = Bar(console=Console(stderr=True), transient=True)
+            self._bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
             self._bar.start()
             self._task = self._bar.add_task(self._title, total=self._total or None)
-        self._bar.update(self._task, completed=self._done)
+        self._bar.update(self._task, completed=self._done, refresh=True)

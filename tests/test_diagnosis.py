@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,11 +18,13 @@ from numpy.typing import NDArray
 from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
+from hystgen import parallel
 from hystgen.diagnosis import floor, options, selection
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import Run
 from hystgen.identification.fronts import Bent, DeadZones, Ends
 from hystgen.records import Record
+from tests.plants import run as plants_run
 from tests.plants.__main__ import main as plants
 
 Array = NDArray[np.float64]
@@ -108,6 +114,41 @@ class TestBlindPlants:
 
 
 @pytest.mark.data
+class TestSeveralProcesses:
+    @pytest.fixture
+    def case(self, tmp_path: Path) -> Path:
+        (case, _), = made(tmp_path, "single", 1)
+        return case
+
+    def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(selection, "LARGE", 0)
+        found = []
+        for cores in (1, 3):
+            monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
+            found.append(diagnosed(case))
+        assert json.dumps(found[0]) == json.dumps(found[1])
+
+    @pytest.mark.parametrize("forks", [2, 4])
+    def test_an_interrupt_leaves_nothing(self, case: Path, forks: int) -> None:
+        program = (
+            "import os, sys; from hystgen import cli, parallel; from hystgen.diagnosis import selection; "
+            "selection.LARGE = 0; parallel.cores = lambda: 2; "
+            "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
+        )
+        with subprocess.Popen(
+            [sys.executable, "-c", program, *plants_run.arguments(case)], cwd=case, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True, start_new_session=True,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+            env={**os.environ, "PYTHONPATH": str(Path(hystgen.__file__).parents[1])},
+        ) as began:  # fmt: skip
+            assert began.stdout is not None
+            assert [began.stdout.readline() for _ in range(forks)] == forks * ["forked\n"]
+            os.killpg(began.pid, signal.SIGINT)
+            _, said = began.communicate(timeout=30)
+        assert (began.returncode, said) == (1, "\nAborted!\n")
+        assert not (case / "out").exists()
+
+
 def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
     """Fitted on the sine, held out on the fades: half a percent of range or better, and the amplifier's lag by name,
     which takes a second effect to show: alone, rate dependence explains more."""

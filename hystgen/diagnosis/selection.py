@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import parallel
 from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Structure
+from hystgen.effects import recursions
 from hystgen.effects.base import About, Effect
 from hystgen.identification.fronts import Kept
 from hystgen.identification.uncertainty import correlation_time
@@ -59,6 +61,9 @@ SIMPLER = 0.05
 
 EXCHANGE = 0.05
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
+
+LARGE = 20_000
+"""Samples to fit from which on the options are tried in several processes; of fewer it takes a few seconds at most."""
 
 AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
 """A held-out error within this factor of the noise leaves nothing that would be enough for a name."""
@@ -131,6 +136,7 @@ class _Records:
     user: Sequence[type[Effect]]
     noise: float
     tick: Callable[[], None]
+    jobs: int
 
     def extensions(self, now: Fitted, like: Sequence[Tried] = ()) -> list[Tried]:
         """One effect more, the best shapes of all, the best one first; `like`: of those that were followed up there."""
@@ -144,6 +150,16 @@ class _Records:
     def left(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
         return fits.rms(fitted.errors(self.held))
+
+
+def _jobs(to_fit: Sequence[Item]) -> int:
+    """Processes that are worth it; what each would compile or read from a cache is there before they begin."""
+    if sum(len(item.run.t) for item in to_fit) < LARGE:
+        return 1
+    jobs = parallel.cores()
+    if jobs > 1:
+        recursions.load()
+    return jobs
 
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
@@ -171,6 +187,7 @@ def select(
         user,
         noise,
         tick,
+        _jobs(to_fit),
     )
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
@@ -278,11 +295,7 @@ def _found(step: _Step, records: _Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    from hystgen.identification import weights
-
-    ones = np.ones(len(base.thresholds))
-    system = fits.linear(base, to_fit, start, ones).system.whole
-    return weights.non_negative(system, np.arange(len(ones)))
+    return fits.linear(base, to_fit, start, np.ones(len(base.thresholds))).best
 
 
 def _alike(other: Tried, best: Tried, noise: float) -> bool:
@@ -305,22 +318,22 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
     simpler: dict[str, _Screened] = {}
 
-    def begin(option: Option) -> _Screened:
-        records.tick()
+    def begin(option: Option) -> Fitted:
         starts = list(option.starts)
         if option.grown is not None:
             starts.append(option.grown(simpler[option.beyond].fitted.shape))
         begun = [fits.fit(option.alone, records.thin, start, now.weights, FIRST_STEPS) for start in starts]
         best = min(begun, key=lambda each: each.rms)
-        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
-        left = fits.rms(fitted.errors(records.thin_held)) if math.isfinite(fitted.rms) else math.inf
-        return _Screened(option, fitted, left)
+        return fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
 
-    tried = [begin(option) for option in found if not option.beyond]
+    def begun(some: Sequence[Option]) -> list[_Screened]:
+        return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
+
+    tried = begun([option for option in found if not option.beyond])
     for each in tried:
         if any(left < (1.0 - SHARE) * b for left, b in zip((each.fitted.rms, each.left), without, strict=True)):
             simpler[each.option.label] = each
-    tried += [begin(option) for option in found if option.beyond in simpler]
+    tried += begun([option for option in found if option.beyond in simpler])
     tried = [each for each in tried if math.isfinite(each.left)]
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)
@@ -333,20 +346,48 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     return [(each.option, each.fitted) for each in kept]
 
 
+def _each(
+    found: Sequence[Option], structures: Sequence[Structure], search: Callable[[int], Fitted], held: Sequence[Item],
+    records: _Records,
+) -> list[_Screened]:
+    """What a search finds for each option, counted by its number, and its rms error on some records.
+
+    In several processes, from which only numbers come: what builds an effect of them cannot be sent.
+    """
+
+    def numbers(k: int) -> tuple[Array, Array, float, float]:
+        fitted = search(k)
+        left = fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
+        return fitted.shape, fitted.weights, fitted.rms, left
+
+    done = parallel.each(numbers, range(len(found)), records.jobs, records.tick)
+    return [
+        _Screened(option, Fitted(structure, shape, p, rms), left)
+        for option, structure, (shape, p, rms, left) in zip(found, structures, done, strict=True)
+    ]
+
+
 def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _Records) -> list[Tried]:
     """The options fitted to everything and run over the held-out records, the best one first."""
-    begun = []
-    for option, screened in kept:
-        records.tick()
+    whole = [option.structure for option, _ in kept]
+
+    def begin(k: int) -> Fitted:
+        option, screened = kept[k]
         shape = option.joined(now, screened.shape)
-        fitted = fits.fit(option.structure, records.to_fit, shape, screened.weights, JOINT_STEPS)
-        begun.append(_Screened(option, fitted, records.left(fitted)))
+        return fits.fit(option.structure, records.to_fit, shape, screened.weights, JOINT_STEPS)
+
+    def go_on(k: int) -> Fitted:
+        fitted = begun[k].fitted
+        if begun[k].left > hopeful:
+            return fitted
+        return fits.fit(fitted.structure, records.to_fit, fitted.shape, fitted.weights)
+
+    followed = [option for option, _ in kept]
+    begun = _each(followed, whole, begin, records.held, records)
     hopeful = HOPEFUL * min((each.left for each in begun), default=0.0)
     tried = []
-    for each in begun:
+    for each in _each(followed, whole, go_on, records.held, records):
         option, fitted = each.option, each.fitted
-        if each.left <= hopeful:
-            fitted = fits.fit(option.structure, records.to_fit, fitted.shape, fitted.weights)
         if fitted.rms >= now.rms:
             continue
         errors = fitted.errors(records.held)

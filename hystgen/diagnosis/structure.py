@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,13 @@ from hystgen.identification import joint, reduction, weights
 from hystgen.identification.constrained import root_mean_square
 from hystgen.identification.fronts import Front, Kept
 from hystgen.identification.joint import DIFFERENCE, Shaped
+from hystgen.identification.reduction import Reduced
 from hystgen.models import Stage
 
 Array = NDArray[np.float64]
+Samples = slice | NDArray[np.intp]
 
+ALL = slice(None)
 
 REMEMBERED, MOST_BYTES = 3, 2**28
 """Movements of the plays that are remembered for a record, and the size of one that is."""
@@ -49,10 +53,19 @@ class Item:
     part: slice = field(default_factory=lambda: slice(None))
     moved: dict[object, Array] = field(default_factory=dict, repr=False, compare=False)
 
-    @property
+    @cached_property
     def known(self) -> NDArray[np.bool_]:
         """The samples that are compared."""
         return np.isfinite(self.y)
+
+    @cached_property
+    def compared(self) -> Samples:
+        """Where these are: a slice if they are evenly spread, since that picks without a copy."""
+        found = np.flatnonzero(self.known)
+        steps = np.diff(found)
+        if not len(steps) or np.any(steps != steps[0]):
+            return found
+        return slice(int(found[0]), int(found[-1]) + 1, int(steps[0]))
 
     def thinned(self, every: int) -> Item:
         """The same with one in so many samples compared."""
@@ -61,6 +74,20 @@ class Item:
         y = np.full_like(self.y, np.nan)
         y[::every] = self.y[::every]
         return replace(self, y=y)
+
+    def recalled(self, by: object) -> Array | None:
+        """How the plays moved by this, if that is remembered."""
+        if by not in self.moved:
+            return None
+        self.moved[by] = plays = self.moved.pop(by)  # the latest one comes last
+        return plays
+
+    def remember(self, by: object, plays: Array) -> None:
+        """Remember how the plays moved, in place of what was asked for least lately."""
+        while len(self.moved) >= REMEMBERED:
+            del self.moved[next(iter(self.moved))]
+        if plays.nbytes <= MOST_BYTES:
+            self.moved[by] = plays
 
 
 @dataclass(frozen=True)
@@ -143,50 +170,74 @@ class Actuator:
         """The effects at one place of the chain, in its order."""
         return sorted((e for e in self.effects if e.place is place), key=lambda e: e.order)
 
-    def columns(self, item: Item, p: Array | None = None) -> tuple[Array, Array]:
+    def columns(self, item: Item, p: Array | None = None, at: Samples = ALL) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and what is added to them without a weight.
 
-        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once.
+        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once. `at`: which samples.
         """
         run = item.run
-        plays = self._plays(item)
-        rows = plays if p is None else (p @ plays)[None, :]
-        constant = np.zeros(plays.shape[1])
+        rows = self._plays(item) if p is None else self._summed(item, p)[None, :]
+        constant = np.zeros(rows.shape[1])
         linear = self.at(Place.LINEAR)
         for effect in linear:
             if effect.order == 0:
                 rows = effect.filtered(rows, run)
+        behind = [effect for effect in linear if effect.order > 0]
+        now = ALL if behind else at  # without a filter behind it, a gain is needed at these samples alone
+        rows, constant = rows[:, now], constant[now]
         whole = item.session or run
         for effect in self.at(Place.GAIN):
             if (id(effect), id(whole)) not in self.gains:
                 self.gains[id(effect), id(whole)] = effect.gain(whole), effect.offset(whole)
-            gain, offset = (values[item.part] for values in self.gains[id(effect), id(whole)])
+            gain, offset = (values[item.part][now] for values in self.gains[id(effect), id(whole)])
             rows, constant = rows * gain, constant * gain + offset
-        for effect in linear:
-            if effect.order > 0:
-                rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
-        return rows, constant
+        for effect in behind:
+            rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
+        return (rows[:, at], constant[at]) if behind else (rows, constant)
 
     def _plays(self, item: Item) -> Array:
         """(n + 1, N) plays along the record; those of the last few hypotheses are remembered."""
-        before, memory = tuple(self.at(Place.DRIVE)), tuple(self.at(Place.PLAYS))
-        key = (self.thresholds.tobytes(), before, self.stages, memory)
-        if key in item.moved:
-            item.moved[key] = plays = item.moved.pop(key)  # the latest one comes last
-            return plays
+        found = item.recalled((self._moving, self._bending))
+        if found is not None:
+            return found
+        plays = item.recalled((self._moving, ()))
+        if plays is None:
+            plays = chain.moved(self.at(Place.PLAYS), *self._input(item))
+            item.remember((self._moving, ()), plays)
+        if self._bending:
+            plays = chain.bent(self._bending, plays, self.thresholds)
+            item.remember((self._moving, self._bending), plays)
+        return plays
+
+    def _summed(self, item: Item, p: Array) -> Array:
+        """(N,) weighted sum of the plays; those without a weight need not move for it."""
+        if not self._bending and item.recalled((self._moving, ())) is None:
+            return chain.summed(self.at(Place.PLAYS), p, *self._input(item))
+        moved = item.recalled((self._moving, self._bending))
+        if moved is None and (moved := item.recalled((self._moving, ()))) is not None:
+            return chain.bent_sum(self._bending, p, moved, self.thresholds)  # of numbers that are tried once
+        return p @ (self._plays(item) if moved is None else moved)
+
+    @cached_property
+    def _bending(self) -> tuple[Effect, ...]:
+        """The effects that bend the plays."""
+        return tuple(effect for effect in self.at(Place.PLAYS) if effect.bends_plays())
+
+    @cached_property
+    def _moving(self) -> object:
+        """All that the plays' movement depends on, of one record."""
+        movers = tuple(effect for effect in self.at(Place.PLAYS) if effect.moves_plays())
+        return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, movers
+
+    def _input(self, item: Item) -> tuple[Array, Run, Array, Array]:
+        """What the plays follow, with their thresholds and where they start."""
         a = item.run.v
-        for effect in before:
+        for effect in self.at(Place.DRIVE):
             a = effect.drive(a, item.run)
         course = reduction.Course(item.name, a, a, item.history, 0, len(a), 0.0)
         course = joint.through_front(course, self.stages)
-        w = course.v
-        start = reduction.start_states(w, course.history, self.thresholds)
-        plays = chain.plays(memory, w, item.run, self.thresholds, start)
-        while len(item.moved) >= REMEMBERED:
-            del item.moved[next(iter(item.moved))]
-        if plays.nbytes <= MOST_BYTES:
-            item.moved[key] = plays
-        return plays
+        start = reduction.start_states(course.v, course.history, self.thresholds)
+        return course.v, item.run, self.thresholds, start
 
     def mapped(self, h: Array, level: float, item: Item) -> Array:
         """The output behind its maps, a limit in front of the offset and a sensor behind it; the offset is `level`."""
@@ -202,15 +253,17 @@ class Actuator:
 
     def level(self, h: Array, item: Item) -> tuple[float, Array]:
         """The best offset in front of a sensor and behind a limit, and how the output changes with it (N,)."""
-        known = item.known
-        level = float(np.mean((item.y - h)[known]))
+        known = item.compared
+        y = item.y[known]
+        level = float(np.mean(y - h[known]))
         step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
         for _ in range(SETTLED):
             bent = self.mapped(h, level, item)
             moved = (self.mapped(h, level + step, item) - bent) / step
-            if not np.any(moved[known]):
+            slope = moved[known]
+            if not np.any(slope):
                 break
-            level += float(moved[known] @ (item.y - bent)[known] / (moved[known] @ moved[known]))
+            level += float(slope @ (y - bent[known]) / (slope @ slope))
         return level, moved
 
     def added(self, item: Item) -> Array:
@@ -254,53 +307,95 @@ class Actuator:
         return np.asarray(e)
 
 
+class _Block:
+    """A record's part of the system about a shape and weights: plays and measured output, reduced; derivatives later.
+
+    The reflections of the reduction are kept, so that the columns of the derivatives are reduced alone.
+    """
+
+    def __init__(self, here: Actuator, item: Item, p: Array) -> None:
+        self._item, self._p = item, p
+        self._level = 0.0
+        at, offset = item.compared, None
+        if here.bends:
+            rows, constant = here.columns(item)
+            h = p @ rows + constant
+            self._level, offset = here.level(h, item)
+            bent = here.mapped(h, self._level, item)
+            step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
+            rows = rows[:, at] * ((here.mapped(h + step, self._level, item) - bent) / step)[at]
+            h = bent[at]
+            target = item.y[at] - h + p @ rows
+        else:
+            rows, constant = here.columns(item, at=at)
+            h = p @ rows + constant
+            target = item.y[at] - constant
+        added = here.added(item)[at]
+        self._sum = h + added
+        self.samples = len(h)
+        free = here.nuisances(item, offset)[:, at]
+        self._free = len(free)
+        table = np.empty((len(free) + len(rows) + 1, len(h))).T
+        table[:, : len(free)] = free.T
+        table[:, len(free) : -1] = rows.T
+        table[:, -1] = target - added
+        self._reduced = [reduction.reflected(part) for part in self._cut(table)]
+
+    def _cut(self, table: Array) -> list[Array]:
+        """A few thousand samples at a time, which stay in the cache while they are reduced."""
+        if len(table) <= reduction.CHUNK:
+            return [table]
+        return [table[k : k + reduction.CHUNK] for k in range(0, len(table), reduction.CHUNK)]
+
+    def system(self, varied: Sequence[Actuator] = ()) -> Array:
+        """Triangular: the plays, the measured output, and the derivatives; what is free in the record is taken out."""
+        if not varied:
+            return self._without_free([part.triangle for part in self._reduced])
+        table = np.empty((len(varied), self.samples)).T
+        for j, other in enumerate(varied):
+            table[:, j] = (self._of(other) - self._sum) / DIFFERENCE
+        parts = zip(self._reduced, self._cut(table), strict=True)
+        return self._without_free([part.extended(columns) for part, columns in parts])
+
+    def _of(self, other: Actuator) -> Array:
+        """What other numbers predict, with the same weights and offset."""
+        item, at = self._item, self._item.compared
+        if other.bends:
+            rows, constant = other.columns(item, self._p)
+            moved = other.mapped(rows[0] + constant, self._level, item)[at]
+        else:
+            rows, constant = other.columns(item, self._p, at)
+            moved = rows[0] + constant
+        return moved + other.added(item)[at]
+
+    def _without_free(self, triangles: Sequence[Array]) -> Array:
+        whole = triangles[0] if len(triangles) == 1 else reduction.triangle(*triangles)
+        return whole[self._free :, self._free :]
+
+
 def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) -> Shaped:
     """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
-    n1, m = len(structure.thresholds), len(shape)
+    n1 = len(structure.thresholds)
     here = structure.actuator(shape)
-    varied = []
-    for j in range(m):
-        one = shape.copy()
-        one[j] += DIFFERENCE
-        varied.append(structure.actuator(one))
-    whole: Array = np.empty((0, n1 + m + 1))
-    samples = 0
-    for item in items:
-        known = item.known
-        if not known.any():
-            continue
-        rows, constant = here.columns(item)
-        h = p @ rows + constant
-        slope: Array | float = 1.0
-        level, offset = 0.0, None
-        target = item.y - constant
-        if here.bends:
-            level, offset = here.level(h, item)
-            bent = here.mapped(h, level, item)
-            step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
-            slope = (here.mapped(h + step, level, item) - bent) / step
-            target = item.y - bent + slope * (p @ rows)
-            h = bent
-        added = here.added(item)
-        target = target - added
-        differences = np.empty((m, len(h)))
-        for j, other in enumerate(varied):
-            row, const = other.columns(item, p)
-            moved = row[0] + const
-            if other.bends:
-                moved = other.mapped(moved, level, item)
-            differences[j] = (moved + other.added(item) - h - added) / DIFFERENCE
-        free = here.nuisances(item, offset)
-        table = np.concatenate([free, rows * slope, differences, target[None, :]])[:, known].T
-        block = np.asarray(np.linalg.qr(table, mode="r"))[len(free) :, len(free) :]
-        whole = np.asarray(np.linalg.qr(np.concatenate([whole, block]), mode="r"))
-        samples += int(np.count_nonzero(known))
-    system = reduction.Reduced(structure.thresholds, whole, (), (samples,))
+    blocks = [_Block(here, item, p) for item in items if item.known.any()]
+    samples = sum(block.samples for block in blocks)
+
+    def derived() -> Reduced:
+        varied = []
+        for j in range(len(shape)):
+            one = shape.copy()
+            one[j] += DIFFERENCE
+            varied.append(structure.actuator(one))
+        whole = reduction.triangle(*(block.system(varied) for block in blocks))
+        measured_last = [*range(n1), *range(n1 + 1, whole.shape[1]), n1]
+        return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))
+
+    whole = reduction.triangle(*(block.system() for block in blocks))
     if not np.isfinite(whole).all():  # numbers far from what the records are like
-        return Shaped(shape, p, math.inf, system)
+        return Shaped(shape, p, math.inf, p, samples, derived)
     columns = np.arange(n1)
     best = weights.non_negative(whole, columns)
-    return Shaped(shape, p, root_mean_square(weights.residual(whole, columns, best), samples), system)
+    return Shaped(shape, p, root_mean_square(weights.residual(whole, columns, best), samples), best, samples, derived)
 
 
 @dataclass(frozen=True)
@@ -331,10 +426,7 @@ def fit(
     found = joint.search(
         lambda shape, q: linear(structure, items, shape, q), structure, np.clip(start, low, high), p, steps
     )
-    if not math.isfinite(found.rms):
-        return Fitted(structure, found.shape, p, math.inf)
-    best = weights.non_negative(found.system.whole, np.arange(len(structure.thresholds)))
-    return Fitted(structure, found.shape, best, found.rms)
+    return Fitted(structure, found.shape, found.best if math.isfinite(found.rms) else p, found.rms)
 
 
 def rms(errors: Sequence[Array]) -> float:

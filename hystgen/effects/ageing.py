@@ -19,11 +19,6 @@ class _Ageing(Effect):
     compensation: ClassVar[str] = "a gain input to `step`"
     timed: ClassVar[bool] = False
 
-    @staticmethod
-    def travelled(run: Run) -> Array:
-        """Distance `sum |dv|` that the drive has moved, input units."""
-        return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(run.v)))])
-
     @classmethod
     def _candidate(cls, label: str, about: About) -> Candidate:
         total = max(about.travel, 1e-12)
@@ -52,7 +47,7 @@ class LogarithmicAgeing(_Ageing):
     def gain(self, run: Run) -> Array:
         """The falling gain."""
         with np.errstate(over="ignore"):
-            travels = np.minimum(self.travelled(run) / self.travel, 1e300)
+            travels = np.minimum(run.travelled / self.travel, 1e300)
         return np.asarray(1.0 - self.loss * np.log10(1.0 + travels))
 
     @classmethod
@@ -70,7 +65,7 @@ class ExponentialAgeing(_Ageing):
 
     def gain(self, run: Run) -> Array:
         """The falling gain."""
-        return np.asarray(1.0 + self.loss * np.expm1(-self.travelled(run) / self.travel))
+        return np.asarray(1.0 + self.loss * np.expm1(-run.travelled / self.travel))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -55,18 +55,32 @@ class Run:
         """Seconds from each sample to the next, N - 1 of them."""
         return np.diff(self.t)
 
+    @cached_property
+    def travelled(self) -> Array:
+        """Distance `sum |dv|` that the drive has moved up to each sample, input units."""
+        return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.v)))])
+
+    @cached_property
+    def heat(self) -> Array:
+        """Mean of `|v v'|/2` from each sample to the next, N - 1 of them."""
+        return 0.5 * np.abs(np.diff(0.5 * self.v * np.abs(self.v))) / self.steps
+
     def factors(self, time_constant: float) -> Array:
-        """`decays` of the steps and a time constant, (3, N - 1); a search comes back to most of them."""
-        found = self._factors.pop(time_constant, None)
+        """`decays` of the steps and a time constant, (3, N - 1)."""
+        return self.remembered(time_constant, lambda: np.stack(decays(self.steps, time_constant)))
+
+    def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:
+        """What is made of the steps and of some numbers; a search comes back to most of them."""
+        found = self._made.pop(by, None)
         if found is None:
-            found = np.stack(decays(self.steps, time_constant))
-        if found.nbytes * (len(self._factors) + 1) > MOST_BYTES and self._factors:
-            del self._factors[next(iter(self._factors))]
-        self._factors[time_constant] = found  # the latest one comes last
+            found = make()
+        if found.nbytes * (len(self._made) + 1) > MOST_BYTES and self._made:
+            del self._made[next(iter(self._made))]
+        self._made[by] = found  # the latest one comes last
         return found
 
     @cached_property
-    def _factors(self) -> dict[float, Array]:
+    def _made(self) -> dict[Hashable, Array]:
         return {}
 
 
@@ -165,9 +179,22 @@ class Effect(BaseModel):
         """Whether it says how the plays move."""
         return cls.plays is not Effect.plays
 
+    def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """PLAYS: sum (N,) of the plays with weights `p`, in which those of weight 0 need not move."""
+        return operators.play_sum(w, thresholds, start, p)
+
+    @classmethod
+    def bends_plays(cls) -> bool:
+        """Whether it says what becomes of their rows."""
+        return cls.bent is not Effect.bent
+
     def bent(self, rows: Array, thresholds: Array) -> Array:
         """PLAYS: what becomes of the plays' rows (n+1, N) before the weights sum them."""
         return rows
+
+    def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
+        """PLAYS: sum (N,) of the bent rows with weights `p`."""
+        return np.asarray(p @ self.bent(rows, thresholds))
 
     def filtered(self, h: Array, run: Run) -> Array:
         """LINEAR: every row of `h`, (N,) or (k, N), filtered by itself, from rest at its first sample."""

@@ -174,15 +174,45 @@ def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, star
 
     `effects`: those of Place.PLAYS, in order.
     """
-    expected = np.empty((len(thresholds), len(w)))
-    mover = next((effect for effect in effects if effect.moves_plays()), None)
+    return bent(effects, moved(effects, w, run, thresholds, start), thresholds)
+
+
+def moved(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+    """Rows (n+1, N) of the plays before an effect bends them."""
+    mover = _mover(effects)
     if mover is None:
-        rows = operators.plays(w, thresholds, start)
-    else:
-        rows = _answer(mover, "plays", expected, w, run, thresholds, start)
+        return operators.plays(w, thresholds, start)
+    return _answer(mover, "plays", np.empty((len(thresholds), len(w))), w, run, thresholds, start)
+
+
+def bent(effects: Sequence[Effect], rows: Array, thresholds: Array) -> Array:
+    """The rows behind all effects that bend them."""
     for effect in effects:
-        rows = _answer(effect, "bent", expected, rows, thresholds)
+        if effect.bends_plays():
+            rows = _answer(effect, "bent", rows, rows, thresholds)
     return rows
+
+
+def bent_sum(effects: Sequence[Effect], p: Array, rows: Array, thresholds: Array) -> Array:
+    """The weighted sum (N,) of the rows of `bent`."""
+    *first, last = (effect for effect in effects if effect.bends_plays())
+    if type(last).bent_sum is Effect.bent_sum:
+        return np.asarray(p @ bent(effects, rows, thresholds))
+    return last.bent_sum(p, bent(first, rows, thresholds), thresholds)
+
+
+def summed(effects: Sequence[Effect], p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+    """The weighted sum (N,) of the rows of `moved`."""
+    mover = _mover(effects)
+    if mover is None:
+        return operators.play_sum(w, thresholds, start, p)
+    if type(mover).summed is Effect.summed:
+        return np.asarray(p @ moved(effects, w, run, thresholds, start))
+    return mover.summed(p, w, run, thresholds, start)
+
+
+def _mover(effects: Sequence[Effect]) -> Effect | None:
+    return next((effect for effect in effects if effect.moves_plays()), None)
 
 
 def _answer(effect: Effect, method: str, like: Array, *arguments: object) -> Array:

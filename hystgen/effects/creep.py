@@ -26,9 +26,9 @@ PER_DECADE = 2
 def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
     """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
     rows = np.ascontiguousarray(np.atleast_2d(h).T)
-    total = np.empty_like(rows)
-    factors = np.stack([run.factors(float(tau)) for tau in time_constants], axis=1)
-    code().creep(rows, *factors, np.ascontiguousarray(weights), np.tile(rows[0], (len(weights), 1)), total)
+    total = np.zeros_like(rows)
+    for tau, weight in zip(time_constants.tolist(), weights.tolist(), strict=True):
+        code().creep(rows, *run.factors(tau), weight, rows[0].copy(), total)
     return total.T.reshape(np.shape(h))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -28,6 +29,25 @@ class _Noncongruent(Effect):
         if thresholds is not None and len(thresholds) < 2:
             yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
+    @abstractmethod
+    def bend(self, i: int, row: Array, thresholds: Array) -> Array:
+        """What is added (N,) to the play of a number above 0."""
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """The drive itself, and bent plays."""
+        out = np.array(rows)
+        for i in range(1, len(rows)):
+            out[i] += self.bend(i, rows[i], thresholds)
+        return out
+
+    def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
+        """Their sum; plays of weight 0 need not be bent."""
+        total: Array = p @ rows
+        for i in range(1, len(rows)):
+            if p[i] != 0.0:
+                total += p[i] * self.bend(i, rows[i], thresholds)
+        return total
+
 
 class PlayFunctions(_Noncongruent):
     """Play functions `sum p_i g_i(play_i)`, `g_i(s) = s + r_n sum_k c_ik xi^k`, `xi = s/r_n`, k = 2, 3, ...
@@ -53,14 +73,11 @@ class PlayFunctions(_Noncongruent):
             plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
             yield ("coefficients",), f"has {count} for {plays}; give one for each threshold but r_0"
 
-    def bent(self, rows: Array, thresholds: Array) -> Array:
-        """Rows behind their polynomials."""
+    def bend(self, i: int, row: Array, thresholds: Array) -> Array:
+        """What its polynomial adds to a play."""
         scale = float(thresholds[-1])
-        out = np.array(rows)
-        for i, terms in enumerate(self.coefficients, 1):
-            xi = rows[i] / scale
-            out[i] += scale * xi * xi * np.polynomial.polynomial.polyval(xi, np.array(terms))
-        return out
+        xi = row / scale
+        return np.asarray(scale * xi * xi * np.polynomial.polynomial.polyval(xi, np.array(self.coefficients[i - 1])))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -109,12 +126,10 @@ class LoopCentre(_Noncongruent):
     centre: Number = Field(description="centre of the bump, input units of the plays", examples=[50.0])
     width: Positive = Field(description="width of the bump, input units of the plays", examples=[20.0])
 
-    def bent(self, rows: Array, thresholds: Array) -> Array:
-        """Rows with the density's integral."""
-        out = np.array(rows)
-        bump = np.tanh((rows[1:] - self.centre) / self.width) + np.tanh(self.centre / self.width)
-        out[1:] += self.amplitude * self.width * bump
-        return out
+    def bend(self, i: int, row: Array, thresholds: Array) -> Array:
+        """What the density's integral adds to a play."""
+        bump = np.tanh((row - self.centre) / self.width) + np.tanh(self.centre / self.width)
+        return np.asarray(self.amplitude * self.width * bump)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

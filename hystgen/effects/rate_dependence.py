@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from abc import abstractmethod
+from collections.abc import Callable, Iterator
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -23,6 +24,30 @@ class _RateDependence(Effect):
         """There are plays to depend on the rate."""
         if thresholds is not None and len(thresholds) < 2:
             yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
+
+    @abstractmethod
+    def follower(self, w: Array, run: Run, thresholds: Array, start: Array) -> Callable[[int, Array], None]:
+        """What writes the play of a number above 0 into a row (N,)."""
+
+    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """The drive itself, and the plays."""
+        follow = self.follower(w, run, thresholds, start)
+        out = np.empty((len(thresholds), len(w)))
+        out[0] = w
+        for i in range(1, len(thresholds)):
+            follow(i, out[i])
+        return out
+
+    def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """The sum of those that have a weight."""
+        follow = self.follower(w, run, thresholds, start)
+        total: Array = p[0] * w
+        one = np.empty(len(w))
+        for i in range(1, len(p)):
+            if p[i] != 0.0:
+                follow(i, one)
+                total += p[i] * one
+        return total
 
 
 class ThresholdRate(_RateDependence):
@@ -57,16 +82,16 @@ class ThresholdRate(_RateDependence):
             return []
         return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} a second"]
 
-    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """Plays with dynamic thresholds."""
+    def follower(self, w: Array, run: Run, thresholds: Array, start: Array) -> Callable[[int, Array], None]:
+        """A play with a dynamic threshold."""
         with np.errstate(over="ignore"):
             slope = np.minimum(np.abs(np.diff(w)) / run.steps, 1e300)
         rate = np.concatenate([[0.0], slope])
-        out = np.empty((len(thresholds), len(w)))
-        out[0] = w
-        for i in range(1, len(thresholds)):
-            code().dilated_play(w, rate, float(thresholds[i]), self.betas[i - 1], float(start[i]), out[i])
-        return out
+
+        def follow(i: int, out: Array) -> None:
+            code().dilated_play(w, rate, float(thresholds[i]), self.betas[i - 1], float(start[i]), out)
+
+        return follow
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -110,16 +135,17 @@ class RelaxingPlays(_RateDependence):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "one implicit step a sample"
 
-    def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """Viscous plays."""
-        if self.time_constant == 0.0:
-            return operators.plays(w, thresholds, start)
-        out = np.empty((len(thresholds), len(w)))
-        out[0] = w
+    def follower(self, w: Array, run: Run, thresholds: Array, start: Array) -> Callable[[int, Array], None]:
+        """A viscous play."""
         about = (self.time_constant, self.exponent, float(thresholds[-1]))
-        for i in range(1, len(thresholds)):
-            code().relaxing_play(w, run.steps, float(thresholds[i]), *about, float(start[i]), out[i])
-        return out
+
+        def follow(i: int, out: Array) -> None:
+            if self.time_constant == 0.0:
+                out[:] = operators.play(w, float(thresholds[i]), float(start[i]))
+            else:
+                code().relaxing_play(w, run.steps, float(thresholds[i]), *about, float(start[i]), out)
+
+        return follow
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -33,25 +33,19 @@ def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Arr
 
 
 def creep(
-    u: Array, decay: Array, early: Array, late: Array, weight: Array, state: Array, total: Array
+    u: Array, decay: Array, early: Array, late: Array, weight: float, state: Array, total: Array
 ) -> None:
-    """Weighted sum of first-order filters from `state` (m, R), each of every column of `u` (N, R); factors (m, N - 1).
+    """Add `weight` times the first-order filter of every column of `u` (N, R), from `state` (R,), to `total`.
 
-    Filters and columns side by side, since each by itself waits for its own last sample.
+    Columns side by side, since each by itself waits for its own last sample.
     """
     for i in range(u.shape[1]):
-        total[0, i] = 0.0
-        for j in range(len(weight)):
-            total[0, i] += weight[j] * state[j, i]
+        total[0, i] += weight * state[i]
     for k in range(len(u) - 1):
         for i in range(u.shape[1]):
-            total[k + 1, i] = 0.0
-        for j in range(len(weight)):
-            d, b, c, w = decay[j, k], early[j, k], late[j, k], weight[j]
-            for i in range(u.shape[1]):
-                x = d * state[j, i] + b * u[k, i] + c * u[k + 1, i]
-                state[j, i] = x
-                total[k + 1, i] += w * x
+            x = decay[k] * state[i] + early[k] * u[k, i] + late[k] * u[k + 1, i]
+            state[i] = x
+            total[k + 1, i] += weight * x
 
 
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
@@ -109,8 +103,8 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         return 0.0, duration - taken if taken < duration else 0.0
     left = duration
     step = left
+    fall = scale / tau * (e / scale) ** exponent
     for _ in range(MOST_PIECES):
-        fall = scale / tau * (e / scale) ** exponent
         if not fall < 1e200:
             return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
@@ -121,6 +115,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
                 return e + speed * left, 0.0
             e = little
             left -= taken
+            fall = scale / tau * (e / scale) ** exponent
             continue
         if not e > 0.0:
             return 0.0, left if speed < 0.0 else 0.0
@@ -150,6 +145,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if left <= 1e-12 * duration or not e > 0.0:
             break
         step *= 4.0
+        fall = scale / tau * (e / scale) ** exponent
     return e, 0.0
 
 
@@ -194,3 +190,15 @@ COMPILED: list[Callable[..., Any]] = [follow, creep, limit, ring, dilated_play, 
 def code() -> Any:
     """The compiled recursions."""
     return compiled.compile_together(COMPILED)
+
+
+def load() -> None:
+    """Have them compiled, or read from the cache, by running each of them on two samples."""
+    u, step = np.arange(2.0), np.ones(1)
+    run, out = code(), np.empty(2)
+    run.follow(u, step, step, step, 0.0, out)
+    run.creep(u[:, None], step, step, step, 1.0, np.ones(1), out[:, None])
+    run.limit(u, step, step, out)
+    run.ring(u, step, step, step, step, 1.0, out)
+    run.dilated_play(u, u, 1.0, 1.0, 0.0, out)
+    run.relaxing_play(u, step, 1.0, 1.0, 1.0, 1.0, 0.0, out)

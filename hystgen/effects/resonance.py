@@ -43,7 +43,7 @@ class Resonance(Effect):
             sine = -slow * np.expm1(-2.0 * apart * angle) / (2.0 * apart) if apart > 0.0 else angle * slow
             return angle, 0.5 * (slow + fast), sine
 
-    def _forced(self, steps: Array) -> tuple[Array, Array, Array, Array]:
+    def _forced(self, steps: Array) -> Array:
         """Decaying cosine and sine of each step, and the responses to a change by 1 over it: output, and its rate."""
         zeta = self.damping
         x, c, s = self._factors(steps)
@@ -55,13 +55,13 @@ class Resonance(Effect):
         short = x < 1e-3 / (1.0 + zeta)
         ramp = np.where(short, x * x * (1.0 / 6.0 - zeta * x / 12.0 + curved / 120.0), ramp)
         step = np.where(short, x * (0.5 - zeta * x / 3.0 + curved / 24.0), step)
-        return c, s, ramp, step
+        return np.stack([c, s, ramp, step])
 
     def filtered(self, h: Array, run: Run) -> Array:
         """The play sum as the mode passes it on."""
         rows = np.ascontiguousarray(np.atleast_2d(h))
         out = np.empty_like(rows)
-        factors = self._forced(run.steps)
+        factors = run.remembered((self.frequency, self.damping), lambda: self._forced(run.steps))
         for row, answer in zip(rows, out, strict=True):
             code().ring(row, *factors, self.damping, answer)
         return out.reshape(np.shape(h))

@@ -88,13 +88,9 @@ class SelfHeating(_Thermal):
 
     def above(self, run: Run) -> Array:
         """Temperature rise, K."""
-        half = 0.5 * run.v * np.abs(run.v)
-        steps = run.steps
-        heat = 0.5 * self.heating * np.abs(np.diff(half)) / steps
-        decay = np.exp(-steps / self.time_constant)
-        kept = -np.expm1(-steps / self.time_constant)
+        decay, kept, none = run.remembered(("heat", self.time_constant), lambda: _kept(run.steps / self.time_constant))
         out = np.empty(len(run.t))
-        code().follow(np.append(heat, 0.0), decay, kept, np.zeros(len(steps)), 0.0, out)
+        code().follow(np.append(self.heating * run.heat, 0.0), decay, kept, none, 0.0, out)
         return out
 
     @classmethod
@@ -123,6 +119,11 @@ class SelfHeating(_Thermal):
                 )
             )  # fmt: skip
         return found
+
+
+def _kept(share: Array) -> Array:
+    """Of the warmth and of the heat of each step, for steps in time constants; the next step's has no part in it."""
+    return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
 
 
 SHAPES = (LoggedThermal, SelfHeating)

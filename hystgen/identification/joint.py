@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -48,13 +49,21 @@ Tick = Callable[[int], None] | None
 class Shaped:
     """A shape, weights over a list of thresholds, and the system that is linear about both.
 
-    `rms`: error of the best weights for the shape, to which `weights` are near.
+    `rms`: error of the `best` weights for the shape, to which `weights` are near. `derived` gives the system: a step
+    that is not taken does not need it.
     """
 
     shape: Array
     weights: Array
     rms: float
-    system: Reduced
+    best: Array
+    samples: int
+    derived: Callable[[], Reduced]
+
+    @cached_property
+    def system(self) -> Reduced:
+        """The system; its derivatives cost most of a search."""
+        return self.derived()
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:
@@ -116,7 +125,7 @@ def search(
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
-            done = now.rms - trial.rms < 0.5 * ENOUGH * now.rms / now.system.samples
+            done = now.rms - trial.rms < 0.5 * ENOUGH * now.rms / now.samples
             now, damping = trial, damping * 0.2
             if done:
                 break
@@ -141,7 +150,7 @@ def _linear(
     best = weights.non_negative(system.whole, columns)
     rms = root_mean_square(weights.residual(system.whole, columns, best), system.samples)
     # About the weights that the derivatives were taken with: they are what the next step of the shape refers to
-    return Shaped(shape, p, rms, system)
+    return Shaped(shape, p, rms, best, system.samples, lambda: system)
 
 
 def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[[Course, Array], Source]:

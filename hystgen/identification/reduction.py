@@ -8,6 +8,7 @@ The column of ones stands first: what is left below its row is the system with t
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 CHUNK = 8192
 """Samples that are reduced at a time."""
+
+BLOCKED = 64
+"""Columns for which the linear algebra library has room to work on at a time."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
@@ -161,19 +165,55 @@ def reduce(
                 stop = min(start + CHUNK, end)
                 found = rows(start, stop, k > 0)
                 if k > 0:
-                    blocks[k - 1] = _triangle(blocks[k - 1], found)
+                    blocks[k - 1] = triangle(blocks[k - 1], found)
                     counts[k - 1] += int(np.count_nonzero(np.isfinite(course.y[start:stop])))
                 if tick is not None:
                     tick(stop - start)
-        whole = _triangle(whole, _without_offset(_triangle(*blocks)))
-        folds = [_triangle(fold, _without_offset(block)) for fold, block in zip(folds, blocks, strict=True)]
+        whole = triangle(whole, _without_offset(triangle(*blocks)))
+        folds = [triangle(fold, _without_offset(block)) for fold, block in zip(folds, blocks, strict=True)]
     return Reduced(thresholds, whole, tuple(folds), tuple(counts))
 
 
-def _triangle(*parts: Array) -> Array:
+def triangle(*parts: Array) -> Array:
     """The triangular factor of parts stacked on each other: same normal equations, at most as many rows as columns."""
     stacked = np.concatenate(parts)
     return np.asarray(np.linalg.qr(stacked, mode="r")) if len(stacked) > 1 else stacked
+
+
+@dataclass(frozen=True)
+class Reflected:
+    """A table reduced to its triangular factor, with the reflections that did it, for columns that come later."""
+
+    triangle: Array
+    reflections: Array
+    factors: Array
+
+    def extended(self, columns: Array) -> Array:
+        """The triangular factor of the table with these columns behind its own; they are overwritten."""
+        from scipy.linalg import lapack
+
+        rank = len(self.factors)
+        room = BLOCKED * columns.shape[1]
+        turned, _, _ = lapack.dormqr("L", "T", self.reflections[:, :rank], self.factors, columns, room, overwrite_c=1)
+        below = reflected(turned[rank:]).triangle
+        left = np.concatenate([self.triangle, np.zeros((len(below), self.triangle.shape[1]))])
+        return np.concatenate([left, np.concatenate([turned[:rank], below])], axis=1)
+
+
+def reflected(table: Array) -> Reflected:
+    """Householder's reduction of a table; overwritten where its columns are contiguous."""
+    from scipy.linalg import lapack
+
+    if not len(table):
+        return Reflected(table, table, np.empty(0))
+    found, factors, _, _ = lapack.dgeqrf(table, lwork=BLOCKED * table.shape[1], overwrite_a=1)
+    return Reflected(np.where(_upper(table.shape[1])[: len(found)], found[: table.shape[1]], 0.0), found, factors)
+
+
+@functools.cache
+def _upper(size: int) -> NDArray[np.bool_]:
+    """Where a triangular factor has its numbers."""
+    return np.triu(np.ones((size, size), dtype=bool))
 
 
 def _without_offset(triangle: Array) -> Array:
@@ -182,4 +222,4 @@ def _without_offset(triangle: Array) -> Array:
 
 def others(reduced: Reduced, fold: int) -> Array:
     """The system of all folds but one."""
-    return _triangle(*(part for k, part in enumerate(reduced.folds) if k != fold))
+    return triangle(*(part for k, part in enumerate(reduced.folds) if k != fold))

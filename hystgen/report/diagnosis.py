@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from hystgen import __version__
+from hystgen import __version__, parallel
 from hystgen.diagnosis import description, told
 from hystgen.report import drawing
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
@@ -26,11 +27,13 @@ AT_NOISE = 1.25
 def html(found: Diagnosis, parameters_text: str) -> str:
     """The page. Raises PlotError without matplotlib."""
     content = found.content
-    figures = {}
+    each = list(itertools.product(FIGURES, (WIDE, NARROW)))
     with drawing.styled():
-        for name, draw in FIGURES.items():
-            wide, narrow = (drawing.content(draw(found, width), "svg") for width in (WIDE, NARROW))
-            figures[name] = Figure(name, wide, narrow, CAPTIONS[name], ALTERNATIVES[name])
+        drawn = dict(zip(each, parallel.each(lambda one: _drawn(found, *one), each, parallel.cores()), strict=True))
+    figures = {
+        name: Figure(name, drawn[name, WIDE], drawn[name, NARROW], CAPTIONS[name], ALTERNATIVES[name])
+        for name in FIGURES
+    }
     sections = [
         Section("How the gap shrinks", [figures["gap"]]),
         Section("What was found", _found(content, found.parameters.model.effects)),
@@ -46,6 +49,10 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
     ]
     return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence())], sections)
+
+
+def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
+    return drawing.content(FIGURES[name](found, width), "svg")
 
 
 def _found(content: Mapping[str, Any], there: Sequence[Effect]) -> list[Text | Table]:

@@ -67,7 +67,8 @@ def require() -> None:
 def styled() -> Iterator[None]:
     """The style of all pictures, whatever matplotlib's own settings; to draw and to save in. Raises PlotError."""
     require()
-    from matplotlib import style
+    from matplotlib import figure, style  # noqa: F401  # all that copies of this process would each import
+    from matplotlib.backends import backend_svg  # noqa: F401
 
     with style.context(["default", STYLE]):
         yield
