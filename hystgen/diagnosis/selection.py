@@ -184,12 +184,19 @@ def select(
             pair = _with_rival(latest, step, gap, records)
             if pair is not None:
                 other, step = pair
-                found[-1] = _found(other, records)
+                found[-1] = replace(_found(other, records), before=found[-1].before)
+        if step is not None and step.merit is None and not found:
+            both = _together(step, gap, records)
+            if both is not None:
+                rankings.append(tuple(step.tried))
+                first, step = both
+                found.append(first)
         if step is not None:
             rankings.append(tuple(step.tried))
         if step is None or step.merit is None:
             break
-        found.append(_found(step, records))
+        accepted = _found(step, records)
+        found.append(replace(accepted, before=found[-1].after) if found else accepted)
         now, latest = step.best.fitted, step
         now, found = _without_needless(now, found, records)
         now, found = _exchanged(now, found, records)
@@ -261,6 +268,33 @@ def _with_rival(latest: _Step, failed: _Step, gap: float, records: _Records) -> 
         step = _step(first.fitted, gap, records, failed.tried) if merit is not None else None
         if step is not None and step.merit is not None and step.best.held_out <= enough:
             return replace(latest, best=first, merit=merit), step
+    return None
+
+
+def _together(failed: _Step, gap: float, records: _Records) -> tuple[Found, _Step] | None:
+    """Two effects of which none qualifies alone, since the other one hides it, but each beside the other.
+
+    The one, and the step from it to both. The search begins with what explains most on held-out records, and with each
+    effect that fitted ones leave no doubt of. What hides the one may leave less of the gap without it: then its share
+    is nothing, and that of the other all.
+    """
+    one_of_each = {each.name: each for each in reversed(failed.tried)}  # of each name the best one
+    fitted = failed.now.errors(records.to_fit)
+    seconds = []
+    for first in one_of_each.values():
+        if first is not failed.tried[0] and difference(fitted, first.fitted.errors(records.to_fit)) > SURE:
+            continue
+        second = _step(first.fitted, gap, records)
+        if second is not None and second.merit is not None and second.best.name != first.name:
+            seconds.append((first, second))
+    for first, second in sorted(seconds, key=lambda pair: pair[1].best.held_out):
+        alone = _without(second.best.fitted, first.name, records)
+        back = None if alone is None else _step(alone, gap, records)
+        if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
+            continue
+        merit = _merit(failed.now, back.best, records)
+        if merit is not None and merit.equal - back.best.held_out >= SHARE * gap:
+            return replace(_found(second, records), before=gap, after=min(records.left(alone), gap)), back
     return None
 
 
