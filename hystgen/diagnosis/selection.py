@@ -23,8 +23,14 @@ Array = NDArray[np.float64]
 SCREENED = 12_000
 """Samples compared while the many shapes are told apart."""
 
-FIRST_STEPS, SCREENING_STEPS = 2, 4
-"""Steps of a search from each start, and in all from the best one, while the shapes are told apart."""
+FIRST_STEPS, SCREENING_STEPS = 2, 2
+"""Steps of a search from each start, and then from the best one, while the shapes are told apart."""
+
+FALLING, LONGER = 0.8, 4
+"""The error of a search that goes on falls below this share within SCREENING_STEPS; and at most so many times those.
+
+The minimum of a light damping is so narrow that the first steps do not reach it.
+"""
 
 KEPT, ALSO = 5, 2
 """Shapes that are followed up after the screening: the best on held-out records, and others that fit best."""
@@ -346,7 +352,11 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
             starts.append(option.grown(simpler[option.beyond].fitted.shape))
         begun = [fits.fit(option.alone, records.thin, start, now.weights, FIRST_STEPS) for start in starts]
         best = min(begun, key=lambda each: each.rms)
-        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS - FIRST_STEPS)
+        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS)
+        for _ in range(LONGER - 1):
+            if fitted.rms >= FALLING * best.rms:
+                break
+            best, fitted = fitted, fits.fit(option.alone, records.thin, fitted.shape, fitted.weights, SCREENING_STEPS)
         left = fits.rms(fitted.errors(records.thin_held)) if math.isfinite(fitted.rms) else math.inf
         return _Screened(option, fitted, left)
 
