@@ -177,8 +177,12 @@ static bool hystgen_foretold(const hystgen_tables_t *t, const hystgen_memory_t *
                              hystgen_play_t w)
 {
     const hystgen_place_t *there = &m->there;
-    const bool turned = hystgen_turns(m, w);
-    if (there->k == 0 || there->rising != (m->here.rising != turned) || hystgen_past(w, there->next, there->rising)) {
+    bool turned;
+    if (there->k == 0) {
+        return false;
+    }
+    turned = hystgen_turns(m, w);
+    if (there->rising != (m->here.rising != turned) || hystgen_past(w, there->next, there->rising)) {
         return false;
     }
     if (there->k > 1) {

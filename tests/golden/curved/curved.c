@@ -285,8 +285,12 @@ static bool curved_foretold(const curved_tables_t *t, const curved_memory_t *m, 
                              curved_play_t w)
 {
     const curved_place_t *there = &m->there;
-    const bool turned = curved_turns(m, w);
-    if (there->k == 0 || there->rising != (m->here.rising != turned) || curved_past(w, there->next, there->rising)) {
+    bool turned;
+    if (there->k == 0) {
+        return false;
+    }
+    turned = curved_turns(m, w);
+    if (there->rising != (m->here.rising != turned) || curved_past(w, there->next, there->rising)) {
         return false;
     }
     if (there->k > 1) {

@@ -261,8 +261,12 @@ static bool plain_foretold(const plain_tables_t *t, const plain_memory_t *m, con
                              plain_real_t w)
 {
     const plain_place_t *there = &m->there;
-    const bool turned = plain_turns(m, w);
-    if (there->k == 0 || there->rising != (m->here.rising != turned) || plain_past(w, there->next, there->rising)) {
+    bool turned;
+    if (there->k == 0) {
+        return false;
+    }
+    turned = plain_turns(m, w);
+    if (there->rising != (m->here.rising != turned) || plain_past(w, there->next, there->rising)) {
         return false;
     }
     if (there->k > 1) {

@@ -538,8 +538,12 @@ static bool two_branches_foretold(const two_branches_tables_t *t, const two_bran
                              two_branches_real_t w)
 {
     const two_branches_place_t *there = &m->there;
-    const bool turned = two_branches_turns(m, w);
-    if (there->k == 0 || there->rising != (m->here.rising != turned) || two_branches_past(w, there->next, there->rising)) {
+    bool turned;
+    if (there->k == 0) {
+        return false;
+    }
+    turned = two_branches_turns(m, w);
+    if (there->rising != (m->here.rising != turned) || two_branches_past(w, there->next, there->rising)) {
         return false;
     }
     if (there->k > 1) {
