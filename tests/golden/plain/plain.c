@@ -1092,6 +1092,66 @@ static plain_real_t plain_inverse_turn_up_beyond(plain_inverse_t *self, plain_re
     return plain_inverse_rise(self, depth, 1, PLAIN_OUTPUT_MAX);
 }
 
+/* A reference beyond the range that way, where a commit may have led beyond it too: then the limit lies behind. */
+static plain_real_t plain_inverse_beyond_up(plain_inverse_t *self, plain_real_t u)
+{
+    plain_memory_t *m = &self->memory;
+    unsigned int depth = m->there.depth;
+    const plain_real_t output = PLAIN_OUTPUT_MAX;
+    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
+    if (!(v < self->pending)) { /* no turn */
+        return plain_inverse_look(self, u);
+    }
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    plain_inverse_take(self, self->pending);
+    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    if (m->here.k > 1) {
+        plain_corner_t *c = &self->corner[depth];
+        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
+        const plain_real_t z = plain_start_level[m->here.k - 1];
+        if (m->start > depth) {
+            m->start = (uint_least16_t)depth;
+        }
+        c->pass[0] = (z + z) - y;
+        c->pass[1] = y;
+        c->extremum = m->w;
+        c->end = m->here.k;
+        c->side = -1;
+        depth = depth + 1;
+    }
+    return plain_inverse_fall(self, depth, 1, PLAIN_OUTPUT_MAX);
+}
+
+/* A reference beyond the range that way, where a commit may have led beyond it too: then the limit lies behind. */
+static plain_real_t plain_inverse_beyond_down(plain_inverse_t *self, plain_real_t u)
+{
+    plain_memory_t *m = &self->memory;
+    unsigned int depth = m->there.depth;
+    const plain_real_t output = PLAIN_OUTPUT_MIN;
+    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
+    if (!(v > self->pending)) { /* no turn */
+        return plain_inverse_look(self, u);
+    }
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    plain_inverse_take(self, self->pending);
+    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    if (m->here.k > 1) {
+        plain_corner_t *c = &self->corner[depth];
+        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
+        const plain_real_t z = plain_start_level[m->here.k - 1];
+        if (m->start > depth) {
+            m->start = (uint_least16_t)depth;
+        }
+        c->pass[0] = -y;
+        c->pass[1] = (z + z) + y;
+        c->extremum = m->w;
+        c->end = m->here.k;
+        c->side = 1;
+        depth = depth + 1;
+    }
+    return plain_inverse_rise(self, depth, 1, PLAIN_OUTPUT_MIN);
+}
+
 /* Where a fast move turns back, or takes just one more play of the same corner along, the usual ones among the samples
    that are left. */
 #if defined(__GNUC__)
@@ -1117,7 +1177,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     return plain_inverse_odd(self);
                 }
                 if (!(PLAIN_OUTPUT_MAX >= p->next_output)) {
-                    return plain_inverse_look(self, u);
+                    return plain_inverse_beyond_up(self, u);
                 }
                 plain_inverse_take(self, self->pending);
                 plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
@@ -1208,7 +1268,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     return plain_inverse_odd(self);
                 }
                 if (!(PLAIN_OUTPUT_MIN <= p->next_output)) {
-                    return plain_inverse_look(self, u);
+                    return plain_inverse_beyond_down(self, u);
                 }
                 plain_inverse_take(self, self->pending);
                 plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
@@ -1302,6 +1362,12 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         self->edge[self->falling] = u;
         self->status |= self->bits;
         return plain_inverse_hold(self);
+    }
+    if (p->rising && u > PLAIN_OUTPUT_MAX) {
+        return plain_inverse_beyond_up(self, u);
+    }
+    if (!p->rising && u < PLAIN_OUTPUT_MIN) {
+        return plain_inverse_beyond_down(self, u);
     }
     return plain_inverse_look(self, u);
 }
