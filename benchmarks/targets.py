@@ -43,6 +43,7 @@ HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 SEARCHED = 200_000  # samples of a round of the search for the worst case
+KEPT = 30  # trials, the dearest ones, whose neighbours the next round is about
 RANGE = 10.0
 BEHIND = "no number behind a commit"
 # of the textbook loop: what numbers are and what sums are
@@ -176,16 +177,16 @@ def landings(n: int, points: Reals, most: int = 129) -> Reals:
 
 def trials(n: int) -> Iterator[Reals]:
     """Every corner list, then a jump, since the search for where it leads is the work of a sample."""
+    # first blocks of uneven sizes, which no rule makes: turning points at random, small among large, a few and many
+    rng = np.random.default_rng(11)
+    for size in [*rng.integers(4, 12, 2000), *[100] * 600]:
+        turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
+        if size < 100:
+            yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
+        yield turns  # and from the start
     for points in corner_lists(n):
         for jump in landings(n, points, 2000 // n + 20):
             yield np.append(points, jump)
-    # and blocks of uneven sizes, which no rule makes: turning points at random, small among large
-    rng = np.random.default_rng(11)
-    for _ in range(2000):
-        size = rng.integers(4, 12)
-        turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
-        yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
-        yield turns  # and from the start
 
 
 def ways(n: int, points: Reals, hair: float) -> Iterator[Reals]:
@@ -516,12 +517,12 @@ class Bench:
         self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False
     ) -> list[Reals]:
         """The dearest of trials and of what lies near the dearest of them, as long as that is dearer."""
-        before, (dear, best) = 0, self._dearest(case, best, 10, form, behind)
+        before, (dear, best) = 0, self._dearest(case, best, KEPT, form, behind)
         for _ in range(rounds):
             if dear == before:
                 break
             before, near = dear, (x for trial in best for x in neighbours(case.n, trial, hair))
-            dear, best = self._dearest(case, [*best, *within(most, near)], 10, form, behind)
+            dear, best = self._dearest(case, [*best, *within(most, near)], KEPT, form, behind)
         return best
 
     def _dearest(

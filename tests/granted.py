@@ -37,7 +37,8 @@ PLACES = [
     return sum;""",
     ),
     # where a corner is left, a play is held by it; there are no more corners than plays
-    (r"(    if \(p->depth > 0\) \{\n)", 1, r"\1        GRANTED(p->k >= 1 && p->k <= PLAYS && p->depth <= PLAYS);\n"),
+    (r"(    if \(depth > 0\) \{\n)", 1, r"\1        GRANTED(k >= 1 && k <= PLAYS && depth <= PLAYS);\n"),
+    (r"(    if \(depth > 0 && NAME_past\()", 1, r"    GRANTED(depth <= PLAYS);\n\1"),
     (r"(static void NAME_leave_corner\([^{]*\{\n)", 1, r"\1    GRANTED(m->here.depth < PLAYS);\n"),
     (
         r"        here = m->here\.k > 1 \? (corner\[m->here\.depth\]\.output) : (NAME_corners_output\(t, m\));",
@@ -50,7 +51,7 @@ PLACES = [
         }""",
     ),
     # no more plays follow than there are
-    (r"(    p->k = \(uint_least16_t\)k;)", 2, r"    GRANTED(k <= PLAYS + 1);\n\1"),
+    (r"(    p->k = \(uint_least16_t\)k;)", 3, r"    GRANTED(k <= PLAYS + 1);\n\1"),
     # a block ends beyond the play it begins with
     (
         r"(        const NAME_corner_t \*c = &corner\[(?:probe - 1|left - 1|middle)\];\n)",

@@ -218,9 +218,10 @@ static unsigned int plain_threshold_not_reached_near(const plain_real_t *step, u
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline unsigned int plain_find_input(const plain_tables_t *t, const plain_corner_t *corner,
-                                                             unsigned int depth, unsigned int *k, plain_real_t x,
-                                                             bool rising, bool near)
+static inline unsigned int plain_find_by_input_way(const plain_tables_t *t,
+                                                                    const plain_corner_t *corner,
+                                                                    unsigned int depth, unsigned int *k,
+                                                                    plain_real_t x, bool rising, bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -241,6 +242,13 @@ static inline unsigned int plain_find_input(const plain_tables_t *t, const plain
                   : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
     return left;
+}
+
+static unsigned int plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner,
+                                          unsigned int depth, unsigned int *k, plain_real_t w, bool rising, bool near)
+{
+    return rising ? plain_find_by_input_way(t, corner, depth, k, w, true, near)
+                  : plain_find_by_input_way(t, corner, depth, k, -w, false, near);
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -336,7 +344,7 @@ static inline void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m
     }
     if (depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = plain_find_input(t, corner, depth, &k, rising ? w : -w, rising, false);
+        depth = plain_find_by_input(t, corner, depth, &k, w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -352,11 +360,10 @@ static inline void plain_corners_go_on(const plain_tables_t *t, const plain_corn
 {
     if (plain_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = plain_find_input(t, corner, p->depth, &k,
-            rising ? w : -w, rising, true);
+        const unsigned int left = plain_find_by_input(t, corner, p->depth, &k, w, rising, true);
         p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        plain_corners_settle_way(t, p, corner, left, k, rising);
+        plain_corners_settle(t, p, corner);
     }
 }
 
@@ -728,6 +735,7 @@ static void plain_inverse_leave_fast(plain_inverse_t *self)
     if (self->fast == 1) {
         self->reference = self->edge[self->falling ? 1 : 0];
         self->answer = self->pending;
+        self->has_pending = true;
         self->repeat = true;
         self->stepped = true;
     }
@@ -907,12 +915,6 @@ static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth
     return v;
 }
 
-static plain_real_t plain_inverse_far(plain_inverse_t *self, unsigned int depth, unsigned int k, bool rising,
-    plain_real_t u)
-{
-    return rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
-}
-
 /* A rising move that takes no more plays along, and is fast from there on. */
 static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t v)
 {
@@ -969,6 +971,26 @@ static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t v)
     return v;
 }
 
+/* A move to u, which is what is asked for but for the limits, from where the memory is. */
+static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked, plain_real_t u)
+{
+    unsigned int depth;
+    unsigned int k;
+    bool rising;
+    plain_real_t v;
+    plain_inverse_ask(self, asked, asked < u || asked > u ? PLAIN_STATUS_INPUT_CLAMPED : 0);
+    self->status |= self->bits;
+    if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
+        v = rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
+    } else {
+        v = rising ? plain_inverse_up(self, v) : plain_inverse_down(self, v);
+    }
+    if (self->fast != 0 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
+        plain_inverse_leave_fast(self);
+    }
+    return v;
+}
+
 /* Any sample, limits and what is no number included. */
 #if defined(__GNUC__)
 __attribute__((noinline))
@@ -976,10 +998,6 @@ __attribute__((noinline))
 static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
 {
     const plain_real_t asked = u;
-    unsigned int depth;
-    unsigned int k;
-    bool rising;
-    plain_real_t v;
     if (self->fast != 0) {
         plain_inverse_leave_fast(self);
         plain_inverse_take(self, self->pending);
@@ -1002,17 +1020,7 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
         self->status |= self->bits;
         return plain_inverse_send(self, self->answer);
     }
-    plain_inverse_ask(self, asked, asked < u || asked > u ? PLAIN_STATUS_INPUT_CLAMPED : 0);
-    self->status |= self->bits;
-    if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
-        v = plain_inverse_far(self, depth, k, rising, u);
-    } else {
-        v = rising ? plain_inverse_up(self, v) : plain_inverse_down(self, v);
-    }
-    if (self->fast != 0 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
-        plain_inverse_leave_fast(self);
-    }
-    return v;
+    return plain_inverse_move(self, asked, u);
 }
 
 /* What is no number, within a fast move or behind a commit. */
@@ -1092,64 +1100,11 @@ static plain_real_t plain_inverse_turn_up_beyond(plain_inverse_t *self, plain_re
     return plain_inverse_rise(self, depth, 1, PLAIN_OUTPUT_MAX);
 }
 
-/* A reference beyond the range that way, where a commit may have led beyond it too: then the limit lies behind. */
-static plain_real_t plain_inverse_beyond_up(plain_inverse_t *self, plain_real_t u)
+/* A reference beyond the range on the way of a fast move; behind a commit the limit may lie behind. */
+static plain_real_t plain_inverse_beyond(plain_inverse_t *self, plain_real_t u)
 {
-    plain_memory_t *m = &self->memory;
-    unsigned int depth = m->there.depth;
-    const plain_real_t output = PLAIN_OUTPUT_MAX;
-    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
-    if (!(v < self->pending)) { /* no turn */
-        return plain_inverse_look(self, u);
-    }
-    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
     plain_inverse_take(self, self->pending);
-    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
-    if (m->here.k > 1) {
-        plain_corner_t *c = &self->corner[depth];
-        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
-        const plain_real_t z = plain_start_level[m->here.k - 1];
-        if (m->start > depth) {
-            m->start = (uint_least16_t)depth;
-        }
-        c->pass[0] = (z + z) - y;
-        c->pass[1] = y;
-        c->extremum = m->w;
-        c->end = m->here.k;
-        c->side = -1;
-        depth = depth + 1;
-    }
-    return plain_inverse_fall(self, depth, 1, PLAIN_OUTPUT_MAX);
-}
-
-/* A reference beyond the range that way, where a commit may have led beyond it too: then the limit lies behind. */
-static plain_real_t plain_inverse_beyond_down(plain_inverse_t *self, plain_real_t u)
-{
-    plain_memory_t *m = &self->memory;
-    unsigned int depth = m->there.depth;
-    const plain_real_t output = PLAIN_OUTPUT_MIN;
-    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
-    if (!(v > self->pending)) { /* no turn */
-        return plain_inverse_look(self, u);
-    }
-    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
-    plain_inverse_take(self, self->pending);
-    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
-    if (m->here.k > 1) {
-        plain_corner_t *c = &self->corner[depth];
-        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
-        const plain_real_t z = plain_start_level[m->here.k - 1];
-        if (m->start > depth) {
-            m->start = (uint_least16_t)depth;
-        }
-        c->pass[0] = -y;
-        c->pass[1] = (z + z) + y;
-        c->extremum = m->w;
-        c->end = m->here.k;
-        c->side = 1;
-        depth = depth + 1;
-    }
-    return plain_inverse_rise(self, depth, 1, PLAIN_OUTPUT_MIN);
+    return plain_inverse_move(self, u, self->memory.here.rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
 }
 
 /* Where a fast move turns back, or takes just one more play of the same corner along, the usual ones among the samples
@@ -1177,7 +1132,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     return plain_inverse_odd(self);
                 }
                 if (!(PLAIN_OUTPUT_MAX >= p->next_output)) {
-                    return plain_inverse_beyond_up(self, u);
+                    return plain_inverse_beyond(self, u);
                 }
                 plain_inverse_take(self, self->pending);
                 plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
@@ -1268,7 +1223,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
                     return plain_inverse_odd(self);
                 }
                 if (!(PLAIN_OUTPUT_MIN <= p->next_output)) {
-                    return plain_inverse_beyond_down(self, u);
+                    return plain_inverse_beyond(self, u);
                 }
                 plain_inverse_take(self, self->pending);
                 plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
@@ -1363,11 +1318,8 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         self->status |= self->bits;
         return plain_inverse_hold(self);
     }
-    if (p->rising && u > PLAIN_OUTPUT_MAX) {
-        return plain_inverse_beyond_up(self, u);
-    }
-    if (!p->rising && u < PLAIN_OUTPUT_MIN) {
-        return plain_inverse_beyond_down(self, u);
+    if (p->rising ? u > PLAIN_OUTPUT_MAX : u < PLAIN_OUTPUT_MIN) {
+        return plain_inverse_beyond(self, u);
     }
     return plain_inverse_look(self, u);
 }
