@@ -233,6 +233,16 @@ def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
             assert np.max(np.abs(nothing - CASCADE.simulate(v))) < tolerance
 
 
+def test_what_no_record_shows_ringing_is_no_resonance() -> None:
+    """Less than three samples a period, or no peak: in the records that is a delay or a lag."""
+    about = About((0.0, 1.0), 10.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,), ringing=(200.0, 450.0))
+    for candidate in effects.shapes("resonance")[0].candidates(about):
+        fastest = candidate.build(candidate.high)
+        assert isinstance(fastest, effects.shapes("resonance")[0])
+        assert fastest.frequency * about.sample_time <= 1 / 3 + 1e-12
+        assert fastest.damping < math.sqrt(0.5)
+
+
 def test_candidates_without_plays_or_temperature_are_left_out() -> None:
     about = About((0.0, 1.0), 1.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,))
     for name in ("rate_dependence", "noncongruent"):

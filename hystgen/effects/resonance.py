@@ -72,27 +72,29 @@ class Resonance(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Frequency from two periods a record to the sampling rate, damping 0.3 % to 1; starts all over log f.
+        """Frequency from two periods a record to three samples a period, damping 0.3 % to 70 %; starts all over log f.
 
-        A light damping rings long, and is found from the frequency at which the error so far rings alone.
+        What is faster is not seen to ring, nor what is damped more: in the records it is a delay or a lag. A light
+        damping rings long, and is found from the frequency at which the error so far rings alone.
         """
-        low, high = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
+        low, fastest = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
+        high = max(fastest - np.log10(3.0), low)
 
         def build(x: Array) -> Resonance:
             return cls(name="resonance", frequency=float(10.0 ** x[0]), damping=float(10.0 ** x[1]))
 
         def start(place: float) -> Array:
-            return np.array([high - max(high - low, 0.0) * place, -1.3])
+            return np.array([min(fastest - max(fastest - low, 0.0) * place, high), -1.3])
 
         places = {
-            "high": [start(place) for place in (0.12, 0.2, 0.28)],
+            "high": [start(place) for place in (0.14, 0.2, 0.28)],
             "middle": [start(place) for place in (0.36, 0.44, 0.52)],
             "low": [start(place) for place in (0.6, 0.7, 0.8)],
             "where it rings": [np.array([np.log10(f), -1.8]) for f in about.ringing],
         }
         return [
             Candidate(
-                f"resonance, {name}", np.array([low, -2.5]), np.array([high, 0.0]), starts[0], build,
+                f"resonance, {name}", np.array([low, -2.5]), np.array([high, np.log10(0.7)]), starts[0], build,
                 others=tuple(starts[1:]),
             )
             for name, starts in places.items() if starts
