@@ -134,10 +134,9 @@ static unsigned int hystgen_threshold_not_reached_near(const hystgen_play_t *ste
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
    known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
    copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
-HYSTGEN_INLINE static inline unsigned int hystgen_find_by_input_way(const hystgen_tables_t *t,
-                                                                    const hystgen_corner_t *corner,
-                                                                    unsigned int depth, unsigned int *k,
-                                                                    hystgen_sum_t x, bool rising, bool near)
+HYSTGEN_INLINE static inline unsigned int hystgen_find_by_input(const hystgen_tables_t *t,
+                                                                const hystgen_corner_t *corner, unsigned int depth,
+                                                                unsigned int *k, hystgen_sum_t x, bool rising, bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -158,13 +157,6 @@ HYSTGEN_INLINE static inline unsigned int hystgen_find_by_input_way(const hystge
                   : hystgen_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
     return left;
-}
-
-static unsigned int hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                          unsigned int depth, unsigned int *k, hystgen_play_t w, bool rising, bool near)
-{
-    return rising ? hystgen_find_by_input_way(t, corner, depth, k, w, true, near)
-                  : hystgen_find_by_input_way(t, corner, depth, k, -(hystgen_sum_t)w, false, near);
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -278,7 +270,7 @@ HYSTGEN_INLINE static inline void hystgen_corners_turn(const hystgen_tables_t *t
     }
     if (depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = hystgen_find_by_input(t, corner, depth, &k, w, rising, false);
+        depth = hystgen_find_by_input(t, corner, depth, &k, rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -291,10 +283,11 @@ HYSTGEN_INLINE static inline void hystgen_corners_go_on(const hystgen_tables_t *
 {
     if (hystgen_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = hystgen_find_by_input(t, corner, p->depth, &k, w, rising, true);
+        const unsigned int left = hystgen_find_by_input(t, corner, p->depth, &k,
+            rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, true);
         p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        hystgen_corners_settle(t, p, corner);
+        hystgen_corners_settle_way(t, p, corner, left, k, rising);
     }
 }
 

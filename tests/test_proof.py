@@ -132,7 +132,7 @@ def alarms(source: Path, machine: str) -> list[str]:
     plays = int(re.search(r"_N_PLAYS (\d+)", source.with_suffix(".h").read_text())[1])  # type: ignore[index]
     apart = {  # how many states are kept apart: play by play, coefficient by coefficient, not all in one
         "loop_rest": 2 * plays + 20, "loop_start": 2 * plays + 20, "loop_solve": 2 * plays + 20,
-        "corners_start": 300, "find_by_input": 1000, "find_by_input_way": 1000, "find_by_output": 1000, "curve": 300,
+        "corners_start": 300, "find_by_input": 1000, "find_by_output": 1000, "curve": 300,
     }  # fmt: skip
     visits = [f"{name}_{what}:{states}" for what, states in apart.items() if f"{name}_{what}(" in text]
     # half words are put together, curves measure arguments, drives may lie behind a line

@@ -242,10 +242,9 @@ static unsigned int curved_threshold_not_reached_near(const curved_play_t *step,
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline unsigned int curved_find_by_input_way(const curved_tables_t *t,
-                                                                    const curved_corner_t *corner,
-                                                                    unsigned int depth, unsigned int *k,
-                                                                    curved_sum_t x, bool rising, bool near)
+static inline unsigned int curved_find_by_input(const curved_tables_t *t,
+                                                                const curved_corner_t *corner, unsigned int depth,
+                                                                unsigned int *k, curved_sum_t x, bool rising, bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -266,13 +265,6 @@ static inline unsigned int curved_find_by_input_way(const curved_tables_t *t,
                   : curved_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
     return left;
-}
-
-static unsigned int curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner,
-                                          unsigned int depth, unsigned int *k, curved_play_t w, bool rising, bool near)
-{
-    return rising ? curved_find_by_input_way(t, corner, depth, k, w, true, near)
-                  : curved_find_by_input_way(t, corner, depth, k, -(curved_sum_t)w, false, near);
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -368,7 +360,7 @@ static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t
     }
     if (depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = curved_find_by_input(t, corner, depth, &k, w, rising, false);
+        depth = curved_find_by_input(t, corner, depth, &k, rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -384,10 +376,11 @@ static inline void curved_corners_go_on(const curved_tables_t *t, const curved_c
 {
     if (curved_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = curved_find_by_input(t, corner, p->depth, &k, w, rising, true);
+        const unsigned int left = curved_find_by_input(t, corner, p->depth, &k,
+            rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, true);
         p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        curved_corners_settle(t, p, corner);
+        curved_corners_settle_way(t, p, corner, left, k, rising);
     }
 }
 

@@ -218,10 +218,9 @@ static unsigned int plain_threshold_not_reached_near(const plain_real_t *step, u
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline unsigned int plain_find_by_input_way(const plain_tables_t *t,
-                                                                    const plain_corner_t *corner,
-                                                                    unsigned int depth, unsigned int *k,
-                                                                    plain_real_t x, bool rising, bool near)
+static inline unsigned int plain_find_by_input(const plain_tables_t *t,
+                                                                const plain_corner_t *corner, unsigned int depth,
+                                                                unsigned int *k, plain_real_t x, bool rising, bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -242,13 +241,6 @@ static inline unsigned int plain_find_by_input_way(const plain_tables_t *t,
                   : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
     return left;
-}
-
-static unsigned int plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner,
-                                          unsigned int depth, unsigned int *k, plain_real_t w, bool rising, bool near)
-{
-    return rising ? plain_find_by_input_way(t, corner, depth, k, w, true, near)
-                  : plain_find_by_input_way(t, corner, depth, k, -w, false, near);
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -344,7 +336,7 @@ static inline void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m
     }
     if (depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = plain_find_by_input(t, corner, depth, &k, w, rising, false);
+        depth = plain_find_by_input(t, corner, depth, &k, rising ? w : -w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -360,10 +352,11 @@ static inline void plain_corners_go_on(const plain_tables_t *t, const plain_corn
 {
     if (plain_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = plain_find_by_input(t, corner, p->depth, &k, w, rising, true);
+        const unsigned int left = plain_find_by_input(t, corner, p->depth, &k,
+            rising ? w : -w, rising, true);
         p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        plain_corners_settle(t, p, corner);
+        plain_corners_settle_way(t, p, corner, left, k, rising);
     }
 }
 

@@ -495,10 +495,9 @@ static unsigned int two_branches_threshold_not_reached_near(const two_branches_r
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline unsigned int two_branches_find_by_input_way(const two_branches_tables_t *t,
-                                                                    const two_branches_corner_t *corner,
-                                                                    unsigned int depth, unsigned int *k,
-                                                                    two_branches_real_t x, bool rising, bool near)
+static inline unsigned int two_branches_find_by_input(const two_branches_tables_t *t,
+                                                                const two_branches_corner_t *corner, unsigned int depth,
+                                                                unsigned int *k, two_branches_real_t x, bool rising, bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -519,13 +518,6 @@ static inline unsigned int two_branches_find_by_input_way(const two_branches_tab
                   : two_branches_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
     }
     return left;
-}
-
-static unsigned int two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                          unsigned int depth, unsigned int *k, two_branches_real_t w, bool rising, bool near)
-{
-    return rising ? two_branches_find_by_input_way(t, corner, depth, k, w, true, near)
-                  : two_branches_find_by_input_way(t, corner, depth, k, -w, false, near);
 }
 
 /* The corner that held play k-1 until it followed, when a move has left `left` of `depth` corners and k > 1. Where no
@@ -621,7 +613,7 @@ static inline void two_branches_corners_turn(const two_branches_tables_t *t, two
     }
     if (depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = two_branches_find_by_input(t, corner, depth, &k, w, rising, false);
+        depth = two_branches_find_by_input(t, corner, depth, &k, rising ? w : -w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -637,10 +629,11 @@ static inline void two_branches_corners_go_on(const two_branches_tables_t *t, co
 {
     if (two_branches_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = two_branches_find_by_input(t, corner, p->depth, &k, w, rising, true);
+        const unsigned int left = two_branches_find_by_input(t, corner, p->depth, &k,
+            rising ? w : -w, rising, true);
         p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        two_branches_corners_settle(t, p, corner);
+        two_branches_corners_settle_way(t, p, corner, left, k, rising);
     }
 }
 
