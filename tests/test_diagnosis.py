@@ -113,7 +113,6 @@ class TestBlindPlants:
         assert [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())] == first
 
 
-@pytest.mark.data
 class TestSeveralProcesses:
     @pytest.fixture
     def case(self, tmp_path: Path) -> Path:
@@ -149,6 +148,7 @@ class TestSeveralProcesses:
         assert not (case / "out").exists()
 
 
+@pytest.mark.data
 def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
     """Fitted on the sine, held out on the fades: half a percent of range or better, and the amplifier's lag by name,
     which takes a second effect to show: alone, rate dependence explains more."""
