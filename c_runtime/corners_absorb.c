@@ -27,12 +27,13 @@ static hystgen_reach_t hystgen_activation(const hystgen_tables_t *t, const hystg
     return (hystgen_reach_t)hystgen_from(c->extremum, c->side, t->threshold[k], rising);
 }
 
-/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
-   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-HYSTGEN_INLINE static inline void hystgen_corners_settle_way(const hystgen_tables_t *t, hystgen_place_t *p,
-                                                             const hystgen_corner_t *corner, unsigned int depth,
-                                                             unsigned int k, bool rising)
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured from
+   the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+HYSTGEN_COPIES void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p,
+                                           const hystgen_corner_t *corner, bool rising)
 {
+    const unsigned int depth = p->depth;
+    const unsigned int k = p->k;
     if (depth > 0) {
         const hystgen_corner_t *c = &corner[depth - 1];
         const hystgen_reach_t e = c->extremum;
@@ -76,15 +77,6 @@ HYSTGEN_INLINE static inline void hystgen_corners_settle_way(const hystgen_table
     }
 }
 
-static void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_place_t *p, const hystgen_corner_t *corner)
-{
-    if (p->rising) {
-        hystgen_corners_settle_way(t, p, corner, p->depth, p->k, true);
-    } else {
-        hystgen_corners_settle_way(t, p, corner, p->depth, p->k, false);
-    }
-}
-
 /* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
 static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t held, int side)
 {
@@ -104,8 +96,8 @@ static bool hystgen_opposite(int side, bool rising)
 }
 
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
-HYSTGEN_INLINE static inline unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, unsigned int k,
-                                                                        unsigned int high, hystgen_sum_t x)
+HYSTGEN_COPIES unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, unsigned int k, unsigned int high,
+                                                          hystgen_sum_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
@@ -133,17 +125,19 @@ static unsigned int hystgen_threshold_not_reached_near(const hystgen_play_t *ste
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
    known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
-HYSTGEN_INLINE static inline unsigned int hystgen_find_by_input(const hystgen_tables_t *t,
-                                                                const hystgen_corner_t *corner, unsigned int depth,
-                                                                unsigned int *k, hystgen_sum_t x, bool rising, bool near)
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
+   along. */
+HYSTGEN_COPIES unsigned int hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                  unsigned int depth, unsigned int *k, hystgen_sum_t x, bool rising,
+                                                  bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const hystgen_corner_t *c = &corner[middle];
-        if (x >= hystgen_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
+        if (x >= hystgen_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
+                                   t->threshold[c->end - 1])) {
             left = middle;
             *k = c->end;
         } else {
@@ -221,7 +215,7 @@ HYSTGEN_API void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_
         m->here.depth = 1;
         m->start = 1;
     }
-    hystgen_corners_settle(t, &m->here, corner);
+    hystgen_corners_settle(t, &m->here, corner, true);
 }
 
 /* Memory with a state of its own for each play: one corner a play. */
@@ -242,7 +236,7 @@ HYSTGEN_API void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory
         hystgen_write_corner(t, &corner[j], play[k], (hystgen_sum_t)play[k] * t->slope[k + 1] + above, k + 1, 0);
         above = above + (hystgen_sum_t)play[k] * (t->slope[k + 1] - t->slope[k]);
     }
-    hystgen_corners_settle(t, &m->here, corner);
+    hystgen_corners_settle(t, &m->here, corner, true);
 }
 
 /* Output of the play sum for the memory as it is. */
@@ -257,10 +251,9 @@ static void hystgen_push_corner(const hystgen_tables_t *t, hystgen_memory_t *m, 
     hystgen_leave_corner(t, m, corner, hystgen_corners_output(t, m));
 }
 
-/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
-HYSTGEN_INLINE static inline void hystgen_corners_turn(const hystgen_tables_t *t, hystgen_memory_t *m,
-                                                       hystgen_corner_t *corner, hystgen_play_t w, hystgen_place_t *p,
-                                                       bool rising)
+/* A move to w that turns, from where p tells of the plays to where it does at its end. */
+HYSTGEN_COPIES void hystgen_corners_turn(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                         hystgen_play_t w, hystgen_place_t *p, bool rising)
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
@@ -270,24 +263,25 @@ HYSTGEN_INLINE static inline void hystgen_corners_turn(const hystgen_tables_t *t
     }
     if (depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = hystgen_find_by_input(t, corner, depth, &k, rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, false);
+        depth = hystgen_find_by_input(t, corner, depth, &k, rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising,
+                                      false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
     p->rising = rising;
-    hystgen_corners_settle_way(t, p, corner, depth, k, rising);
+    hystgen_corners_settle(t, p, corner, rising);
 }
 
-HYSTGEN_INLINE static inline void hystgen_corners_go_on(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                        hystgen_play_t w, hystgen_place_t *p, bool rising)
+/* The same of a move that goes on. */
+HYSTGEN_COPIES void hystgen_corners_go_on(const hystgen_tables_t *t, const hystgen_corner_t *corner, hystgen_play_t w,
+                                          hystgen_place_t *p, bool rising)
 {
     if (hystgen_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = hystgen_find_by_input(t, corner, p->depth, &k,
+        p->depth = (uint_least16_t)hystgen_find_by_input(t, corner, p->depth, &k,
             rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, true);
-        p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        hystgen_corners_settle_way(t, p, corner, left, k, rising);
+        hystgen_corners_settle(t, p, corner, rising);
     }
 }
 

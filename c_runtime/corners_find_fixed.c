@@ -38,7 +38,8 @@ static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corn
     unsigned int probe = left;
     while (low < left) {
         const hystgen_corner_t *c = &corner[probe - 1];
-        if (x >= hystgen_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+        if (x >= hystgen_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side,
+                                   t->start_level[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -48,7 +49,8 @@ static void hystgen_find_by_output(const hystgen_tables_t *t, const hystgen_corn
     }
     if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
         const hystgen_corner_t *c = &corner[left - 1];
-        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u, hystgen_way(x, rising ? c->output : -c->output, c->side));
+        k = hystgen_level_not_reached(t->start_level, k, c->end - 1u,
+                                      hystgen_way(x, rising ? c->output : -c->output, c->side));
     }
     p->depth = (uint_least16_t)left;
     p->k = (uint_least16_t)k;

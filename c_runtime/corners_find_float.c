@@ -17,12 +17,11 @@ static unsigned int hystgen_level_not_reached(const hystgen_real_t *level, unsig
 
 /* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
    follow then, of which the first ones are known to; *end is the first play beyond what was left, if any was. x as a
-   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest likewise,
-   then the plays of one. A copy for each direction, which asks for it nowhere. */
-HYSTGEN_INLINE static inline unsigned int hystgen_corners_find(const hystgen_tables_t *t,
-                                                               const hystgen_corner_t *corner, unsigned int start,
-                                                               unsigned int depth, unsigned int *k, unsigned int *end,
-                                                               hystgen_real_t x, bool rising)
+   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest
+   likewise, then the plays of one. A copy for each direction, which asks for it nowhere. */
+HYSTGEN_COPIES unsigned int hystgen_corners_find(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                 unsigned int start, unsigned int depth, unsigned int *k,
+                                                 unsigned int *end, hystgen_real_t x, bool rising)
 {
     unsigned int low = start;
     unsigned int left = depth;

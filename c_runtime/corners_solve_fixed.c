@@ -39,6 +39,16 @@ HYSTGEN_NOINLINE static hystgen_reach_t hystgen_corners_land(const hystgen_table
     return hystgen_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
+HYSTGEN_NOINLINE static void hystgen_corners_settle_there(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                          const hystgen_corner_t *corner)
+{
+    if (m->there.rising) {
+        hystgen_corners_settle(t, &m->there, corner, true);
+    } else {
+        hystgen_corners_settle(t, &m->there, corner, false);
+    }
+}
+
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`, from the output `here` on.
    Moves nothing, but leaves word for the next absorb of where the answer lies; the free slot above the corners is
    scratch space for the corner that turning back would leave. One part after the other, so that only one of them is on
@@ -61,7 +71,7 @@ HYSTGEN_API hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t
     }
     m->there.rising = rising;
     hystgen_corners_seek(t, m, corner, output);
-    hystgen_corners_settle(t, &m->there, corner);
+    hystgen_corners_settle_there(t, m, corner);
     return hystgen_corners_land(t, m, corner, output);
 }
 

@@ -69,12 +69,10 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
             least = hystgen_from(corner[left].extremum, corner[left].side, last, true);
         }
         if (w < least && k > 1) { /* later answers of the same move must not lie before this one */
-            if (!(least > from)) {
-                return from;
-            }
-            hystgen_write_place(p, output, next_level, least, next, k, left, true);
+            w = least;
+            first = least;
+            level = output;
             *room = !(least > next);
-            return least;
         }
     }
     if (!(w > from)) {
@@ -137,12 +135,10 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const
             least = hystgen_from(corner[left].extremum, corner[left].side, last, false);
         }
         if (w > least && k > 1) { /* later answers of the same move must not lie before this one */
-            if (!(least < from)) {
-                return from;
-            }
-            hystgen_write_place(p, output, next_level, least, next, k, left, false);
+            w = least;
+            first = least;
+            level = output;
             *room = !(least < next);
-            return least;
         }
     }
     if (!(w < from)) {

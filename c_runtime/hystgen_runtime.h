@@ -35,7 +35,7 @@ typedef hystgen_real_t hystgen_sum_t;
 #endif
 #define HYSTGEN_API
 #define HYSTGEN_NOINLINE
-#define HYSTGEN_INLINE
+#define HYSTGEN_COPIES static inline
 
 #include "hystgen_state.h"
 #ifdef HYSTGEN_FIXED

@@ -106,7 +106,7 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
                 assert row.mean_instructions is not None
                 assert row.max_instructions is not None
                 assert 40 < row.mean_instructions < row.max_instructions < 60_000
-                assert 500 < (row.flash or 0) < 16_000
+                assert 500 < (row.flash or 0) < 12_000
                 assert ((row.library or 0) > 500) == (not target.fpu)  # hardware needs no library
                 assert 30 < (row.ram or 0) < 300
                 assert 0 <= (row.stack or 0) < 400

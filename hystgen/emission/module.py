@@ -120,6 +120,7 @@ def _arithmetic(arithmetic: str) -> dict[str, Any]:
         "reach": family.reach,
         "FLT": "FLT" if family.real == "float" else "DBL",
         "mantissa": 24 if family.real == "float" else 53,
+        "soft": runtime.SOFT.get(family.bits),
         "runtime_file": f"hystgen_runtime_{family.bits}",
         "runtime_version": runtime.VERSION,
     }

@@ -84,7 +84,14 @@ FAMILIES = {
 
 
 NOINLINE = "#if defined(__GNUC__)\n__attribute__((noinline))\n#endif\n"
-INLINE = "#if defined(__GNUC__)\n__attribute__((always_inline))\n#endif\n"
+INLINE = "#if defined(__GNUC__)\n__attribute__((always_inline))\n#endif\nstatic inline "
+SOFT = {
+    "f32": "(defined(__arm__) && !defined(__ARM_FP))"
+    " || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)",
+    "f64": "(defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0))"
+    " || (defined(__riscv) && (!defined(__riscv_flen) || __riscv_flen < 64)) || defined(__AVR__)",
+}
+"""Where each operation of a number is a call of a library."""
 
 
 def data_folder(name: str) -> Path:
@@ -170,7 +177,8 @@ def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
-    text = text.replace("HYSTGEN_NOINLINE ", NOINLINE).replace("HYSTGEN_INLINE ", INLINE)
+    text = text.replace("HYSTGEN_NOINLINE ", NOINLINE)
+    text = text.replace("HYSTGEN_COPIES ", INLINE if family.fixed else f"{prefix.upper()}_COPIES ")
     text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
     text = text.replace("HYSTGEN_SUM_MAX", family.sum_max)
     return _named(text, prefix, family)

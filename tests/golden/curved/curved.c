@@ -126,15 +126,16 @@ static curved_reach_t curved_activation(const curved_tables_t *t, const curved_c
     return (curved_reach_t)curved_from(c->extremum, c->side, t->threshold[k], rising);
 }
 
-/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
-   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured from
+   the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline void curved_corners_settle_way(const curved_tables_t *t, curved_place_t *p,
-                                                             const curved_corner_t *corner, unsigned int depth,
-                                                             unsigned int k, bool rising)
+static inline void curved_corners_settle(const curved_tables_t *t, curved_place_t *p,
+                                           const curved_corner_t *corner, bool rising)
 {
+    const unsigned int depth = p->depth;
+    const unsigned int k = p->k;
     if (depth > 0) {
         const curved_corner_t *c = &corner[depth - 1];
         const curved_reach_t e = c->extremum;
@@ -178,15 +179,6 @@ static inline void curved_corners_settle_way(const curved_tables_t *t, curved_pl
     }
 }
 
-static void curved_corners_settle(const curved_tables_t *t, curved_place_t *p, const curved_corner_t *corner)
-{
-    if (p->rising) {
-        curved_corners_settle_way(t, p, corner, p->depth, p->k, true);
-    } else {
-        curved_corners_settle_way(t, p, corner, p->depth, p->k, false);
-    }
-}
-
 /* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
 static curved_sum_t curved_way(curved_sum_t x, curved_sum_t held, int side)
 {
@@ -209,8 +201,8 @@ static bool curved_opposite(int side, bool rising)
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline unsigned int curved_threshold_not_reached(const curved_play_t *step, unsigned int k,
-                                                                        unsigned int high, curved_sum_t x)
+static inline unsigned int curved_threshold_not_reached(const curved_play_t *step, unsigned int k, unsigned int high,
+                                                          curved_sum_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
@@ -238,20 +230,22 @@ static unsigned int curved_threshold_not_reached_near(const curved_play_t *step,
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
    known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
+   along. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline unsigned int curved_find_by_input(const curved_tables_t *t,
-                                                                const curved_corner_t *corner, unsigned int depth,
-                                                                unsigned int *k, curved_sum_t x, bool rising, bool near)
+static inline unsigned int curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner,
+                                                  unsigned int depth, unsigned int *k, curved_sum_t x, bool rising,
+                                                  bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const curved_corner_t *c = &corner[middle];
-        if (x >= curved_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
+        if (x >= curved_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
+                                   t->threshold[c->end - 1])) {
             left = middle;
             *k = c->end;
         } else {
@@ -329,7 +323,7 @@ static void curved_corners_rest(const curved_tables_t *t, curved_memory_t *m, cu
         m->here.depth = 1;
         m->start = 1;
     }
-    curved_corners_settle(t, &m->here, corner);
+    curved_corners_settle(t, &m->here, corner, true);
 }
 
 /* Output of the play sum for the memory as it is. */
@@ -344,13 +338,12 @@ static void curved_push_corner(const curved_tables_t *t, curved_memory_t *m, cur
     curved_leave_corner(t, m, corner, curved_corners_output(t, m));
 }
 
-/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
+/* A move to w that turns, from where p tells of the plays to where it does at its end. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t *m,
-                                                       curved_corner_t *corner, curved_play_t w, curved_place_t *p,
-                                                       bool rising)
+static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
+                                         curved_play_t w, curved_place_t *p, bool rising)
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
@@ -360,27 +353,28 @@ static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t
     }
     if (depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = curved_find_by_input(t, corner, depth, &k, rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, false);
+        depth = curved_find_by_input(t, corner, depth, &k, rising ? (curved_sum_t)w : -(curved_sum_t)w, rising,
+                                      false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
     p->rising = rising;
-    curved_corners_settle_way(t, p, corner, depth, k, rising);
+    curved_corners_settle(t, p, corner, rising);
 }
 
+/* The same of a move that goes on. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
-static inline void curved_corners_go_on(const curved_tables_t *t, const curved_corner_t *corner,
-                                                        curved_play_t w, curved_place_t *p, bool rising)
+static inline void curved_corners_go_on(const curved_tables_t *t, const curved_corner_t *corner, curved_play_t w,
+                                          curved_place_t *p, bool rising)
 {
     if (curved_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = curved_find_by_input(t, corner, p->depth, &k,
+        p->depth = (uint_least16_t)curved_find_by_input(t, corner, p->depth, &k,
             rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, true);
-        p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        curved_corners_settle_way(t, p, corner, left, k, rising);
+        curved_corners_settle(t, p, corner, rising);
     }
 }
 
@@ -465,7 +459,8 @@ static void curved_find_by_output(const curved_tables_t *t, const curved_corner_
     unsigned int probe = left;
     while (low < left) {
         const curved_corner_t *c = &corner[probe - 1];
-        if (x >= curved_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side, t->start_level[c->end - 1])) {
+        if (x >= curved_last_step(rising ? c->output : -c->output, rising ? c->side : -c->side,
+                                   t->start_level[c->end - 1])) {
             left = probe - 1;
             k = c->end;
         } else {
@@ -475,7 +470,8 @@ static void curved_find_by_output(const curved_tables_t *t, const curved_corner_
     }
     if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
         const curved_corner_t *c = &corner[left - 1];
-        k = curved_level_not_reached(t->start_level, k, c->end - 1u, curved_way(x, rising ? c->output : -c->output, c->side));
+        k = curved_level_not_reached(t->start_level, k, c->end - 1u,
+                                      curved_way(x, rising ? c->output : -c->output, c->side));
     }
     p->depth = (uint_least16_t)left;
     p->k = (uint_least16_t)k;
@@ -526,6 +522,19 @@ static curved_reach_t curved_corners_land(const curved_tables_t *t, curved_memor
     return curved_going(t, w, rising ? output - here : here - output, k, rising);
 }
 
+#if defined(__GNUC__)
+__attribute__((noinline))
+#endif
+static void curved_corners_settle_there(const curved_tables_t *t, curved_memory_t *m,
+                                                          const curved_corner_t *corner)
+{
+    if (m->there.rising) {
+        curved_corners_settle(t, &m->there, corner, true);
+    } else {
+        curved_corners_settle(t, &m->there, corner, false);
+    }
+}
+
 /* The analytic inverse asked of the same memory: the input of the plays that gives `output`, from the output `here` on.
    Moves nothing, but leaves word for the next absorb of where the answer lies; the free slot above the corners is
    scratch space for the corner that turning back would leave. One part after the other, so that only one of them is on
@@ -548,7 +557,7 @@ static curved_reach_t curved_corners_solve_from(const curved_tables_t *t, curved
     }
     m->there.rising = rising;
     curved_corners_seek(t, m, corner, output);
-    curved_corners_settle(t, &m->there, corner);
+    curved_corners_settle_there(t, m, corner);
     return curved_corners_land(t, m, corner, output);
 }
 

@@ -18,6 +18,17 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
+/* A function that several places need, or both directions of a move. Where floating point is hardware it stands in each
+   of them, and what is known there need not be asked; where each operation is a call, that would save little and be
+   long. */
+#if !defined(__GNUC__)
+#define PLAIN_COPIES static inline
+#elif (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)
+#define PLAIN_COPIES __attribute__((noinline)) static
+#else
+#define PLAIN_COPIES __attribute__((always_inline)) static inline
+#endif
+
 /* The constant tables of one model in floating point. */
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */
@@ -102,15 +113,13 @@ static plain_real_t plain_activation(const plain_tables_t *t, const plain_corner
     return plain_from(c->extremum, c->side, t->threshold[k], rising);
 }
 
-/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
-   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline void plain_corners_settle_way(const plain_tables_t *t, plain_place_t *p,
-                                                             const plain_corner_t *corner, unsigned int depth,
-                                                             unsigned int k, bool rising)
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured from
+   the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+PLAIN_COPIES void plain_corners_settle(const plain_tables_t *t, plain_place_t *p,
+                                           const plain_corner_t *corner, bool rising)
 {
+    const unsigned int depth = p->depth;
+    const unsigned int k = p->k;
     if (depth > 0) {
         const plain_corner_t *c = &corner[depth - 1];
         const plain_real_t e = c->extremum;
@@ -154,15 +163,6 @@ static inline void plain_corners_settle_way(const plain_tables_t *t, plain_place
     }
 }
 
-static void plain_corners_settle(const plain_tables_t *t, plain_place_t *p, const plain_corner_t *corner)
-{
-    if (p->rising) {
-        plain_corners_settle_way(t, p, corner, p->depth, p->k, true);
-    } else {
-        plain_corners_settle_way(t, p, corner, p->depth, p->k, false);
-    }
-}
-
 /* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
 static plain_real_t plain_way(plain_real_t x, plain_real_t held, int side)
 {
@@ -182,11 +182,8 @@ static bool plain_opposite(int side, bool rising)
 }
 
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline unsigned int plain_threshold_not_reached(const plain_real_t *step, unsigned int k,
-                                                                        unsigned int high, plain_real_t x)
+PLAIN_COPIES unsigned int plain_threshold_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
+                                                          plain_real_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
@@ -214,20 +211,19 @@ static unsigned int plain_threshold_not_reached_near(const plain_real_t *step, u
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
    known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline unsigned int plain_find_by_input(const plain_tables_t *t,
-                                                                const plain_corner_t *corner, unsigned int depth,
-                                                                unsigned int *k, plain_real_t x, bool rising, bool near)
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
+   along. */
+PLAIN_COPIES unsigned int plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner,
+                                                  unsigned int depth, unsigned int *k, plain_real_t x, bool rising,
+                                                  bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const plain_corner_t *c = &corner[middle];
-        if (x >= plain_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
+        if (x >= plain_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
+                                   t->threshold[c->end - 1])) {
             left = middle;
             *k = c->end;
         } else {
@@ -305,7 +301,7 @@ static void plain_corners_rest(const plain_tables_t *t, plain_memory_t *m, plain
         m->here.depth = 1;
         m->start = 1;
     }
-    plain_corners_settle(t, &m->here, corner);
+    plain_corners_settle(t, &m->here, corner, true);
 }
 
 /* Output of the play sum for the memory as it is. */
@@ -320,13 +316,9 @@ static void plain_push_corner(const plain_tables_t *t, plain_memory_t *m, plain_
     plain_leave_corner(t, m, corner, plain_corners_output(t, m));
 }
 
-/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m,
-                                                       plain_corner_t *corner, plain_real_t w, plain_place_t *p,
-                                                       bool rising)
+/* A move to w that turns, from where p tells of the plays to where it does at its end. */
+PLAIN_COPIES void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                         plain_real_t w, plain_place_t *p, bool rising)
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
@@ -336,27 +328,25 @@ static inline void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m
     }
     if (depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = plain_find_by_input(t, corner, depth, &k, rising ? w : -w, rising, false);
+        depth = plain_find_by_input(t, corner, depth, &k, rising ? w : -w, rising,
+                                      false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
     p->rising = rising;
-    plain_corners_settle_way(t, p, corner, depth, k, rising);
+    plain_corners_settle(t, p, corner, rising);
 }
 
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline void plain_corners_go_on(const plain_tables_t *t, const plain_corner_t *corner,
-                                                        plain_real_t w, plain_place_t *p, bool rising)
+/* The same of a move that goes on. */
+PLAIN_COPIES void plain_corners_go_on(const plain_tables_t *t, const plain_corner_t *corner, plain_real_t w,
+                                          plain_place_t *p, bool rising)
 {
     if (plain_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = plain_find_by_input(t, corner, p->depth, &k,
+        p->depth = (uint_least16_t)plain_find_by_input(t, corner, p->depth, &k,
             rising ? w : -w, rising, true);
-        p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        plain_corners_settle_way(t, p, corner, left, k, rising);
+        plain_corners_settle(t, p, corner, rising);
     }
 }
 
@@ -420,15 +410,11 @@ static unsigned int plain_level_not_reached(const plain_real_t *level, unsigned 
 
 /* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
    follow then, of which the first ones are known to; *end is the first play beyond what was left, if any was. x as a
-   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest likewise,
-   then the plays of one. A copy for each direction, which asks for it nowhere. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline unsigned int plain_corners_find(const plain_tables_t *t,
-                                                               const plain_corner_t *corner, unsigned int start,
-                                                               unsigned int depth, unsigned int *k, unsigned int *end,
-                                                               plain_real_t x, bool rising)
+   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest
+   likewise, then the plays of one. A copy for each direction, which asks for it nowhere. */
+PLAIN_COPIES unsigned int plain_corners_find(const plain_tables_t *t, const plain_corner_t *corner,
+                                                 unsigned int start, unsigned int depth, unsigned int *k,
+                                                 unsigned int *end, plain_real_t x, bool rising)
 {
     unsigned int low = start;
     unsigned int left = depth;
@@ -542,12 +528,10 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
             least = plain_from(corner[left].extremum, corner[left].side, last, true);
         }
         if (w < least && k > 1) { /* later answers of the same move must not lie before this one */
-            if (!(least > from)) {
-                return from;
-            }
-            plain_write_place(p, output, next_level, least, next, k, left, true);
+            w = least;
+            first = least;
+            level = output;
             *room = !(least > next);
-            return least;
         }
     }
     if (!(w > from)) {
@@ -610,12 +594,10 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corn
             least = plain_from(corner[left].extremum, corner[left].side, last, false);
         }
         if (w > least && k > 1) { /* later answers of the same move must not lie before this one */
-            if (!(least < from)) {
-                return from;
-            }
-            plain_write_place(p, output, next_level, least, next, k, left, false);
+            w = least;
+            first = least;
+            level = output;
             *room = !(least < next);
-            return least;
         }
     }
     if (!(w < from)) {
@@ -675,12 +657,12 @@ static const plain_tables_t plain_tables = {
     plain_threshold, NULL, plain_slope, NULL, plain_start_level, plain_reciprocal, 1.9224f, 6
 };
 
-static bool plain_finite(plain_real_t x)
+PLAIN_COPIES bool plain_finite(plain_real_t x)
 {
     return x >= -FLT_MAX && x <= FLT_MAX; /* false for NaN */
 }
 
-static plain_real_t plain_clamp_drive(plain_real_t v)
+PLAIN_COPIES plain_real_t plain_clamp_drive(plain_real_t v)
 {
     return v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX : v;
 }
@@ -737,7 +719,7 @@ static void plain_inverse_leave_fast(plain_inverse_t *self)
 }
 
 /* The actuator has seen w, which lies where solving put it. */
-static void plain_inverse_take(plain_inverse_t *self, plain_real_t w)
+PLAIN_COPIES void plain_inverse_take(plain_inverse_t *self, plain_real_t w)
 {
     plain_copy_place(&self->memory.here, &self->memory.there);
     self->memory.there.k = 0;
@@ -830,44 +812,50 @@ static plain_real_t plain_inverse_rest(plain_inverse_t *self)
     return m->w;
 }
 
-/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. From where it ends
-   samples are fast up to the reference at which another play follows, so that they need not look; a little short of it,
-   by more than rounding can be. */
+/* Where a move has ended, at v: from there samples are fast up to the reference at which another play follows, so that
+   they need not look; a little short of it, by more than rounding can be. */
+PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_t v, bool rising)
+{
+    const plain_place_t *p = &self->memory.there;
+    const plain_real_t end = rising ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN;
+    const plain_real_t most = rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN;
+    plain_real_t edge = p->next_output;
+    if (rising ? p->next > end : p->next < end) { /* the range ends before the next play */
+        if (rising ? v > end : v < end) {
+            return plain_inverse_stay(self, v);
+        }
+        edge = p->anchor_output + (end - p->anchor) * plain_slope[p->k];
+    }
+    if (rising ? edge > most : edge < most) {
+        edge = most;
+    }
+    self->edge[!rising] = self->reference;
+    self->edge[rising] = rising ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
+    self->gain = plain_reciprocal[p->k];
+    self->falling = !rising;
+    self->fast = 1;
+    self->pending = v;
+    return v;
+}
+
+/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that shorter ways save no registers for it */
 #endif
 static plain_real_t plain_inverse_rise(plain_inverse_t *self, unsigned int depth, unsigned int k,
     plain_real_t u)
 {
-    const plain_place_t *p = &self->memory.there;
     const plain_real_t from = self->memory.w;
     bool room = true;
     const plain_real_t v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, from, u,
         &self->memory.there, &room);
-    plain_real_t edge;
     if (!(v > from)) {
         return plain_inverse_rest(self);
     }
     if (!room) {
         return plain_inverse_stay(self, v);
     }
-    edge = p->next_output;
-    if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
-        if (v > PLAIN_DRIVE_MAX) {
-            return plain_inverse_stay(self, v);
-        }
-        edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
-    }
-    if (edge > PLAIN_OUTPUT_MAX) {
-        edge = PLAIN_OUTPUT_MAX;
-    }
-    self->edge[0] = self->reference;
-    self->edge[1] = edge - 2.2984315e-05f;
-    self->gain = plain_reciprocal[p->k];
-    self->falling = false;
-    self->fast = 1;
-    self->pending = v;
-    return v;
+    return plain_inverse_enter(self, v, true);
 }
 
 /* The same for a falling move. */
@@ -877,91 +865,27 @@ __attribute__((noinline)) /* so that shorter ways save no registers for it */
 static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth, unsigned int k,
     plain_real_t u)
 {
-    const plain_place_t *p = &self->memory.there;
     const plain_real_t from = self->memory.w;
     bool room = true;
     const plain_real_t v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, from, u,
         &self->memory.there, &room);
-    plain_real_t edge;
     if (!(v < from)) {
         return plain_inverse_rest(self);
     }
     if (!room) {
         return plain_inverse_stay(self, v);
     }
-    edge = p->next_output;
-    if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
-        if (v < PLAIN_DRIVE_MIN) {
-            return plain_inverse_stay(self, v);
-        }
-        edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
-    }
-    if (edge < PLAIN_OUTPUT_MIN) {
-        edge = PLAIN_OUTPUT_MIN;
-    }
-    self->edge[1] = self->reference;
-    self->edge[0] = edge + 2.2984315e-05f;
-    self->gain = plain_reciprocal[p->k];
-    self->falling = true;
-    self->fast = 1;
-    self->pending = v;
-    return v;
+    return plain_inverse_enter(self, v, false);
 }
 
-/* A rising move that takes no more plays along, and is fast from there on. */
-static plain_real_t plain_inverse_up(plain_inverse_t *self, plain_real_t v)
+/* A move that takes no more plays along, and is fast from there on. */
+PLAIN_COPIES plain_real_t plain_inverse_along(plain_inverse_t *self, plain_real_t v, bool rising)
 {
-    const plain_place_t *p = &self->memory.here;
-    plain_real_t edge;
-    if (!(v > self->memory.w)) {
+    if (!(rising ? v > self->memory.w : v < self->memory.w)) {
         return plain_inverse_rest(self);
     }
-    plain_copy_place(&self->memory.there, p);
-    edge = p->next_output;
-    if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
-        if (v > PLAIN_DRIVE_MAX) {
-            return plain_inverse_stay(self, v);
-        }
-        edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
-    }
-    if (edge > PLAIN_OUTPUT_MAX) {
-        edge = PLAIN_OUTPUT_MAX;
-    }
-    self->edge[0] = self->reference;
-    self->edge[1] = edge - 2.2984315e-05f;
-    self->gain = plain_reciprocal[p->k];
-    self->falling = false;
-    self->fast = 1;
-    self->pending = v;
-    return v;
-}
-
-/* A falling move that takes no more plays along, and is fast from there on. */
-static plain_real_t plain_inverse_down(plain_inverse_t *self, plain_real_t v)
-{
-    const plain_place_t *p = &self->memory.here;
-    plain_real_t edge;
-    if (!(v < self->memory.w)) {
-        return plain_inverse_rest(self);
-    }
-    plain_copy_place(&self->memory.there, p);
-    edge = p->next_output;
-    if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
-        if (v < PLAIN_DRIVE_MIN) {
-            return plain_inverse_stay(self, v);
-        }
-        edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
-    }
-    if (edge < PLAIN_OUTPUT_MIN) {
-        edge = PLAIN_OUTPUT_MIN;
-    }
-    self->edge[1] = self->reference;
-    self->edge[0] = edge + 2.2984315e-05f;
-    self->gain = plain_reciprocal[p->k];
-    self->falling = true;
-    self->fast = 1;
-    self->pending = v;
-    return v;
+    plain_copy_place(&self->memory.there, &self->memory.here);
+    return plain_inverse_enter(self, v, rising);
 }
 
 /* A move to u, which is what is asked for but for the limits, from where the memory is. */
@@ -976,7 +900,7 @@ static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked
     if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
         v = rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
     } else {
-        v = rising ? plain_inverse_up(self, v) : plain_inverse_down(self, v);
+        v = rising ? plain_inverse_along(self, v, true) : plain_inverse_along(self, v, false);
     }
     if (self->fast != 0 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
         plain_inverse_leave_fast(self);
@@ -1016,66 +940,33 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
     return plain_inverse_move(self, asked, u);
 }
 
-/* What is no number, within a fast move or behind a commit. */
-static plain_real_t plain_inverse_odd(plain_inverse_t *self)
+/* What is no number behind a commit. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_odd_behind(plain_inverse_t *self)
 {
     self->status |= PLAIN_STATUS_HELD;
-    if (self->fast == 1) {
-        return plain_inverse_hold(self);
-    }
     plain_inverse_take(self, self->pending);
     return plain_inverse_return(self);
 }
 
-/* Where a rising fast move turns back to a reference beyond the range, or to an infinite one. */
-static plain_real_t plain_inverse_turn_down_beyond(plain_inverse_t *self, plain_real_t u)
+/* What is no number, within a fast move. */
+static plain_real_t plain_inverse_odd(plain_inverse_t *self)
 {
-    plain_memory_t *m = &self->memory;
-    unsigned int depth = m->there.depth;
-    const plain_real_t output = PLAIN_OUTPUT_MIN;
-    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
-    if (!(u >= -FLT_MAX)) {
-        return plain_inverse_odd(self);
-    }
-    if (!(v < self->pending)) { /* a commit has led beyond what may be asked for: no turn */
-        return plain_inverse_look(self, u);
-    }
-    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
-    plain_inverse_take(self, self->pending);
-    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
-    if (m->here.k > 1) {
-        plain_corner_t *c = &self->corner[depth];
-        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
-        const plain_real_t z = plain_start_level[m->here.k - 1];
-        if (m->start > depth) {
-            m->start = (uint_least16_t)depth;
-        }
-        c->pass[0] = (z + z) - y;
-        c->pass[1] = y;
-        c->extremum = m->w;
-        c->end = m->here.k;
-        c->side = -1;
-        depth = depth + 1;
-    }
-    return plain_inverse_fall(self, depth, 1, PLAIN_OUTPUT_MIN);
+    self->status |= PLAIN_STATUS_HELD;
+    return plain_inverse_hold(self);
 }
 
-/* Where a falling fast move turns back to a reference beyond the range, or to an infinite one. */
-static plain_real_t plain_inverse_turn_up_beyond(plain_inverse_t *self, plain_real_t u)
+/* Where a fast move turns back to u, which is what is asked for but for the limits; it was rising, or not. */
+PLAIN_COPIES plain_real_t plain_inverse_turn(plain_inverse_t *self, plain_real_t asked,
+    plain_real_t u, unsigned int bits, bool rising)
 {
     plain_memory_t *m = &self->memory;
     unsigned int depth = m->there.depth;
-    const plain_real_t output = PLAIN_OUTPUT_MAX;
-    const plain_real_t v = m->there.anchor + (output - m->there.anchor_output) * self->gain;
-    if (!(u <= FLT_MAX)) {
-        return plain_inverse_odd(self);
-    }
-    if (!(v > self->pending)) { /* a commit has led beyond what may be asked for: no turn */
-        return plain_inverse_look(self, u);
-    }
-    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
     plain_inverse_take(self, self->pending);
-    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    plain_inverse_ask(self, asked, bits);
+    self->status |= bits;
     if (m->here.k > 1) {
         plain_corner_t *c = &self->corner[depth];
         const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
@@ -1083,14 +974,29 @@ static plain_real_t plain_inverse_turn_up_beyond(plain_inverse_t *self, plain_re
         if (m->start > depth) {
             m->start = (uint_least16_t)depth;
         }
-        c->pass[0] = -y;
-        c->pass[1] = (z + z) + y;
+        c->pass[0] = rising ? (z + z) - y : -y;
+        c->pass[1] = rising ? y : (z + z) + y;
         c->extremum = m->w;
         c->end = m->here.k;
-        c->side = 1;
+        c->side = rising ? -1 : 1;
         depth = depth + 1;
     }
-    return plain_inverse_rise(self, depth, 1, PLAIN_OUTPUT_MAX);
+    return rising ? plain_inverse_fall(self, depth, 1, u) : plain_inverse_rise(self, depth, 1, u);
+}
+
+/* The same to a reference beyond the range, or to an infinite one. */
+PLAIN_COPIES plain_real_t plain_inverse_turn_beyond(plain_inverse_t *self, plain_real_t u, bool rising)
+{
+    const plain_place_t *p = &self->memory.there;
+    const plain_real_t end = rising ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
+    const plain_real_t v = p->anchor + (end - p->anchor_output) * self->gain;
+    if (!plain_finite(u)) {
+        return plain_inverse_odd(self);
+    }
+    if (!(rising ? v < self->pending : v > self->pending)) { /* a commit has led beyond what may be asked for: no turn */
+        return plain_inverse_look(self, u);
+    }
+    return plain_inverse_turn(self, u, end, PLAIN_STATUS_INPUT_CLAMPED, rising);
 }
 
 /* A reference beyond the range on the way of a fast move; behind a commit the limit may lie behind. */
@@ -1098,6 +1004,70 @@ static plain_real_t plain_inverse_beyond(plain_inverse_t *self, plain_real_t u)
 {
     plain_inverse_take(self, self->pending);
     return plain_inverse_move(self, u, self->memory.here.rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
+}
+
+/* Where a fast move goes on to `output` and takes more plays along: just one more of the same corner, mostly. */
+PLAIN_COPIES plain_real_t plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_real_t output,
+    bool rising)
+{
+    plain_memory_t *m = &self->memory;
+    plain_place_t *p = &m->there;
+    const plain_corner_t *c = &self->corner[p->depth - 1];
+    const unsigned int k = p->k + 1u;
+    if (k < c->end && !(rising ? c->side < 0 : c->side > 0)) {
+        const plain_real_t y = rising ? c->pass[0] : c->pass[1]; /* where it rises with its sign changed */
+        const plain_real_t way = rising ? output + y : y - output;
+        plain_real_t r = plain_threshold[k];
+        plain_real_t z = plain_start_level[k];
+        plain_real_t v;
+        bool first = way < z;
+        if (c->side != 0) {
+            first = way * 0.5f < z;
+            r = r + r;
+            z = z + z;
+        }
+        r = rising ? c->extremum + r : c->extremum - r;
+        z = rising ? z - y : y - z; /* the last play of a corner goes by this output, the others by the way */
+        v = p->next + (output - p->next_output) * plain_reciprocal[k];
+        if (first && (rising ? output < z && v < r && v <= PLAIN_DRIVE_MAX
+                             : output > z && v > r && v >= PLAIN_DRIVE_MIN)) {
+            if (!(rising ? v > self->pending : v < self->pending)) {
+                plain_inverse_take(self, self->pending);
+                plain_inverse_ask(self, u, 0);
+                return plain_inverse_rest(self);
+            }
+            plain_copy_place(&m->here, p);
+            m->w = self->pending;
+            p->anchor = p->next;
+            p->anchor_output = p->next_output;
+            p->next = r;
+            p->next_output = z;
+            p->k = (uint_least16_t)k;
+            plain_inverse_ask(self, u, 0);
+            return plain_inverse_enter(self, v, rising);
+        }
+    }
+    plain_inverse_take(self, self->pending);
+    plain_inverse_ask(self, u, 0);
+    return rising ? plain_inverse_rise(self, m->here.depth, k, u) : plain_inverse_fall(self, m->here.depth, k, u);
+}
+
+/* The same to a reference beyond the range, or to an infinite one. */
+PLAIN_COPIES plain_real_t plain_inverse_on_beyond(plain_inverse_t *self, plain_real_t u, bool rising)
+{
+    const plain_place_t *p = &self->memory.there;
+    const unsigned int k = p->k + 1u;
+    if (!plain_finite(u)) {
+        return plain_inverse_odd(self);
+    }
+    if (!(rising ? PLAIN_OUTPUT_MAX >= p->next_output : PLAIN_OUTPUT_MIN <= p->next_output)) {
+        return plain_inverse_beyond(self, u);
+    }
+    plain_inverse_take(self, self->pending);
+    plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    return rising ? plain_inverse_rise(self, self->memory.here.depth, k, PLAIN_OUTPUT_MAX)
+                  : plain_inverse_fall(self, self->memory.here.depth, k, PLAIN_OUTPUT_MIN);
 }
 
 /* Where a fast move turns back, or takes just one more play of the same corner along, the usual ones among the samples
@@ -1108,213 +1078,57 @@ __attribute__((noinline))
 static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
 {
     const plain_real_t output = u;
-    plain_memory_t *m = &self->memory;
-    plain_place_t *p = &m->there;
+    const plain_place_t *p = &self->memory.there;
     plain_real_t last;
-    plain_real_t edge;
     plain_real_t v;
-    if (self->fast == 0) {
-        return plain_inverse_look(self, u);
+    bool beyond;
+    if (self->fast != 1) {
+        if (self->fast == 0) {
+            return plain_inverse_look(self, u);
+        }
+        if (!plain_finite(u)) {
+            return plain_inverse_odd_behind(self);
+        }
     }
     if (p->rising) {
         if (output >= p->next_output && u > self->edge[0]) {
-            const plain_corner_t *c;
-            const unsigned int k = p->k + 1u;
-            if (u > PLAIN_OUTPUT_MAX) {
-                if (!plain_finite(u)) {
-                    return plain_inverse_odd(self);
-                }
-                if (!(PLAIN_OUTPUT_MAX >= p->next_output)) {
-                    return plain_inverse_beyond(self, u);
-                }
-                plain_inverse_take(self, self->pending);
-                plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
-                self->status |= PLAIN_STATUS_INPUT_CLAMPED;
-                return plain_inverse_rise(self, m->here.depth, k, PLAIN_OUTPUT_MAX);
-            }
-            c = &self->corner[p->depth - 1];
-            if (k < c->end && !(c->side < 0)) {
-                const plain_real_t y = c->pass[0]; /* with its sign changed */
-                plain_real_t way = output + y;
-                plain_real_t r = plain_threshold[k];
-                plain_real_t z = plain_start_level[k];
-                bool first = way < z;
-                if (c->side != 0) {
-                    first = way * 0.5f < z;
-                    r = r + r;
-                    z = z + z;
-                }
-                r = c->extremum + r;
-                z = z - y; /* the last play of a corner goes by this output, the others by the way */
-                v = p->next + (output - p->next_output) * plain_reciprocal[k];
-                if (first && output < z && v < r && v <= PLAIN_DRIVE_MAX) {
-                    if (!(v > self->pending)) {
-                        plain_inverse_take(self, self->pending);
-                        plain_inverse_ask(self, u, 0);
-                        return plain_inverse_rest(self);
-                    }
-                    plain_copy_place(&m->here, p);
-                    m->w = self->pending;
-                    p->anchor = p->next;
-                    p->anchor_output = p->next_output;
-                    p->next = r;
-                    p->next_output = z;
-                    p->k = (uint_least16_t)k;
-                    plain_inverse_ask(self, u, 0);
-                    edge = p->next_output;
-                    if (p->next > PLAIN_DRIVE_MAX) { /* the range ends before the next play */
-                        edge = p->anchor_output + (PLAIN_DRIVE_MAX - p->anchor) * plain_slope[p->k];
-                    }
-                    if (edge > PLAIN_OUTPUT_MAX) {
-                        edge = PLAIN_OUTPUT_MAX;
-                    }
-                    self->edge[0] = self->reference;
-                    self->edge[1] = edge - 2.2984315e-05f;
-                    self->gain = plain_reciprocal[p->k];
-                    self->falling = false;
-                    self->fast = 1;
-                    self->pending = v;
-                    return v;
-
-                }
-            }
-            plain_inverse_take(self, self->pending);
-            plain_inverse_ask(self, u, 0);
-            return plain_inverse_rise(self, m->here.depth, k, u);
+            return u > PLAIN_OUTPUT_MAX ? plain_inverse_on_beyond(self, u, true)
+                : plain_inverse_on(self, u, output, true);
         }
-
+        if (u < PLAIN_OUTPUT_MIN) {
+            return plain_inverse_turn_beyond(self, u, true);
+        }
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v < self->pending) {
-            unsigned int depth = p->depth;
-            if (u < PLAIN_OUTPUT_MIN) {
-                return plain_inverse_turn_down_beyond(self, u);
-            }
-            plain_inverse_take(self, self->pending);
-            plain_inverse_ask(self, u, 0);
-            if (m->here.k > 1) {
-                plain_corner_t *c = &self->corner[depth];
-                const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
-                const plain_real_t z = plain_start_level[m->here.k - 1];
-                if (m->start > depth) {
-                    m->start = (uint_least16_t)depth;
-                }
-                c->pass[0] = (z + z) - y;
-                c->pass[1] = y;
-                c->extremum = m->w;
-                c->end = m->here.k;
-                c->side = -1;
-                depth = depth + 1;
-            }
-    return plain_inverse_fall(self, depth, 1, u);
+            return plain_inverse_turn(self, u, u, 0, true);
         }
 } else {
         if (output <= p->next_output && u < self->edge[1]) {
-            const plain_corner_t *c;
-            const unsigned int k = p->k + 1u;
-            if (u < PLAIN_OUTPUT_MIN) {
-                if (!plain_finite(u)) {
-                    return plain_inverse_odd(self);
-                }
-                if (!(PLAIN_OUTPUT_MIN <= p->next_output)) {
-                    return plain_inverse_beyond(self, u);
-                }
-                plain_inverse_take(self, self->pending);
-                plain_inverse_ask(self, u, PLAIN_STATUS_INPUT_CLAMPED);
-                self->status |= PLAIN_STATUS_INPUT_CLAMPED;
-                return plain_inverse_fall(self, m->here.depth, k, PLAIN_OUTPUT_MIN);
-            }
-            c = &self->corner[p->depth - 1];
-            if (k < c->end && !(c->side > 0)) {
-                const plain_real_t y = c->pass[1];
-                plain_real_t way = y - output;
-                plain_real_t r = plain_threshold[k];
-                plain_real_t z = plain_start_level[k];
-                bool first = way < z;
-                if (c->side != 0) {
-                    first = way * 0.5f < z;
-                    r = r + r;
-                    z = z + z;
-                }
-                r = c->extremum - r;
-                z = y - z; /* the last play of a corner goes by this output, the others by the way */
-                v = p->next + (output - p->next_output) * plain_reciprocal[k];
-                if (first && output > z && v > r && v >= PLAIN_DRIVE_MIN) {
-                    if (!(v < self->pending)) {
-                        plain_inverse_take(self, self->pending);
-                        plain_inverse_ask(self, u, 0);
-                        return plain_inverse_rest(self);
-                    }
-                    plain_copy_place(&m->here, p);
-                    m->w = self->pending;
-                    p->anchor = p->next;
-                    p->anchor_output = p->next_output;
-                    p->next = r;
-                    p->next_output = z;
-                    p->k = (uint_least16_t)k;
-                    plain_inverse_ask(self, u, 0);
-                    edge = p->next_output;
-                    if (p->next < PLAIN_DRIVE_MIN) { /* the range ends before the next play */
-                        edge = p->anchor_output + (PLAIN_DRIVE_MIN - p->anchor) * plain_slope[p->k];
-                    }
-                    if (edge < PLAIN_OUTPUT_MIN) {
-                        edge = PLAIN_OUTPUT_MIN;
-                    }
-                    self->edge[1] = self->reference;
-                    self->edge[0] = edge + 2.2984315e-05f;
-                    self->gain = plain_reciprocal[p->k];
-                    self->falling = true;
-                    self->fast = 1;
-                    self->pending = v;
-                    return v;
-
-                }
-            }
-            plain_inverse_take(self, self->pending);
-            plain_inverse_ask(self, u, 0);
-            return plain_inverse_fall(self, m->here.depth, k, u);
+            return u < PLAIN_OUTPUT_MIN ? plain_inverse_on_beyond(self, u, false)
+                : plain_inverse_on(self, u, output, false);
         }
-
+        if (u > PLAIN_OUTPUT_MAX) {
+            return plain_inverse_turn_beyond(self, u, false);
+        }
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v > self->pending) {
-            unsigned int depth = p->depth;
-            if (u > PLAIN_OUTPUT_MAX) {
-                return plain_inverse_turn_up_beyond(self, u);
-            }
-            plain_inverse_take(self, self->pending);
-            plain_inverse_ask(self, u, 0);
-            if (m->here.k > 1) {
-                plain_corner_t *c = &self->corner[depth];
-                const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
-                const plain_real_t z = plain_start_level[m->here.k - 1];
-                if (m->start > depth) {
-                    m->start = (uint_least16_t)depth;
-                }
-                c->pass[0] = -y;
-                c->pass[1] = (z + z) + y;
-                c->extremum = m->w;
-                c->end = m->here.k;
-                c->side = 1;
-                depth = depth + 1;
-            }
-    return plain_inverse_rise(self, depth, 1, u);
+            return plain_inverse_turn(self, u, u, 0, false);
         }
 }
     if (!plain_finite(u)) {
         return plain_inverse_odd(self);
     }
     last = self->edge[self->falling];
-    if ((u >= last && u <= last) || (p->rising
-        ? u > PLAIN_OUTPUT_MAX && last > PLAIN_OUTPUT_MAX && PLAIN_OUTPUT_MAX < p->next_output
-        : u < PLAIN_OUTPUT_MIN && last < PLAIN_OUTPUT_MIN && PLAIN_OUTPUT_MIN > p->next_output)) {
+    beyond = p->rising ? u > PLAIN_OUTPUT_MAX : u < PLAIN_OUTPUT_MIN;
+    if ((u >= last && u <= last) || (beyond && (p->rising
+        ? last > PLAIN_OUTPUT_MAX && PLAIN_OUTPUT_MAX < p->next_output
+        : last < PLAIN_OUTPUT_MIN && PLAIN_OUTPUT_MIN > p->next_output))) {
         /* the last answer once more, for the same reference or one with the same limit; the drive has come to it */
         self->edge[self->falling] = u;
         self->status |= self->bits;
         return plain_inverse_hold(self);
     }
-    if (p->rising ? u > PLAIN_OUTPUT_MAX : u < PLAIN_OUTPUT_MIN) {
-        return plain_inverse_beyond(self, u);
-    }
-    return plain_inverse_look(self, u);
+    return beyond ? plain_inverse_beyond(self, u) : plain_inverse_look(self, u);
 }
 
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)

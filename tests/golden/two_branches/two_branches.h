@@ -137,6 +137,17 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #pragma STDC FP_CONTRACT OFF
 #endif
 
+/* A function that several places need, or both directions of a move. Where floating point is hardware it stands in each
+   of them, and what is known there need not be asked; where each operation is a call, that would save little and be
+   long. */
+#if !defined(__GNUC__)
+#define TWO_BRANCHES_COPIES static inline
+#elif (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)
+#define TWO_BRANCHES_COPIES __attribute__((noinline)) static
+#else
+#define TWO_BRANCHES_COPIES __attribute__((always_inline)) static inline
+#endif
+
 /* The constant tables of one model in floating point. */
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */
@@ -379,15 +390,13 @@ static two_branches_real_t two_branches_activation(const two_branches_tables_t *
     return two_branches_from(c->extremum, c->side, t->threshold[k], rising);
 }
 
-/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured
-   from the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline void two_branches_corners_settle_way(const two_branches_tables_t *t, two_branches_place_t *p,
-                                                             const two_branches_corner_t *corner, unsigned int depth,
-                                                             unsigned int k, bool rising)
+/* Brings a place's anchor and next up to date after k, depth or the direction have changed. The anchor is measured from
+   the corner that holds play k: what is not moved by a move is not computed anew, and rounding does not pile up. */
+TWO_BRANCHES_COPIES void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_place_t *p,
+                                           const two_branches_corner_t *corner, bool rising)
 {
+    const unsigned int depth = p->depth;
+    const unsigned int k = p->k;
     if (depth > 0) {
         const two_branches_corner_t *c = &corner[depth - 1];
         const two_branches_real_t e = c->extremum;
@@ -431,15 +440,6 @@ static inline void two_branches_corners_settle_way(const two_branches_tables_t *
     }
 }
 
-static void two_branches_corners_settle(const two_branches_tables_t *t, two_branches_place_t *p, const two_branches_corner_t *corner)
-{
-    if (p->rising) {
-        two_branches_corners_settle_way(t, p, corner, p->depth, p->k, true);
-    } else {
-        two_branches_corners_settle_way(t, p, corner, p->depth, p->k, false);
-    }
-}
-
 /* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
 static two_branches_real_t two_branches_way(two_branches_real_t x, two_branches_real_t held, int side)
 {
@@ -459,11 +459,8 @@ static bool two_branches_opposite(int side, bool rising)
 }
 
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline unsigned int two_branches_threshold_not_reached(const two_branches_real_t *step, unsigned int k,
-                                                                        unsigned int high, two_branches_real_t x)
+TWO_BRANCHES_COPIES unsigned int two_branches_threshold_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
+                                                          two_branches_real_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
@@ -491,20 +488,19 @@ static unsigned int two_branches_threshold_not_reached_near(const two_branches_r
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
    known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays along. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline unsigned int two_branches_find_by_input(const two_branches_tables_t *t,
-                                                                const two_branches_corner_t *corner, unsigned int depth,
-                                                                unsigned int *k, two_branches_real_t x, bool rising, bool near)
+   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
+   along. */
+TWO_BRANCHES_COPIES unsigned int two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                  unsigned int depth, unsigned int *k, two_branches_real_t x, bool rising,
+                                                  bool near)
 {
     unsigned int low = 0;
     unsigned int left = depth;
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const two_branches_corner_t *c = &corner[middle];
-        if (x >= two_branches_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side, t->threshold[c->end - 1])) {
+        if (x >= two_branches_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
+                                   t->threshold[c->end - 1])) {
             left = middle;
             *k = c->end;
         } else {
@@ -582,7 +578,7 @@ static void two_branches_corners_rest(const two_branches_tables_t *t, two_branch
         m->here.depth = 1;
         m->start = 1;
     }
-    two_branches_corners_settle(t, &m->here, corner);
+    two_branches_corners_settle(t, &m->here, corner, true);
 }
 
 /* Output of the play sum for the memory as it is. */
@@ -597,13 +593,9 @@ static void two_branches_push_corner(const two_branches_tables_t *t, two_branche
     two_branches_leave_corner(t, m, corner, two_branches_corners_output(t, m));
 }
 
-/* A move to w that turns or goes on, from where p tells of the plays to where it does at its end. A copy for each. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline void two_branches_corners_turn(const two_branches_tables_t *t, two_branches_memory_t *m,
-                                                       two_branches_corner_t *corner, two_branches_real_t w, two_branches_place_t *p,
-                                                       bool rising)
+/* A move to w that turns, from where p tells of the plays to where it does at its end. */
+TWO_BRANCHES_COPIES void two_branches_corners_turn(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                         two_branches_real_t w, two_branches_place_t *p, bool rising)
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
@@ -613,27 +605,25 @@ static inline void two_branches_corners_turn(const two_branches_tables_t *t, two
     }
     if (depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = two_branches_find_by_input(t, corner, depth, &k, rising ? w : -w, rising, false);
+        depth = two_branches_find_by_input(t, corner, depth, &k, rising ? w : -w, rising,
+                                      false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
     p->rising = rising;
-    two_branches_corners_settle_way(t, p, corner, depth, k, rising);
+    two_branches_corners_settle(t, p, corner, rising);
 }
 
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline void two_branches_corners_go_on(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                        two_branches_real_t w, two_branches_place_t *p, bool rising)
+/* The same of a move that goes on. */
+TWO_BRANCHES_COPIES void two_branches_corners_go_on(const two_branches_tables_t *t, const two_branches_corner_t *corner, two_branches_real_t w,
+                                          two_branches_place_t *p, bool rising)
 {
     if (two_branches_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        const unsigned int left = two_branches_find_by_input(t, corner, p->depth, &k,
+        p->depth = (uint_least16_t)two_branches_find_by_input(t, corner, p->depth, &k,
             rising ? w : -w, rising, true);
-        p->depth = (uint_least16_t)left;
         p->k = (uint_least16_t)k;
-        two_branches_corners_settle_way(t, p, corner, left, k, rising);
+        two_branches_corners_settle(t, p, corner, rising);
     }
 }
 
@@ -697,15 +687,11 @@ static unsigned int two_branches_level_not_reached(const two_branches_real_t *le
 
 /* Where a move to output x leads: corners it leaves of `depth`, the lowest `start` of which are of the start; *k plays
    follow then, of which the first ones are known to; *end is the first play beyond what was left, if any was. x as a
-   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest likewise,
-   then the plays of one. A copy for each direction, which asks for it nowhere. */
-#if defined(__GNUC__)
-__attribute__((always_inline))
-#endif
-static inline unsigned int two_branches_corners_find(const two_branches_tables_t *t,
-                                                               const two_branches_corner_t *corner, unsigned int start,
-                                                               unsigned int depth, unsigned int *k, unsigned int *end,
-                                                               two_branches_real_t x, bool rising)
+   rising move sees it. First the blocks that are passed whole, by bisection, those of the start but the lowest
+   likewise, then the plays of one. A copy for each direction, which asks for it nowhere. */
+TWO_BRANCHES_COPIES unsigned int two_branches_corners_find(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                 unsigned int start, unsigned int depth, unsigned int *k,
+                                                 unsigned int *end, two_branches_real_t x, bool rising)
 {
     unsigned int low = start;
     unsigned int left = depth;
@@ -819,12 +805,10 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
             least = two_branches_from(corner[left].extremum, corner[left].side, last, true);
         }
         if (w < least && k > 1) { /* later answers of the same move must not lie before this one */
-            if (!(least > from)) {
-                return from;
-            }
-            two_branches_write_place(p, output, next_level, least, next, k, left, true);
+            w = least;
+            first = least;
+            level = output;
             *room = !(least > next);
-            return least;
         }
     }
     if (!(w > from)) {
@@ -887,12 +871,10 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
             least = two_branches_from(corner[left].extremum, corner[left].side, last, false);
         }
         if (w > least && k > 1) { /* later answers of the same move must not lie before this one */
-            if (!(least < from)) {
-                return from;
-            }
-            two_branches_write_place(p, output, next_level, least, next, k, left, false);
+            w = least;
+            first = least;
+            level = output;
             *room = !(least < next);
-            return least;
         }
     }
     if (!(w < from)) {
@@ -978,12 +960,12 @@ static const two_branches_envelope_t two_branches_stage_1_descending = {
     6.0f, 0.4f, 0.1f, 0.5f, 0.16666667f, 2.5f, 0.99999994f
 };
 
-static bool two_branches_finite(two_branches_real_t x)
+TWO_BRANCHES_COPIES bool two_branches_finite(two_branches_real_t x)
 {
     return x >= -FLT_MAX && x <= FLT_MAX; /* false for NaN */
 }
 
-static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v)
+TWO_BRANCHES_COPIES two_branches_real_t two_branches_clamp_drive(two_branches_real_t v)
 {
     return v < TWO_BRANCHES_DRIVE_MIN ? TWO_BRANCHES_DRIVE_MIN : v > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX : v;
 }
