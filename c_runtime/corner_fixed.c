@@ -17,9 +17,9 @@ static void hystgen_write_corner(const hystgen_tables_t *t, hystgen_corner_t *c,
     c->side = (int_least8_t)side;
 }
 
-/* Leaves the corner of turning back, at `output`, above those that are held. */
+/* Leaves the corner of turning back, at `output`, above those that are held; until then w has risen, or fallen. */
 static void hystgen_leave_corner(const hystgen_tables_t *t, const hystgen_memory_t *m, hystgen_corner_t *corner,
-                                 hystgen_sum_t output)
+                                 hystgen_sum_t output, bool risen)
 {
-    hystgen_write_corner(t, &corner[m->here.depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+    hystgen_write_corner(t, &corner[m->here.depth], m->w, output, m->here.k, risen ? -1 : 1);
 }

@@ -27,13 +27,13 @@ static void hystgen_write_corner(const hystgen_tables_t *t, hystgen_corner_t *c,
     c->side = (int_least8_t)side;
 }
 
-/* Leaves the corner of turning back, at `output`, above those that are held. */
-static void hystgen_leave_corner(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                                 hystgen_real_t output)
+/* Leaves the corner of turning back, at `output`, above those that are held; until then w has risen, or fallen. */
+HYSTGEN_COPIES void hystgen_leave_corner(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                         hystgen_real_t output, bool risen)
 {
     const unsigned int depth = m->here.depth;
     if (m->start > depth) {
         m->start = (uint_least16_t)depth;
     }
-    hystgen_write_corner(t, &corner[depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+    hystgen_write_corner(t, &corner[depth], m->w, output, m->here.k, risen ? -1 : 1);
 }

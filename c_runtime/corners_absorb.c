@@ -124,11 +124,10 @@ static unsigned int hystgen_threshold_not_reached_near(const hystgen_play_t *ste
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
-   along. */
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   mostly takes one or two more plays along. */
 HYSTGEN_COPIES unsigned int hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                  unsigned int depth, unsigned int *k, hystgen_sum_t x, bool rising,
+                                                  unsigned int depth, unsigned int *k, hystgen_play_t w, bool rising,
                                                   bool near)
 {
     unsigned int low = 0;
@@ -136,19 +135,22 @@ HYSTGEN_COPIES unsigned int hystgen_find_by_input(const hystgen_tables_t *t, con
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const hystgen_corner_t *c = &corner[middle];
-        if (x >= hystgen_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
-                                   t->threshold[c->end - 1])) {
+        const hystgen_play_t *r = &t->threshold[c->end];
+        if (hystgen_reached(w, (hystgen_reach_t)hystgen_from(c->extremum, c->side, r[-1], rising), rising)) {
             left = middle;
             *k = c->end;
         } else {
             low = middle + 1;
         }
     }
-    if (left > 0 && hystgen_opposite(corner[left - 1].side, rising)) {
+    if (left > 0) {
         const hystgen_corner_t *c = &corner[left - 1];
-        const hystgen_sum_t way = hystgen_way(x, rising ? c->extremum : -c->extremum, c->side);
-        *k = near ? hystgen_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                  : hystgen_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
+            const hystgen_sum_t on = rising ? (hystgen_sum_t)w - c->extremum : (hystgen_sum_t)c->extremum - w;
+            const hystgen_sum_t way = c->side == 0 ? on : hystgen_half(on); /* in the measure of the thresholds */
+            *k = near ? hystgen_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                      : hystgen_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        }
     }
     return left;
 }
@@ -245,10 +247,11 @@ HYSTGEN_API hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, cons
     return m->here.anchor_output + ((hystgen_sum_t)m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Leaves the corner of turning back above those that are held. */
-static void hystgen_push_corner(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner)
+/* Leaves the corner of turning back above those that are held; until then w has risen, or fallen. */
+HYSTGEN_COPIES void hystgen_push_corner(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                                        bool risen)
 {
-    hystgen_leave_corner(t, m, corner, hystgen_corners_output(t, m));
+    hystgen_leave_corner(t, m, corner, hystgen_corners_output(t, m), risen);
 }
 
 /* A move to w that turns, from where p tells of the plays to where it does at its end. */
@@ -258,13 +261,12 @@ HYSTGEN_COPIES void hystgen_corners_turn(const hystgen_tables_t *t, hystgen_memo
     unsigned int depth = p->depth;
     unsigned int k = 1;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
-        hystgen_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        hystgen_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
     }
     if (depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = hystgen_find_by_input(t, corner, depth, &k, rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising,
-                                      false);
+        depth = hystgen_find_by_input(t, corner, depth, &k, w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -278,8 +280,7 @@ HYSTGEN_COPIES void hystgen_corners_go_on(const hystgen_tables_t *t, const hystg
 {
     if (hystgen_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        p->depth = (uint_least16_t)hystgen_find_by_input(t, corner, p->depth, &k,
-            rising ? (hystgen_sum_t)w : -(hystgen_sum_t)w, rising, true);
+        p->depth = (uint_least16_t)hystgen_find_by_input(t, corner, p->depth, &k, w, rising, true);
         p->k = (uint_least16_t)k;
         hystgen_corners_settle(t, p, corner, rising);
     }

@@ -67,7 +67,7 @@ HYSTGEN_API hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t
             return hystgen_going(t, m->w, rising ? output - here : here - output, p->k, rising);
         }
     } else if (p->k > 1) {
-        hystgen_leave_corner(t, m, corner, here);
+        hystgen_leave_corner(t, m, corner, here, p->rising);
     }
     m->there.rising = rising;
     hystgen_corners_seek(t, m, corner, output);

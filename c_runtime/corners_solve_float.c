@@ -167,7 +167,7 @@ HYSTGEN_API bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory
             return false;
         }
         if (here->k > 1) { /* the move turns back */
-            hystgen_push_corner(t, m, corner);
+            hystgen_push_corner(t, m, corner, here->rising);
             *depth = *depth + 1;
         }
         *k = 1;

@@ -92,11 +92,11 @@ static void curved_write_corner(const curved_tables_t *t, curved_corner_t *c, cu
     c->side = (int_least8_t)side;
 }
 
-/* Leaves the corner of turning back, at `output`, above those that are held. */
+/* Leaves the corner of turning back, at `output`, above those that are held; until then w has risen, or fallen. */
 static void curved_leave_corner(const curved_tables_t *t, const curved_memory_t *m, curved_corner_t *corner,
-                                 curved_sum_t output)
+                                 curved_sum_t output, bool risen)
 {
-    curved_write_corner(t, &corner[m->here.depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+    curved_write_corner(t, &corner[m->here.depth], m->w, output, m->here.k, risen ? -1 : 1);
 }
 
 static bool curved_reached(curved_reach_t x, curved_reach_t level, bool rising)
@@ -229,14 +229,13 @@ static unsigned int curved_threshold_not_reached_near(const curved_play_t *step,
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
-   along. */
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   mostly takes one or two more plays along. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
 static inline unsigned int curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner,
-                                                  unsigned int depth, unsigned int *k, curved_sum_t x, bool rising,
+                                                  unsigned int depth, unsigned int *k, curved_play_t w, bool rising,
                                                   bool near)
 {
     unsigned int low = 0;
@@ -244,19 +243,22 @@ static inline unsigned int curved_find_by_input(const curved_tables_t *t, const 
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const curved_corner_t *c = &corner[middle];
-        if (x >= curved_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
-                                   t->threshold[c->end - 1])) {
+        const curved_play_t *r = &t->threshold[c->end];
+        if (curved_reached(w, (curved_reach_t)curved_from(c->extremum, c->side, r[-1], rising), rising)) {
             left = middle;
             *k = c->end;
         } else {
             low = middle + 1;
         }
     }
-    if (left > 0 && curved_opposite(corner[left - 1].side, rising)) {
+    if (left > 0) {
         const curved_corner_t *c = &corner[left - 1];
-        const curved_sum_t way = curved_way(x, rising ? c->extremum : -c->extremum, c->side);
-        *k = near ? curved_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                  : curved_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
+            const curved_sum_t on = rising ? (curved_sum_t)w - c->extremum : (curved_sum_t)c->extremum - w;
+            const curved_sum_t way = c->side == 0 ? on : curved_half(on); /* in the measure of the thresholds */
+            *k = near ? curved_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                      : curved_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        }
     }
     return left;
 }
@@ -332,10 +334,14 @@ static curved_sum_t curved_corners_output(const curved_tables_t *t, const curved
     return m->here.anchor_output + ((curved_sum_t)m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Leaves the corner of turning back above those that are held. */
-static void curved_push_corner(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner)
+/* Leaves the corner of turning back above those that are held; until then w has risen, or fallen. */
+#if defined(__GNUC__)
+__attribute__((always_inline))
+#endif
+static inline void curved_push_corner(const curved_tables_t *t, curved_memory_t *m, curved_corner_t *corner,
+                                        bool risen)
 {
-    curved_leave_corner(t, m, corner, curved_corners_output(t, m));
+    curved_leave_corner(t, m, corner, curved_corners_output(t, m), risen);
 }
 
 /* A move to w that turns, from where p tells of the plays to where it does at its end. */
@@ -348,13 +354,12 @@ static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t
     unsigned int depth = p->depth;
     unsigned int k = 1;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
-        curved_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        curved_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
     }
     if (depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = curved_find_by_input(t, corner, depth, &k, rising ? (curved_sum_t)w : -(curved_sum_t)w, rising,
-                                      false);
+        depth = curved_find_by_input(t, corner, depth, &k, w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -371,8 +376,7 @@ static inline void curved_corners_go_on(const curved_tables_t *t, const curved_c
 {
     if (curved_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        p->depth = (uint_least16_t)curved_find_by_input(t, corner, p->depth, &k,
-            rising ? (curved_sum_t)w : -(curved_sum_t)w, rising, true);
+        p->depth = (uint_least16_t)curved_find_by_input(t, corner, p->depth, &k, w, rising, true);
         p->k = (uint_least16_t)k;
         curved_corners_settle(t, p, corner, rising);
     }
@@ -553,7 +557,7 @@ static curved_reach_t curved_corners_solve_from(const curved_tables_t *t, curved
             return curved_going(t, m->w, rising ? output - here : here - output, p->k, rising);
         }
     } else if (p->k > 1) {
-        curved_leave_corner(t, m, corner, here);
+        curved_leave_corner(t, m, corner, here, p->rising);
     }
     m->there.rising = rising;
     curved_corners_seek(t, m, corner, output);

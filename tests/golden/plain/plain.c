@@ -75,15 +75,15 @@ static void plain_write_corner(const plain_tables_t *t, plain_corner_t *c, plain
     c->side = (int_least8_t)side;
 }
 
-/* Leaves the corner of turning back, at `output`, above those that are held. */
-static void plain_leave_corner(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
-                                 plain_real_t output)
+/* Leaves the corner of turning back, at `output`, above those that are held; until then w has risen, or fallen. */
+PLAIN_COPIES void plain_leave_corner(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                         plain_real_t output, bool risen)
 {
     const unsigned int depth = m->here.depth;
     if (m->start > depth) {
         m->start = (uint_least16_t)depth;
     }
-    plain_write_corner(t, &corner[depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+    plain_write_corner(t, &corner[depth], m->w, output, m->here.k, risen ? -1 : 1);
 }
 
 static bool plain_reached(plain_real_t x, plain_real_t level, bool rising)
@@ -163,24 +163,6 @@ PLAIN_COPIES void plain_corners_settle(const plain_tables_t *t, plain_place_t *p
     }
 }
 
-/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
-static plain_real_t plain_way(plain_real_t x, plain_real_t held, int side)
-{
-    return side == 0 ? x - held : plain_half(x - held);
-}
-
-/* Where the last play of a corner's block starts to follow a rising move. */
-static plain_real_t plain_last_step(plain_real_t held, int side, plain_real_t steps)
-{
-    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
-}
-
-/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
-static bool plain_opposite(int side, bool rising)
-{
-    return rising ? side >= 0 : side <= 0;
-}
-
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
 PLAIN_COPIES unsigned int plain_threshold_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
                                                           plain_real_t x)
@@ -210,11 +192,10 @@ static unsigned int plain_threshold_not_reached_near(const plain_real_t *step, u
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
-   along. */
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   mostly takes one or two more plays along. */
 PLAIN_COPIES unsigned int plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner,
-                                                  unsigned int depth, unsigned int *k, plain_real_t x, bool rising,
+                                                  unsigned int depth, unsigned int *k, plain_real_t w, bool rising,
                                                   bool near)
 {
     unsigned int low = 0;
@@ -222,19 +203,22 @@ PLAIN_COPIES unsigned int plain_find_by_input(const plain_tables_t *t, const pla
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const plain_corner_t *c = &corner[middle];
-        if (x >= plain_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
-                                   t->threshold[c->end - 1])) {
+        const plain_real_t *r = &t->threshold[c->end];
+        if (plain_reached(w, plain_from(c->extremum, c->side, r[-1], rising), rising)) {
             left = middle;
             *k = c->end;
         } else {
             low = middle + 1;
         }
     }
-    if (left > 0 && plain_opposite(corner[left - 1].side, rising)) {
+    if (left > 0) {
         const plain_corner_t *c = &corner[left - 1];
-        const plain_real_t way = plain_way(x, rising ? c->extremum : -c->extremum, c->side);
-        *k = near ? plain_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                  : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
+            const plain_real_t on = rising ? w - c->extremum : c->extremum - w;
+            const plain_real_t way = c->side == 0 ? on : plain_half(on); /* in the measure of the thresholds */
+            *k = near ? plain_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                      : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        }
     }
     return left;
 }
@@ -310,10 +294,11 @@ static plain_real_t plain_corners_output(const plain_tables_t *t, const plain_me
     return m->here.anchor_output + (m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Leaves the corner of turning back above those that are held. */
-static void plain_push_corner(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner)
+/* Leaves the corner of turning back above those that are held; until then w has risen, or fallen. */
+PLAIN_COPIES void plain_push_corner(const plain_tables_t *t, plain_memory_t *m, plain_corner_t *corner,
+                                        bool risen)
 {
-    plain_leave_corner(t, m, corner, plain_corners_output(t, m));
+    plain_leave_corner(t, m, corner, plain_corners_output(t, m), risen);
 }
 
 /* A move to w that turns, from where p tells of the plays to where it does at its end. */
@@ -323,13 +308,12 @@ PLAIN_COPIES void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m,
     unsigned int depth = p->depth;
     unsigned int k = 1;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
-        plain_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        plain_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
     }
     if (depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = plain_find_by_input(t, corner, depth, &k, rising ? w : -w, rising,
-                                      false);
+        depth = plain_find_by_input(t, corner, depth, &k, w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -343,8 +327,7 @@ PLAIN_COPIES void plain_corners_go_on(const plain_tables_t *t, const plain_corne
 {
     if (plain_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        p->depth = (uint_least16_t)plain_find_by_input(t, corner, p->depth, &k,
-            rising ? w : -w, rising, true);
+        p->depth = (uint_least16_t)plain_find_by_input(t, corner, p->depth, &k, w, rising, true);
         p->k = (uint_least16_t)k;
         plain_corners_settle(t, p, corner, rising);
     }
@@ -626,7 +609,7 @@ static bool plain_corners_begin(const plain_tables_t *t, plain_memory_t *m, plai
             return false;
         }
         if (here->k > 1) { /* the move turns back */
-            plain_push_corner(t, m, corner);
+            plain_push_corner(t, m, corner, here->rising);
             *depth = *depth + 1;
         }
         *k = 1;
@@ -879,7 +862,7 @@ static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth
 }
 
 /* A move that takes no more plays along, and is fast from there on. */
-PLAIN_COPIES plain_real_t plain_inverse_along(plain_inverse_t *self, plain_real_t v, bool rising)
+static plain_real_t plain_inverse_along(plain_inverse_t *self, plain_real_t v, bool rising)
 {
     if (!(rising ? v > self->memory.w : v < self->memory.w)) {
         return plain_inverse_rest(self);
@@ -900,7 +883,7 @@ static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked
     if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
         v = rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
     } else {
-        v = rising ? plain_inverse_along(self, v, true) : plain_inverse_along(self, v, false);
+        v = plain_inverse_along(self, v, rising);
     }
     if (self->fast != 0 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
         plain_inverse_leave_fast(self);

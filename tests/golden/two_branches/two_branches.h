@@ -352,15 +352,15 @@ static void two_branches_write_corner(const two_branches_tables_t *t, two_branch
     c->side = (int_least8_t)side;
 }
 
-/* Leaves the corner of turning back, at `output`, above those that are held. */
-static void two_branches_leave_corner(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
-                                 two_branches_real_t output)
+/* Leaves the corner of turning back, at `output`, above those that are held; until then w has risen, or fallen. */
+TWO_BRANCHES_COPIES void two_branches_leave_corner(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                         two_branches_real_t output, bool risen)
 {
     const unsigned int depth = m->here.depth;
     if (m->start > depth) {
         m->start = (uint_least16_t)depth;
     }
-    two_branches_write_corner(t, &corner[depth], m->w, output, m->here.k, m->here.rising ? -1 : 1);
+    two_branches_write_corner(t, &corner[depth], m->w, output, m->here.k, risen ? -1 : 1);
 }
 
 static bool two_branches_reached(two_branches_real_t x, two_branches_real_t level, bool rising)
@@ -440,24 +440,6 @@ TWO_BRANCHES_COPIES void two_branches_corners_settle(const two_branches_tables_t
     }
 }
 
-/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
-static two_branches_real_t two_branches_way(two_branches_real_t x, two_branches_real_t held, int side)
-{
-    return side == 0 ? x - held : two_branches_half(x - held);
-}
-
-/* Where the last play of a corner's block starts to follow a rising move. */
-static two_branches_real_t two_branches_last_step(two_branches_real_t held, int side, two_branches_real_t steps)
-{
-    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
-}
-
-/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
-static bool two_branches_opposite(int side, bool rising)
-{
-    return rising ? side >= 0 : side <= 0;
-}
-
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
 TWO_BRANCHES_COPIES unsigned int two_branches_threshold_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
                                                           two_branches_real_t x)
@@ -487,11 +469,10 @@ static unsigned int two_branches_threshold_not_reached_near(const two_branches_r
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. x as a rising move sees it; a
-   copy for each direction, which asks for it nowhere. `near`: a move that goes on mostly takes one or two more plays
-   along. */
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   mostly takes one or two more plays along. */
 TWO_BRANCHES_COPIES unsigned int two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                  unsigned int depth, unsigned int *k, two_branches_real_t x, bool rising,
+                                                  unsigned int depth, unsigned int *k, two_branches_real_t w, bool rising,
                                                   bool near)
 {
     unsigned int low = 0;
@@ -499,19 +480,22 @@ TWO_BRANCHES_COPIES unsigned int two_branches_find_by_input(const two_branches_t
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const two_branches_corner_t *c = &corner[middle];
-        if (x >= two_branches_last_step(rising ? c->extremum : -c->extremum, rising ? c->side : -c->side,
-                                   t->threshold[c->end - 1])) {
+        const two_branches_real_t *r = &t->threshold[c->end];
+        if (two_branches_reached(w, two_branches_from(c->extremum, c->side, r[-1], rising), rising)) {
             left = middle;
             *k = c->end;
         } else {
             low = middle + 1;
         }
     }
-    if (left > 0 && two_branches_opposite(corner[left - 1].side, rising)) {
+    if (left > 0) {
         const two_branches_corner_t *c = &corner[left - 1];
-        const two_branches_real_t way = two_branches_way(x, rising ? c->extremum : -c->extremum, c->side);
-        *k = near ? two_branches_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                  : two_branches_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
+            const two_branches_real_t on = rising ? w - c->extremum : c->extremum - w;
+            const two_branches_real_t way = c->side == 0 ? on : two_branches_half(on); /* in the measure of the thresholds */
+            *k = near ? two_branches_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                      : two_branches_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+        }
     }
     return left;
 }
@@ -587,10 +571,11 @@ static two_branches_real_t two_branches_corners_output(const two_branches_tables
     return m->here.anchor_output + (m->w - m->here.anchor) * t->slope[m->here.k];
 }
 
-/* Leaves the corner of turning back above those that are held. */
-static void two_branches_push_corner(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner)
+/* Leaves the corner of turning back above those that are held; until then w has risen, or fallen. */
+TWO_BRANCHES_COPIES void two_branches_push_corner(const two_branches_tables_t *t, two_branches_memory_t *m, two_branches_corner_t *corner,
+                                        bool risen)
 {
-    two_branches_leave_corner(t, m, corner, two_branches_corners_output(t, m));
+    two_branches_leave_corner(t, m, corner, two_branches_corners_output(t, m), risen);
 }
 
 /* A move to w that turns, from where p tells of the plays to where it does at its end. */
@@ -600,13 +585,12 @@ TWO_BRANCHES_COPIES void two_branches_corners_turn(const two_branches_tables_t *
     unsigned int depth = p->depth;
     unsigned int k = 1;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
-        two_branches_push_corner(t, m, corner); /* the plays that followed stay where they are */
+        two_branches_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
     }
     if (depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising)) {
         k = 2; /* right at its activation it would not follow yet */
-        depth = two_branches_find_by_input(t, corner, depth, &k, rising ? w : -w, rising,
-                                      false);
+        depth = two_branches_find_by_input(t, corner, depth, &k, w, rising, false);
     }
     p->k = (uint_least16_t)k;
     p->depth = (uint_least16_t)depth;
@@ -620,8 +604,7 @@ TWO_BRANCHES_COPIES void two_branches_corners_go_on(const two_branches_tables_t 
 {
     if (two_branches_past(w, p->next, rising)) {
         unsigned int k = p->k + 1u;
-        p->depth = (uint_least16_t)two_branches_find_by_input(t, corner, p->depth, &k,
-            rising ? w : -w, rising, true);
+        p->depth = (uint_least16_t)two_branches_find_by_input(t, corner, p->depth, &k, w, rising, true);
         p->k = (uint_least16_t)k;
         two_branches_corners_settle(t, p, corner, rising);
     }
@@ -903,7 +886,7 @@ static bool two_branches_corners_begin(const two_branches_tables_t *t, two_branc
             return false;
         }
         if (here->k > 1) { /* the move turns back */
-            two_branches_push_corner(t, m, corner);
+            two_branches_push_corner(t, m, corner, here->rising);
             *depth = *depth + 1;
         }
         *k = 1;
