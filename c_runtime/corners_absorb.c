@@ -77,24 +77,6 @@ HYSTGEN_COPIES void hystgen_corners_settle(const hystgen_tables_t *t, hystgen_pl
     }
 }
 
-/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
-static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t held, int side)
-{
-    return side == 0 ? x - held : hystgen_half(x - held);
-}
-
-/* Where the last play of a corner's block starts to follow a rising move. */
-static hystgen_sum_t hystgen_last_step(hystgen_sum_t held, int side, hystgen_sum_t steps)
-{
-    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
-}
-
-/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
-static bool hystgen_opposite(int side, bool rising)
-{
-    return rising ? side >= 0 : side <= 0;
-}
-
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
 HYSTGEN_COPIES unsigned int hystgen_threshold_not_reached(const hystgen_play_t *step, unsigned int k, unsigned int high,
                                                           hystgen_sum_t x)

@@ -1,5 +1,23 @@
 #include "hystgen_runtime.h"
 
+/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
+static hystgen_sum_t hystgen_way(hystgen_sum_t x, hystgen_sum_t held, int side)
+{
+    return side == 0 ? x - held : hystgen_half(x - held);
+}
+
+/* Where the last play of a corner's block starts to follow a rising move. */
+static hystgen_sum_t hystgen_last_step(hystgen_sum_t held, int side, hystgen_sum_t steps)
+{
+    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
+}
+
+/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
+static bool hystgen_opposite(int side, bool rising)
+{
+    return rising ? side >= 0 : side <= 0;
+}
+
 static bool hystgen_passed(hystgen_sum_t output, hystgen_sum_t level, bool rising)
 {
     return rising ? output >= level : output <= level;

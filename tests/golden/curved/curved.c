@@ -179,24 +179,6 @@ static inline void curved_corners_settle(const curved_tables_t *t, curved_place_
     }
 }
 
-/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
-static curved_sum_t curved_way(curved_sum_t x, curved_sum_t held, int side)
-{
-    return side == 0 ? x - held : curved_half(x - held);
-}
-
-/* Where the last play of a corner's block starts to follow a rising move. */
-static curved_sum_t curved_last_step(curved_sum_t held, int side, curved_sum_t steps)
-{
-    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
-}
-
-/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
-static bool curved_opposite(int side, bool rising)
-{
-    return rising ? side >= 0 : side <= 0;
-}
-
 /* First of the rising thresholds k .. high-1 that x has not reached, or high. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
@@ -423,6 +405,24 @@ static void curved_corners_foretell(const curved_tables_t *t, curved_memory_t *m
         curved_copy_place(&m->there, &m->here);
         curved_corners_go(t, m, corner, w, &m->there);
     }
+}
+
+/* How far a rising x lies above what a corner holds, in the measure of the thresholds. */
+static curved_sum_t curved_way(curved_sum_t x, curved_sum_t held, int side)
+{
+    return side == 0 ? x - held : curved_half(x - held);
+}
+
+/* Where the last play of a corner's block starts to follow a rising move. */
+static curved_sum_t curved_last_step(curved_sum_t held, int side, curved_sum_t steps)
+{
+    return side < 0 ? held : side > 0 ? held + (steps + steps) : held + steps;
+}
+
+/* Whether a corner lets go of its plays one by one, and not all of them at its extremum. */
+static bool curved_opposite(int side, bool rising)
+{
+    return rising ? side >= 0 : side <= 0;
 }
 
 static bool curved_passed(curved_sum_t output, curved_sum_t level, bool rising)
