@@ -1085,7 +1085,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         if (v < self->pending) {
             return plain_inverse_turn(self, u, u, 0, true);
         }
-} else {
+    } else {
         if (output <= p->next_output && u < self->edge[1]) {
             return u < PLAIN_OUTPUT_MIN ? plain_inverse_on_beyond(self, u, false)
                 : plain_inverse_on(self, u, output, false);
@@ -1097,7 +1097,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         if (v > self->pending) {
             return plain_inverse_turn(self, u, u, 0, false);
         }
-}
+    }
     if (!plain_finite(u)) {
         return plain_inverse_odd(self);
     }
