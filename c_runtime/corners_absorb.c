@@ -117,8 +117,14 @@ HYSTGEN_COPIES unsigned int hystgen_find_by_input(const hystgen_tables_t *t, con
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const hystgen_corner_t *c = &corner[middle];
-        const hystgen_play_t *r = &t->threshold[c->end];
-        if (hystgen_reached(w, (hystgen_reach_t)hystgen_from(c->extremum, c->side, r[-1], rising), rising)) {
+        const int side = c->side;
+        hystgen_sum_t passed = c->extremum;
+        if (rising ? side >= 0 : side <= 0) {
+            const hystgen_play_t *r = &t->threshold[c->end];
+            const hystgen_sum_t steps = side == 0 ? (hystgen_sum_t)r[-1] : (hystgen_sum_t)r[-1] + r[-1];
+            passed = rising ? passed + steps : passed - steps;
+        }
+        if (hystgen_reached(w, (hystgen_reach_t)passed, rising)) {
             left = middle;
             *k = c->end;
         } else {

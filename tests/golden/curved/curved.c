@@ -225,8 +225,14 @@ static inline unsigned int curved_find_by_input(const curved_tables_t *t, const 
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const curved_corner_t *c = &corner[middle];
-        const curved_play_t *r = &t->threshold[c->end];
-        if (curved_reached(w, (curved_reach_t)curved_from(c->extremum, c->side, r[-1], rising), rising)) {
+        const int side = c->side;
+        curved_sum_t passed = c->extremum;
+        if (rising ? side >= 0 : side <= 0) {
+            const curved_play_t *r = &t->threshold[c->end];
+            const curved_sum_t steps = side == 0 ? (curved_sum_t)r[-1] : (curved_sum_t)r[-1] + r[-1];
+            passed = rising ? passed + steps : passed - steps;
+        }
+        if (curved_reached(w, (curved_reach_t)passed, rising)) {
             left = middle;
             *k = c->end;
         } else {

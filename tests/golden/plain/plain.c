@@ -203,8 +203,14 @@ PLAIN_COPIES unsigned int plain_find_by_input(const plain_tables_t *t, const pla
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const plain_corner_t *c = &corner[middle];
-        const plain_real_t *r = &t->threshold[c->end];
-        if (plain_reached(w, plain_from(c->extremum, c->side, r[-1], rising), rising)) {
+        const int side = c->side;
+        plain_real_t passed = c->extremum;
+        if (rising ? side >= 0 : side <= 0) {
+            const plain_real_t *r = &t->threshold[c->end];
+            const plain_real_t steps = side == 0 ? r[-1] : r[-1] + r[-1];
+            passed = rising ? passed + steps : passed - steps;
+        }
+        if (plain_reached(w, passed, rising)) {
             left = middle;
             *k = c->end;
         } else {
@@ -1065,14 +1071,6 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
     plain_real_t last;
     plain_real_t v;
     bool beyond;
-    if (self->fast != 1) {
-        if (self->fast == 0) {
-            return plain_inverse_look(self, u);
-        }
-        if (!plain_finite(u)) {
-            return plain_inverse_odd_behind(self);
-        }
-    }
     if (p->rising) {
         if (output >= p->next_output && u > self->edge[0]) {
             return u > PLAIN_OUTPUT_MAX ? plain_inverse_on_beyond(self, u, true)
@@ -1123,6 +1121,14 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         self->edge[self->falling] = u;
         self->pending = v;
         return v;
+    }
+    if (self->fast != 1) {
+        if (self->fast == 0) {
+            return plain_inverse_look(self, u);
+        }
+        if (!plain_finite(u)) {
+            return plain_inverse_odd_behind(self);
+        }
     }
     return plain_inverse_next(self, u);
 }

@@ -480,8 +480,14 @@ TWO_BRANCHES_COPIES unsigned int two_branches_find_by_input(const two_branches_t
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
         const two_branches_corner_t *c = &corner[middle];
-        const two_branches_real_t *r = &t->threshold[c->end];
-        if (two_branches_reached(w, two_branches_from(c->extremum, c->side, r[-1], rising), rising)) {
+        const int side = c->side;
+        two_branches_real_t passed = c->extremum;
+        if (rising ? side >= 0 : side <= 0) {
+            const two_branches_real_t *r = &t->threshold[c->end];
+            const two_branches_real_t steps = side == 0 ? r[-1] : r[-1] + r[-1];
+            passed = rising ? passed + steps : passed - steps;
+        }
+        if (two_branches_reached(w, passed, rising)) {
             left = middle;
             *k = c->end;
         } else {
