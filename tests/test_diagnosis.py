@@ -19,9 +19,12 @@ from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import floor, options, selection
+from hystgen.diagnosis import floor, options, selection, structure
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import Run
+from hystgen.effects.creep import ExponentialCreep
+from hystgen.effects.drift import LinearDrift
+from hystgen.effects.sensor_nonlinearity import SensorPolynomial
 from hystgen.identification.fronts import Bent, DeadZones, Ends
 from hystgen.records import Record
 from tests.plants import run as plants_run
@@ -272,6 +275,39 @@ def test_a_strong_curve_of_the_sensor_is_found_whatever_the_offset(tmp_path: Pat
     assert [effect["name"] for effect in content["effects"]] == ["sensor_nonlinearity"]
     # the believed thresholds are the right ones, so that nothing else is left
     assert content["gap"]["refitted"]["holdout"] > 30.0 * 0.02
+    assert content["gap"]["after"]["holdout"] < 1.15 * 0.02
+
+
+@pytest.mark.parametrize(("rate", "start"), [(40.0, 0.0), (0.0, 30.0), (40.0, 30.0)])
+def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
+    """A creep that begins anywhere is in front of it, a drift is behind: the right numbers leave nothing of either."""
+    v = wander(5, turns=40)
+    v[:40] = np.linspace(0.0, v[40], 40)
+    t = np.arange(len(v)) * 1e-3
+    xi = (brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + 20.0 + start * np.exp(-t / 0.4)) / 100.0
+    y = 100.0 * (xi - 0.12 * xi**2) + 50.0 + rate * t
+    made = (
+        LinearDrift(name="drift", rate=rate),
+        ExponentialCreep(name="creep", shape="exponential", time_constants=(0.4,), weights=(1e-12,)),
+        SensorPolynomial(name="sensor_nonlinearity", coefficients=(-0.12,), scale=100.0),
+    )
+    # where the drift begins is free, and no creep: a sensor tells the one from the other
+    item = Item("made", Run(t, v), y - 50.0, None, float(np.ptp(y)))
+    error = structure.Actuator(np.array([0.0, 10.0]), (), made).error(item, np.array([1.0, 0.5]))
+    assert np.max(np.abs(error)) < 1e-6
+
+
+@pytest.mark.parametrize("curve", [-0.15, 0.15])
+def test_a_curved_sensor_beside_a_drift(tmp_path: Path, curve: float) -> None:
+    records = []
+    for number in range(1, 6):
+        v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 if number % 2 else 0.6) * (wander(number) - 40.0)])
+        t = np.arange(len(v)) * 1e-3 + 3.0 * number
+        xi = (brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + 60.0) / 100.0
+        y = 100.0 * (xi + curve * xi**2) + 1.5 * t
+        records.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
+    content = hystgen.diagnose(_model(tmp_path), records[:3], holdout=records[3:], history=[0.0]).content
+    assert sorted(effect["name"] for effect in content["effects"]) == ["drift", "sensor_nonlinearity"]
     assert content["gap"]["after"]["holdout"] < 1.15 * 0.02
 
 

@@ -33,7 +33,8 @@ class Hypothesis:
     def errors(self, items: list[int], _: Any = None) -> list[Array]:
         noise = [np.random.default_rng([item, *map(ord, sorted(self.names))]) for item in items]
         return [
-            self.left * missing(item) + self.world.colour(random) for item, random in zip(items, noise, strict=True)
+            self.left * missing(item) + self.world.colour(random)
+            for item, random in zip(items, noise, strict=True)
         ]
 
 
@@ -65,6 +66,12 @@ class World:
     def gap(self, now: Hypothesis) -> float:
         return float(np.sqrt(np.mean(np.concatenate(now.errors(list(self.held))) ** 2)))
 
+    @property
+    def records(self) -> Any:
+        return SimpleNamespace(
+            to_fit=self.to_fit, held=self.held, noise=NOISE, extensions=self.extensions, left=self.gap
+        )
+
 
 def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, float] | None = None) -> list[str]:
     """Names of the two that are found; `alone`: what an effect leaves when it is sought from where both are."""
@@ -74,9 +81,7 @@ def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, flo
         return Hypothesis(world, frozenset(rest), (alone or {}).get(rest))
 
     monkeypatch.setattr(selection, "_without", without)
-    records: Any = SimpleNamespace(
-        to_fit=world.to_fit, held=world.held, noise=NOISE, extensions=world.extensions, left=world.gap
-    )
+    records = world.records
     now: Any = Hypothesis(world, frozenset())
     failed = selection._step(now, world.gap(now), records)
     assert failed is not None
@@ -110,3 +115,54 @@ def test_chance_makes_no_pair(left: float, memory: float, monkeypatch: pytest.Mo
     names = "abcdef"
     same = {frozenset(a + b): left for a in names for b in names} | {frozenset(): left}
     assert together(World(same, names, memory), monkeypatch) == []
+
+
+def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`c` was the best beside the wrong `w`; beside `a`, which takes the place of that, `b` is."""
+    left = {"w": 0.5, "c": 0.6, "a": 0.7, "b": 0.8, "cw": 0.2, "bw": 0.4, "ac": 0.1, "ab": 0.02}
+    world = World({frozenset(names): share for names, share in left.items()}, "abcw")
+
+    def without(now: Hypothesis, name: str, _: Any) -> Hypothesis:
+        return Hypothesis(world, now.names - {name})
+
+    monkeypatch.setattr(selection, "_without", without)
+    now: Any = Hypothesis(world, frozenset("wc"))
+    gap = world.gap(Hypothesis(world, frozenset()))
+    found = [
+        selection.Found("w", "w", gap, left["w"], 0.0, ()),
+        selection.Found("c", "c", left["w"], left["cw"], 0.0, ("a", "b")),
+    ]
+    best: Any
+    best, found = selection._exchanged(now, found, world.records)
+    assert best.names == frozenset("ab")
+    assert sorted(each.name for each in found) == ["a", "b"]
+    assert found[0].before == gap
+    assert found[-1].after == world.gap(best)
+    assert not any(each.rivals for each in found)  # beside the other one nothing comes near
+
+
+@pytest.mark.parametrize(
+    ("held_out", "fitted", "first"), [(0.99, 1.2, "simple"), (1.03, 1.2, "rich"), (1.03, 1.0, "simple")]
+)
+def test_what_is_free_in_a_record_is_no_merit(held_out: float, fitted: float, first: str) -> None:
+    """The simpler one has fewer numbers, and with what the richer one leaves free explains held-out records so well."""
+
+    class Made:
+        def __init__(self, name: str, free: int, left: dict[tuple[int, bool], float]) -> None:
+            self.name, self.left, self.shape = name, left, np.zeros(2)
+            self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
+
+        def errors(self, items: tuple[int, ...], like: Any = None) -> list[Array]:
+            random = np.random.default_rng([len(self.name), len(items)])
+            share = self.left[len(items), like is not None and like is not self]
+            return [share * random.normal(size=2000) for _ in items]
+
+    to_fit, held = (0, 1, 2, 3), (4, 5, 6)
+    rich = Made("rich", 5, {(4, False): 1.0, (3, False): 1.0})
+    simple = Made("simple", 1, {(4, False): 2.0, (3, False): 2.0, (4, True): fitted, (3, True): held_out})
+    tried = []
+    for made in (rich, simple):
+        errors, option = made.errors(held), SimpleNamespace(name=made.name)
+        tried.append(selection.Tried(option, made, (made.name,), 1.0, errors))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=to_fit, held=held)
+    assert selection._simplest_first(tried, records)[0].name == first

@@ -74,6 +74,9 @@ SIMPLER = 0.05
 EXCHANGE = 0.05
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
 
+EXCHANGES = 4
+"""At most so many times one effect takes the place of another."""
+
 LARGE = 20_000
 """Samples to fit from which on the options are tried in several processes; of fewer it takes a few seconds at most."""
 
@@ -114,7 +117,11 @@ class Tried:
 
         Free responses to a start state alone may explain a drift.
         """
-        return len(self.fitted.shape) + max(len(self.fitted.actuator.nuisances(item)) for item in held)
+        return _numbers(self.fitted, held)
+
+
+def _numbers(fitted: Fitted, held: Sequence[Item]) -> int:
+    return len(fitted.shape) + max(len(fitted.actuator.nuisances(item)) for item in held)
 
 
 @dataclass(frozen=True, eq=False)
@@ -453,8 +460,8 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
 def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     """All, the best and those about as good before the others, and of these the ones of fewer numbers first.
 
-    About as good: where all leave the same free in every record, held-out records find them alike within a few per
-    cent, and fitted ones by chance.
+    About as good: where all leave the same free in every record, held-out records find them no worse, whatever more the
+    best explains of those it was fitted to; or alike within a few per cent, and fitted ones by chance.
     """
     if not tried:
         return []
@@ -462,8 +469,10 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
     near, others = [best], []
     for each in tried[1:]:
-        alike = fits.rms(each.fitted.errors(held, best.fitted)) <= enough
-        if alike and difference(each.fitted.errors(records.to_fit, best.fitted), fitted) > SURE:
+        left = fits.rms(each.fitted.errors(held, best.fitted))
+        if left <= best.held_out or (
+            left <= enough and difference(each.fitted.errors(records.to_fit, best.fitted), fitted) > SURE
+        ):
             near.append(each)
         else:
             others.append(each)
@@ -485,19 +494,39 @@ def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tup
 def _exchanged(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
     """Put another effect or shape in the place of one accepted earlier, where those accepted later make it the better.
 
-    The first of two has been chosen while the second was missing, and may have taken part of its place.
+    The first of two has been chosen while the second was missing, and may have taken part of its place; and the second
+    beside a wrong first one. Which names are alike shows beside all the others too.
     """
-    for k in range(len(found) - 1):
-        fitted = _without(now, found[k].name, records)
-        step = None if fitted is None else _step(fitted, 0.0, records)
-        if step is None or step.merit is None or step.best.held_out > (1.0 - EXCHANGE) * records.left(now):
-            continue
-        other = _found(step, records)
-        best = step.best.fitted
-        chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
-        chain = chain or [*_rest(found, k, other.before), other]
-        return _exchanged(*_without_needless(best, chain, records), records)
+    latest, left = found[-1].name, EXCHANGES
+    while left:
+        left -= 1
+        for k, old in enumerate(found):
+            fitted = None if old.name == latest else _without(now, old.name, records)
+            step = None if fitted is None else _step(fitted, 0.0, records)
+            if step is None or step.merit is None:
+                continue
+            other = _found(step, records)
+            if not _gives_way(now, step.best, records):
+                if step.best.held_out <= (1.0 + UNSURE) * records.left(now):  # else it was not found again
+                    alike = dict.fromkeys([other.name, *other.rivals])
+                    found[k] = replace(old, rivals=tuple(name for name in alike if name != old.name))
+                continue
+            best = step.best.fitted
+            chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
+            now, found = _without_needless(best, chain or [*_rest(found, k, other.before), other], records)
+            latest = other.name
+            break
+        else:
+            break
     return now, found
+
+
+def _gives_way(now: Fitted, best: Tried, records: _Records) -> bool:
+    """Whether a hypothesis leaves so much more than another one, or no less on equal terms with more numbers."""
+    held, left = records.held, records.left(now)
+    if best.held_out <= (1.0 - EXCHANGE) * left:
+        return True
+    return best.numbers(held) < _numbers(now, held) and fits.rms(best.fitted.errors(held, now)) <= left
 
 
 def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: _Records) -> list[Found]:
@@ -520,7 +549,8 @@ def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: _Records
 
 def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
     """What was found but the k-th; each step of the gap is between two models that there are."""
-    rest = [*found[:k], replace(found[k + 1], before=found[k].before), *found[k + 2 :]]
+    later = [replace(found[k + 1], before=found[k].before), *found[k + 2 :]] if k + 1 < len(found) else []
+    rest = [*found[:k], *later]
     rest[-1] = replace(rest[-1], after=without)
     return rest
 

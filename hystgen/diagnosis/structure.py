@@ -33,7 +33,7 @@ REMEMBERED, MOST_BYTES = 3, 2**28
 
 
 SETTLED = 3
-"""Steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
+"""Most steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
 
 
 @dataclass(frozen=True)
@@ -239,7 +239,7 @@ class Actuator:
         start = reduction.start_states(course.v, course.history, self.thresholds)
         return course.v, item.run, self.thresholds, start
 
-    def mapped(self, h: Array, level: float, item: Item) -> Array:
+    def mapped(self, h: Array, level: Array, item: Item) -> Array:
         """The output behind its maps, a limit in front of the offset and a sensor behind it; the offset is `level`."""
         maps = self.at(Place.OUTPUT)
         for effect in maps:
@@ -251,19 +251,28 @@ class Actuator:
                 h = effect.mapped(h, item.run)
         return h
 
-    def level(self, h: Array, item: Item) -> tuple[float, Array]:
-        """The best offset in front of a sensor and behind a limit, and how the output changes with it (N,)."""
+    def level(self, h: Array, item: Item) -> tuple[Array, Array]:
+        """The best offset (N,) in front of a sensor and behind a limit, and how the output changes with it (N,).
+
+        A sensor sees the responses to an unknown start state too, so they are part of it, and what is added at the very
+        end is none of it: a curve about the wrong offset would be another one.
+        """
         known = item.compared
-        y = item.y[known]
-        level = float(np.mean(y - h[known]))
+        y = item.y - self.added(item)
+        free = self.nuisances(item)
+        level = np.full(len(h), float(np.mean((y - h)[known])))
         step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
         for _ in range(SETTLED):
             bent = self.mapped(h, level, item)
             moved = (self.mapped(h, level + step, item) - bent) / step
-            slope = moved[known]
-            if not np.any(slope):
+            if not np.any(moved[known]):
                 break
-            level += float(slope @ (y - bent[known]) / (slope @ slope))
+            slopes = (free * moved)[:, known]
+            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ (y - bent)[known], rcond=1e-12)
+            shift = change @ free
+            level = level + shift
+            if np.max(np.abs(shift)) < step:
+                break
         return level, moved
 
     def added(self, item: Item) -> Array:
@@ -283,10 +292,10 @@ class Actuator:
 
         `offset`: what the offset does to the output, where a map lies between them.
         """
-        free = [np.ones((1, len(item.run.t))) if offset is None else offset[None, :]]
+        free = [np.ones((1, len(item.run.t)))]
         if item.history is None:
             free += [found for effect in self.effects if len(found := effect.transients(item.run))]
-        return np.concatenate(free)
+        return np.concatenate(free) if offset is None else np.concatenate(free) * offset
 
     def error(self, item: Item, p: Array, free: Array | None = None) -> Array:
         """Measured less predicted, what is free in the record fitted away; NaN where it is not compared.
@@ -315,7 +324,7 @@ class _Block:
 
     def __init__(self, here: Actuator, item: Item, p: Array) -> None:
         self._item, self._p = item, p
-        self._level = 0.0
+        self._level = np.zeros(1)
         at, offset = item.compared, None
         if here.bends:
             rows, constant = here.columns(item)

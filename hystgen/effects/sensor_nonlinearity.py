@@ -10,6 +10,9 @@ from pydantic import Field
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.param_models import Number, Positive
 
+BENT = 1.0
+"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor its step may overshoot."""
+
 
 class SensorPolynomial(Effect):
     """Sensor that measures `y + scale sum_k c_k xi^k`, `xi = y/scale`, k = 2, 3, ...; single-valued in y."""
@@ -42,10 +45,12 @@ class SensorPolynomial(Effect):
                 name="sensor_nonlinearity", coefficients=tuple((0.1 * x).tolist()), scale=about.output_range
             )
 
-        return [
-            Candidate(label, np.full(n, -5.0), np.full(n, 5.0), np.zeros(n), build, none=np.zeros(n))
-            for label, n in (("sensor, parabola", 1), ("sensor, cubic", 2))
-        ]
+        def candidate(label: str, n: int) -> Candidate:
+            none = np.zeros(n)
+            one, other = (np.append(side, none[1:]) for side in (-BENT, BENT))
+            return Candidate(label, none - 5.0, none + 5.0, one, build, none, (other,))
+
+        return [candidate("sensor, parabola", 1), candidate("sensor, cubic", 2)]
 
 
 SHAPES = (SensorPolynomial,)
