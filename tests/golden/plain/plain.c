@@ -947,9 +947,10 @@ static plain_real_t plain_inverse_odd(plain_inverse_t *self)
     return plain_inverse_hold(self);
 }
 
-/* Where a fast move turns back to u, which is what is asked for but for the limits; it was rising, or not. */
-PLAIN_COPIES plain_real_t plain_inverse_turn(plain_inverse_t *self, plain_real_t asked,
-    plain_real_t u, unsigned int bits, bool rising)
+/* Where a fast move, which was rising or not, turns back for what is asked: leaves its corner, and returns how many hold
+   plays then. */
+PLAIN_COPIES unsigned int plain_inverse_turn(plain_inverse_t *self, plain_real_t asked, unsigned int bits,
+    bool rising)
 {
     plain_memory_t *m = &self->memory;
     unsigned int depth = m->there.depth;
@@ -970,22 +971,24 @@ PLAIN_COPIES plain_real_t plain_inverse_turn(plain_inverse_t *self, plain_real_t
         c->side = rising ? -1 : 1;
         depth = depth + 1;
     }
-    return rising ? plain_inverse_fall(self, depth, 1, u) : plain_inverse_rise(self, depth, 1, u);
+    return depth;
 }
 
-/* The same to a reference beyond the range, or to an infinite one. */
+/* Where a fast move turns back to a reference beyond the range, or to an infinite one. */
 PLAIN_COPIES plain_real_t plain_inverse_turn_beyond(plain_inverse_t *self, plain_real_t u, bool rising)
 {
     const plain_place_t *p = &self->memory.there;
     const plain_real_t end = rising ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
     const plain_real_t v = p->anchor + (end - p->anchor_output) * self->gain;
+    unsigned int depth;
     if (!plain_finite(u)) {
         return plain_inverse_odd(self);
     }
     if (!(rising ? v < self->pending : v > self->pending)) { /* a commit has led beyond what may be asked for: no turn */
         return plain_inverse_look(self, u);
     }
-    return plain_inverse_turn(self, u, end, PLAIN_STATUS_INPUT_CLAMPED, rising);
+    depth = plain_inverse_turn(self, u, PLAIN_STATUS_INPUT_CLAMPED, rising);
+    return rising ? plain_inverse_fall(self, depth, 1, end) : plain_inverse_rise(self, depth, 1, end);
 }
 
 /* A reference beyond the range on the way of a fast move; behind a commit the limit may lie behind. */
@@ -995,9 +998,10 @@ static plain_real_t plain_inverse_beyond(plain_inverse_t *self, plain_real_t u)
     return plain_inverse_move(self, u, self->memory.here.rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
 }
 
-/* Where a fast move goes on to `output` and takes more plays along: just one more of the same corner, mostly. */
-PLAIN_COPIES plain_real_t plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_real_t output,
-    bool rising)
+/* Where a fast move goes on to `output` and takes just one more play of the same corner along, as it mostly does: the
+   drive *v, or false. */
+PLAIN_COPIES bool plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_real_t output, bool rising,
+    plain_real_t *v)
 {
     plain_memory_t *m = &self->memory;
     plain_place_t *p = &m->there;
@@ -1008,7 +1012,6 @@ PLAIN_COPIES plain_real_t plain_inverse_on(plain_inverse_t *self, plain_real_t u
         const plain_real_t way = rising ? output + y : y - output;
         plain_real_t r = plain_threshold[k];
         plain_real_t z = plain_start_level[k];
-        plain_real_t v;
         bool first = way < z;
         if (c->side != 0) {
             first = way * 0.5f < z;
@@ -1017,13 +1020,14 @@ PLAIN_COPIES plain_real_t plain_inverse_on(plain_inverse_t *self, plain_real_t u
         }
         r = rising ? c->extremum + r : c->extremum - r;
         z = rising ? z - y : y - z; /* the last play of a corner goes by this output, the others by the way */
-        v = p->next + (output - p->next_output) * plain_reciprocal[k];
-        if (first && (rising ? output < z && v < r && v <= PLAIN_DRIVE_MAX
-                             : output > z && v > r && v >= PLAIN_DRIVE_MIN)) {
-            if (!(rising ? v > self->pending : v < self->pending)) {
+        *v = p->next + (output - p->next_output) * plain_reciprocal[k];
+        if (first && (rising ? output < z && *v < r && *v <= PLAIN_DRIVE_MAX
+                             : output > z && *v > r && *v >= PLAIN_DRIVE_MIN)) {
+            if (!(rising ? *v > self->pending : *v < self->pending)) {
                 plain_inverse_take(self, self->pending);
                 plain_inverse_ask(self, u, 0);
-                return plain_inverse_rest(self);
+                *v = plain_inverse_rest(self);
+                return true;
             }
             plain_copy_place(&m->here, p);
             m->w = self->pending;
@@ -1033,15 +1037,14 @@ PLAIN_COPIES plain_real_t plain_inverse_on(plain_inverse_t *self, plain_real_t u
             p->next_output = z;
             p->k = (uint_least16_t)k;
             plain_inverse_ask(self, u, 0);
-            return plain_inverse_enter(self, v, rising);
+            *v = plain_inverse_enter(self, *v, rising);
+            return true;
         }
     }
-    plain_inverse_take(self, self->pending);
-    plain_inverse_ask(self, u, 0);
-    return rising ? plain_inverse_rise(self, m->here.depth, k, u) : plain_inverse_fall(self, m->here.depth, k, u);
+    return false;
 }
 
-/* The same to a reference beyond the range, or to an infinite one. */
+/* Where a fast move goes on to a reference beyond the range, or to an infinite one. */
 PLAIN_COPIES plain_real_t plain_inverse_on_beyond(plain_inverse_t *self, plain_real_t u, bool rising)
 {
     const plain_place_t *p = &self->memory.there;
@@ -1073,27 +1076,43 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
     bool beyond;
     if (p->rising) {
         if (output >= p->next_output && u > self->edge[0]) {
-            return u > PLAIN_OUTPUT_MAX ? plain_inverse_on_beyond(self, u, true)
-                : plain_inverse_on(self, u, output, true);
+            if (u > PLAIN_OUTPUT_MAX) {
+                return plain_inverse_on_beyond(self, u, true);
+            }
+            if (plain_inverse_on(self, u, output, true, &v)) {
+                return v;
+            }
+            plain_inverse_take(self, self->pending);
+            plain_inverse_ask(self, u, 0);
+            return plain_inverse_rise(self, self->memory.here.depth, self->memory.here.k + 1u, u);
         }
         if (u < PLAIN_OUTPUT_MIN) {
             return plain_inverse_turn_beyond(self, u, true);
         }
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v < self->pending) {
-            return plain_inverse_turn(self, u, u, 0, true);
+            const unsigned int depth = plain_inverse_turn(self, u, 0, true);
+            return plain_inverse_fall(self, depth, 1, u);
         }
     } else {
         if (output <= p->next_output && u < self->edge[1]) {
-            return u < PLAIN_OUTPUT_MIN ? plain_inverse_on_beyond(self, u, false)
-                : plain_inverse_on(self, u, output, false);
+            if (u < PLAIN_OUTPUT_MIN) {
+                return plain_inverse_on_beyond(self, u, false);
+            }
+            if (plain_inverse_on(self, u, output, false, &v)) {
+                return v;
+            }
+            plain_inverse_take(self, self->pending);
+            plain_inverse_ask(self, u, 0);
+            return plain_inverse_fall(self, self->memory.here.depth, self->memory.here.k + 1u, u);
         }
         if (u > PLAIN_OUTPUT_MAX) {
             return plain_inverse_turn_beyond(self, u, false);
         }
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v > self->pending) {
-            return plain_inverse_turn(self, u, u, 0, false);
+            const unsigned int depth = plain_inverse_turn(self, u, 0, false);
+            return plain_inverse_rise(self, depth, 1, u);
         }
     }
     if (!plain_finite(u)) {
