@@ -367,6 +367,20 @@ class TestIntervals:
         assert inside >= 26
         assert np.mean(widths) < 3.0 * 3.92 * np.std(values)
 
+    def test_are_the_same_for_any_singular_vectors(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Their signs are a matter of the library's and of the last bit."""
+        _, expected = self.fitted(0)
+        svd = np.linalg.svd
+
+        def turned(matrix: Array, full_matrices: bool = True) -> tuple[Array, Array, Array]:
+            left, values, right = svd(matrix, full_matrices=full_matrices)
+            signs = np.where(np.arange(len(values)) % 2, 1.0, -1.0)
+            return left * signs, values, right * signs[:, None]
+
+        monkeypatch.setattr(np.linalg, "svd", turned)
+        _, found = self.fitted(0)
+        assert found == pytest.approx(expected, rel=1e-9)
+
 
 def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
     """Drop-outs do not spoil the fit, hum is told and nothing is named, and the page says so."""

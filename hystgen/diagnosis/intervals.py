@@ -65,15 +65,17 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     active = np.flatnonzero(np.append(p > 0.0, np.ones(len(shape), dtype=bool)))
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
     inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
-    # only the numbers' part of the covariance is needed
-    root = (right.T * inverse)[np.count_nonzero(active < n1) :]
+    # Only the numbers' part of the covariance is needed; its triangular root with a positive diagonal is the only one,
+    # where singular vectors may come with other signs and in another order, and would draw other numbers
+    root = np.asarray(np.linalg.qr((right.T * inverse)[np.count_nonzero(active < n1) :].T, mode="r"))
+    root = root * np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, None]
     errors = fitted.errors(items)
     inside = [e[np.isfinite(e)] for e in errors]
     inside = [e for e in inside if len(e)]
     samples = sum(map(len, inside))
     tau = sum(correlation_time(e) * len(e) for e in inside) / max(samples, 1)
     sigma = fitted.rms * float(np.sqrt(tau * samples / max(samples - len(active), 1)))
-    drawn = np.random.default_rng(SEED).standard_normal((DRAWS, root.shape[1])) @ root.T
+    drawn = np.random.default_rng(SEED).standard_normal((DRAWS, len(root))) @ root
     low, high = fitted.structure.bounds
     shapes = np.clip(shape + sigma * drawn, low, high)
     of_front: dict[str, Any] = {}
