@@ -498,6 +498,30 @@ def test_relaxing_plays_against_the_ode(tau: float, exponent: float, tolerance: 
     assert np.max(np.abs(found - np.array(expected).T)[1:]) < tolerance * np.max(np.abs(w))
 
 
+@pytest.mark.parametrize("part", range(6))
+def test_any_relaxation_against_an_ode_solver(part: int) -> None:
+    """Slow to stiff ones over straight steps, fast ones among them, by a method that knows nothing of play."""
+    from scipy.integrate import solve_ivp
+
+    rng = np.random.default_rng(part)
+    for _ in range(100):
+        tau, m = float(10.0 ** rng.uniform(-4, 1)), float(10.0 ** rng.uniform(0, 1))
+        w = np.concatenate([[0.0], np.cumsum(rng.uniform(-2.0, 2.0, 5))])
+        t = np.concatenate([[0.0], np.cumsum(10.0 ** rng.uniform(-5, 0, 5))])
+
+        def rate(now: float, z: Array, w: Array = w, t: Array = t, tau: float = tau, m: float = m) -> Array:
+            gap = np.interp(now, t, w) - z
+            return np.asarray(np.sign(gap) / tau * np.maximum(np.abs(gap) - 1.0, 0.0) ** m)
+
+        z, expected = np.zeros(1), [0.0]
+        for k in range(5):
+            z = solve_ivp(rate, (t[k], t[k + 1]), z, method="LSODA", rtol=1e-10, atol=1e-11).y[:, -1]
+            expected.append(float(z[0]))
+        effect = make("rate_dependence", shape="relaxation", time_constant=tau, exponent=m)
+        found = effect.plays(w, Run(t, w), np.array([0.0, 1.0]), np.zeros(2))[1]
+        assert np.max(np.abs(found - expected)) < 1e-5, (tau, m, w)
+
+
 def test_fast_relaxation_is_the_play() -> None:
     t, w = drive()
     effect = make("rate_dependence", shape="relaxation", time_constant=1e-9)

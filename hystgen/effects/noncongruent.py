@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, span
+from hystgen.effects.recursions import code
 from hystgen.param_models import MAX_PLAYS, Number, Positive
 
 MAX_TERMS = 8
@@ -30,14 +31,14 @@ class _Noncongruent(Effect):
             yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
     @abstractmethod
-    def bend(self, i: int, row: Array, thresholds: Array) -> Array:
-        """What is added (N,) to the play of a number above 0."""
+    def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
+        """Add to `total` (N,) what the play of a number above 0 gains, times `weight`."""
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
         """The drive itself, and bent plays."""
         out = np.array(rows)
         for i in range(1, len(rows)):
-            out[i] += self.bend(i, rows[i], thresholds)
+            self.bend(i, rows[i], thresholds, 1.0, out[i])
         return out
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
@@ -45,7 +46,7 @@ class _Noncongruent(Effect):
         total: Array = p @ rows
         for i in range(1, len(rows)):
             if p[i] != 0.0:
-                total += p[i] * self.bend(i, rows[i], thresholds)
+                self.bend(i, rows[i], thresholds, float(p[i]), total)
         return total
 
 
@@ -73,11 +74,9 @@ class PlayFunctions(_Noncongruent):
             plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
             yield ("coefficients",), f"has {count} for {plays}; give one for each threshold but r_0"
 
-    def bend(self, i: int, row: Array, thresholds: Array) -> Array:
+    def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """What its polynomial adds to a play."""
-        scale = float(thresholds[-1])
-        xi = row / scale
-        return np.asarray(scale * xi * xi * np.polynomial.polynomial.polyval(xi, np.array(self.coefficients[i - 1])))
+        code().curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -126,10 +125,10 @@ class LoopCentre(_Noncongruent):
     centre: Number = Field(description="centre of the bump, input units of the plays", examples=[50.0])
     width: Positive = Field(description="width of the bump, input units of the plays", examples=[20.0])
 
-    def bend(self, i: int, row: Array, thresholds: Array) -> Array:
+    def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """What the density's integral adds to a play."""
         bump = np.tanh((row - self.centre) / self.width) + np.tanh(self.centre / self.width)
-        return np.asarray(self.amplitude * self.width * bump)
+        total += weight * self.amplitude * self.width * bump
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -1,4 +1,4 @@
-"""The sample-by-sample recursions of the effects, compiled when first used."""
+"""What the effects do sample by sample, compiled when first used."""
 
 from __future__ import annotations
 
@@ -20,8 +20,14 @@ MOST_PIECES = 1000
 CLOSE = 1e-7
 """Error of a piece of a nonlinear relaxation, in largest thresholds."""
 
+SLOW = 1.0
+"""Share of a disturbance that friction may take in a piece by the Taylor series."""
+
+NEARLY = 0.3
+"""Share of a stretch by which it may change in a piece whose curvature counts with its leading term."""
+
 SLIGHT = 1e-4
-"""Share of the speed that friction may take while it is left out."""
+"""Share of the speed that friction may take while what it takes is summed along the way without it."""
 
 
 def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Array) -> None:
@@ -74,6 +80,16 @@ def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float,
         out[k + 1] = y
 
 
+def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Array) -> None:
+    """Add `weight` times `scale xi^2 (c_2 + c_3 xi + ..)`, `xi = u/scale`, to `total`."""
+    for k in range(len(u)):
+        xi = u[k] / scale
+        value = 0.0
+        for c in coefficients[::-1]:
+            value = c + value * xi
+        total[k] += weight * (scale * xi * xi * value)
+
+
 def dilated_play(w: Array, rate: Array, r: float, beta: float, state: float, out: Array) -> None:
     """Play whose threshold is `r + beta rate_k`."""
     for k in range(len(w)):
@@ -89,11 +105,39 @@ def mean_decay(x: float) -> float:
     return -math.expm1(-x) / x
 
 
+def bent_decay(x: float) -> float:
+    """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, what a growing disturbance leaves of its square's sum; 1/6 at 0."""
+    if x < 0.1:
+        return 1 / 6 - x * (1 / 6 - x * (11 / 120 - x * (13 / 360 - x * 57 / 5040)))
+    decay = math.exp(-x)
+    return (1.0 - decay * (2.0 * x + decay)) / (2.0 * x * x * x)
+
+
+def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
+    """What `e` gains over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
+
+    The terms `q_k` of q follow from `e q' = m q e'`, those of e from the second on are `-step q_(k-1)/k`.
+    """
+    d = 1.0 / e
+    q1 = m * c1 * q0 * d
+    c2 = -step * q1 / 2
+    q2 = ((m - 1) * c1 * q1 + 2 * m * c2 * q0) * d / 2
+    c3 = -step * q2 / 3
+    q3 = ((m - 2) * c1 * q2 + (2 * m - 1) * c2 * q1 + 3 * m * c3 * q0) * d / 3
+    c4 = -step * q3 / 4
+    q4 = ((m - 3) * c1 * q3 + (2 * m - 2) * c2 * q2 + (3 * m - 1) * c3 * q1 + 4 * m * c4 * q0) * d / 4
+    c5 = -step * q4 / 5
+    q5 = (m - 4) * c1 * q4 + (2 * m - 3) * c2 * q3 + (3 * m - 2) * c3 * q2 + (4 * m - 1) * c4 * q1 + 5 * m * c5 * q0
+    c6 = -step * q5 * d / 30
+    return c1 + (c2 + (c3 + (c4 + (c5 + c6)))), c6
+
+
 def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
     """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
 
-    The linear case is exact. Else steps that are exact for the equation straightened about `e` (exponential
-    Rosenbrock-Euler), with the leading term of the curvature, as long as what is left out allows.
+    The linear case is exact. Else pieces by the equation's Taylor series where friction takes its time, and where it is
+    fast pieces that are exact for the equation straightened about `e` (exponential Rosenbrock-Euler) with the leading
+    term of the curvature, each as long as what is left out allows.
     """
     if exponent == 1.0:
         final = e + (speed - e / tau) * duration * mean_decay(duration / tau)
@@ -108,13 +152,14 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if not fall < 1e200:
             return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
-        if fall < 0.5 * SLIGHT * speed:  # nothing but the speed counts
+        if fall < 0.5 * SLIGHT * speed:  # hardly anything but the speed counts
             little = scale * (SLIGHT * speed * tau / scale) ** (1.0 / exponent)
-            taken = (little - e) / speed
-            if taken >= left:
-                return e + speed * left, 0.0
-            e = little
+            taken = min((little - e) / speed, left)
+            final = e + speed * taken
+            e = final - (scale / tau * (final / scale) ** exponent * final - fall * e) / ((exponent + 1.0) * speed)
             left -= taken
+            if not left > 0.0:
+                break
             fall = scale / tau * (e / scale) ** exponent
             continue
         if not e > 0.0:
@@ -122,18 +167,33 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         slope = exponent * fall / e
         step = min(step, left)
         part = slope * step
-        final = e + change * step * mean_decay(part)
+        if part <= SLOW and abs(change) * step <= 0.5 * e:
+            gain, last = taylor(e, change * step, fall, exponent, step)
+            if abs(last) > CLOSE * scale:
+                step *= 0.5
+                continue
+            e += gain
+            left -= step
+            if left <= 1e-12 * duration:
+                break
+            step *= 4.0
+            fall = scale / tau * (e / scale) ** exponent
+            continue
+        gain = change * step * mean_decay(part)
+        final = e + gain
         if speed == 0.0:
             final = max(final, 0.0)
         bend = slope / e
-        if abs(final - e) > 0.1 * e or part > 0.5 or exponent < 1.0:
+        end, after = 0.0, 0.0
+        if abs(gain) > NEARLY * e:
             end = max(final, 0.1 * e)
-            bend = max(bend, exponent * scale / tau * (end / scale) ** exponent / end / end)
-            wrong = step * step * step * bend * abs(exponent - 1.0) * change * change / 12.0
+            after = scale / tau * (end / scale) ** exponent
+            bend = max(bend, exponent * after / end / end)
+            wrong = step * gain * gain * bend * abs(exponent - 1.0) / 12.0
         else:  # the curvature about e adds its leading term
-            more = step * step * step * bend * (1.0 - exponent) * change * change / 6.0
+            more = (1.0 - exponent) * bend * change * change * bent_decay(part) * step * step * step
             final += more
-            wrong = abs(more) * (0.25 * abs(exponent - 2.0) * abs(change) * step / e + part)
+            wrong = abs(more * gain) / e * (abs(exponent - 2.0) / 3.0 + 2.0 * abs(exponent - 1.0))
         if wrong > CLOSE * scale and (final > 0.0 or e > CLOSE * scale):
             step *= max(0.2, 0.9 * (CLOSE * scale / wrong) ** (1.0 / 3.0))
             continue
@@ -145,7 +205,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if left <= 1e-12 * duration or not e > 0.0:
             break
         step *= 4.0
-        fall = scale / tau * (e / scale) ** exponent
+        fall = after if e == end else scale / tau * (e / scale) ** exponent
     return e, 0.0
 
 
@@ -183,7 +243,9 @@ def relaxing_play(
         out[k + 1] = state
 
 
-COMPILED: list[Callable[..., Any]] = [follow, creep, limit, ring, dilated_play, mean_decay, stretch, relaxing_play]
+COMPILED: list[Callable[..., Any]] = [
+    follow, creep, limit, ring, curve, dilated_play, mean_decay, bent_decay, taylor, stretch, relaxing_play,
+]  # fmt: skip
 
 
 @functools.cache
@@ -200,5 +262,6 @@ def load() -> None:
     run.creep(u[:, None], step, step, step, 1.0, np.ones(1), out[:, None])
     run.limit(u, step, step, out)
     run.ring(u, step, step, step, step, 1.0, out)
+    run.curve(u, 1.0, step, 1.0, out)
     run.dilated_play(u, u, 1.0, 1.0, 0.0, out)
     run.relaxing_play(u, step, 1.0, 1.0, 1.0, 1.0, 0.0, out)

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+from hystgen.effects.recursions import code
 from hystgen.param_models import Number, Positive
 
 BENT = 1.0
@@ -32,9 +33,9 @@ class SensorPolynomial(Effect):
 
     def mapped(self, y: Array, run: Run) -> Array:
         """What the sensor shows."""
-        xi = y / self.scale
-        bent = np.polynomial.polynomial.polyval(xi, np.array(self.coefficients))
-        return np.asarray(y + self.scale * xi * xi * bent)
+        shown = np.array(y)
+        code().curve(np.asarray(y), self.scale, np.array(self.coefficients), 1.0, shown)
+        return shown
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
