@@ -59,8 +59,9 @@ class World:
         rms = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
         return selection.Tried(option, extended, (name,), rms, errors)
 
-    def extensions(self, now: Hypothesis, _: Any = ()) -> list[Any]:
+    def extensions(self, now: Hypothesis, worth: Any = None) -> list[Any]:
         found = [self.tried(now, name) for name in self.all if name not in now.names]
+        found = [each for each in found if worth is None or worth(each.option)]
         return sorted(found, key=lambda each: each.held_out)
 
     def gap(self, now: Hypothesis) -> float:
@@ -133,7 +134,10 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
         selection.Found("c", "c", left["w"], left["cw"], 0.0, ("a", "b")),
     ]
     best: Any
-    best, found = selection._exchanged(now, found, world.records)
+    best, unchanged = selection._exchanged(now, [*found], {"b", "c", "w"}, world.records)
+    assert best is now  # without `a` there is nothing better
+    assert [each.name for each in unchanged] == ["w", "c"]
+    best, found = selection._exchanged(now, found, {"a", "b", "c", "w"}, world.records)
     assert best.names == frozenset("ab")
     assert sorted(each.name for each in found) == ["a", "b"]
     assert found[0].before == gap

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -157,13 +157,10 @@ class _Records:
     tick: Callable[[], None]
     jobs: int
 
-    def extensions(self, now: Fitted, like: Sequence[Tried] = ()) -> list[Tried]:
-        """One effect more, the best shapes of all, the best one first; `like`: of those that were followed up there."""
+    def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
+        """One effect more, the best shapes of all, the best one first; `worth`: of the options that are worth it."""
         known = replace(self.known, ringing=periodic.ringing(self.to_fit, now.errors(self.to_fit), RINGING))
-        found = options(now, known, self.user)
-        if like:
-            labels = {label for each in like for label in (each.option.label, each.option.beyond)}
-            found = [option for option in found if option.label in labels]
+        found = [option for option in options(now, known, self.user) if worth is None or worth(option)]
         return _followed_up(now, _screened(now, self, found), self)
 
     def left(self, fitted: Fitted) -> float:
@@ -235,7 +232,7 @@ def select(
         found.append(replace(accepted, before=found[-1].after) if found else accepted)
         now, latest = step.best.fitted, step
         now, found = _without_needless(now, found, records)
-        now, found = _exchanged(now, found, records)
+        now, found = _exchanged(now, found, {each.option.name for tried in rankings for each in tried}, records)
         if now is not step.best.fitted:
             latest = None
     return Outcome(refitted, now, tuple(found), tuple(rankings))
@@ -275,13 +272,15 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     return _Merit(removed, p_value) if sure else None
 
 
-def _step(now: Fitted, gap: float, records: _Records, like: Sequence[Tried] = ()) -> _Step | None:
+def _step(
+    now: Fitted, gap: float, records: _Records, worth: Callable[[Option], bool] | None = None
+) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
 
     What explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is
     the next one's turn.
     """
-    tried = records.extensions(now, like)
+    tried = records.extensions(now, worth)
     if not tried:
         return None
     for best in _simplest_first(tried, records):
@@ -299,9 +298,10 @@ def _with_rival(latest: _Step, failed: _Step, gap: float, records: _Records) -> 
     others = {each.name: each for each in reversed(_rivals(latest, records))}  # of each name the best one
     left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
     enough = (1.0 - EXCHANGE) * records.left(failed.now)
+    labels = {label for each in failed.tried for label in (each.option.label, each.option.beyond)}
     for first in _simplest_first(left, records):
         merit = _merit(latest.now, first, records)
-        step = _step(first.fitted, gap, records, failed.tried) if merit is not None else None
+        step = _step(first.fitted, gap, records, lambda option: option.label in labels) if merit is not None else None
         if step is not None and step.merit is not None and step.best.held_out <= enough:
             return replace(latest, best=first, merit=merit), step
     return None
@@ -491,18 +491,21 @@ def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tup
     return now, found
 
 
-def _exchanged(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:
+def _exchanged(
+    now: Fitted, found: list[Found], names: Collection[str], records: _Records
+) -> tuple[Fitted, list[Found]]:
     """Put another effect or shape in the place of one accepted earlier, where those accepted later make it the better.
 
     The first of two has been chosen while the second was missing, and may have taken part of its place; and the second
-    beside a wrong first one. Which names are alike shows beside all the others too.
+    beside a wrong first one. Which names are alike shows beside all the others too. `names`: effects that were
+    followed up so far, since one that was among the best beside none of the others is not worth another search.
     """
     latest, left = found[-1].name, EXCHANGES
     while left:
         left -= 1
         for k, old in enumerate(found):
             fitted = None if old.name == latest else _without(now, old.name, records)
-            step = None if fitted is None else _step(fitted, 0.0, records)
+            step = None if fitted is None else _step(fitted, 0.0, records, lambda option: option.name in names)
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
