@@ -193,3 +193,24 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     return rising ? hystgen_corners_rise(t, corner, m->start, depth, k, m->w, output, &m->there, &room)
                   : hystgen_corners_fall(t, corner, m->start, depth, k, m->w, output, &m->there, &room);
 }
+
+/* Where a move to w ends, which `depth` corners stand before: fills in the place that is known beforehand. */
+HYSTGEN_API void hystgen_corners_reach(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
+                                       unsigned int depth, hystgen_real_t w, bool rising)
+{
+    hystgen_place_t *p = &m->there;
+    const bool on = m->here.rising == rising;
+    unsigned int k = on ? m->here.k : 1u;
+    if (on ? hystgen_past(w, m->here.next, rising)
+           : depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
+        k = k + 1;
+        depth = hystgen_find_by_input(t, corner, depth, &k, w, rising, false);
+    } else if (on) { /* a move that goes on as it was */
+        hystgen_copy_place(p, &m->here);
+        return;
+    }
+    p->k = (uint_least16_t)k;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+    hystgen_corners_settle(t, p, corner, rising);
+}

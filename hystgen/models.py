@@ -465,16 +465,25 @@ class Cascade:
 
         The straight way to an end of the range leaves every play at its extreme, so that the ends are attained.
         """
-        extremes = []
-        for w in self.play_range:
-            states = [
-                min(max(s, w - r), w + r) for s, r in zip(self.pi.start, self.pi.thresholds, strict=True)
-            ]
+        low, high = (self._after(w) for w in self.play_range)
+        return low, high
+
+    @cached_property
+    def swung(self) -> tuple[float, float]:
+        """The output at either end of `input_range` after the other end: inside `output_range`, or right at its ends.
+
+        References between an end of that and this need a drive out of range, once the drive has been at the other end.
+        """
+        low, high = self.play_range
+        return self._after(high, low), self._after(low, high)
+
+    def _after(self, *drives: float) -> float:
+        """The output when the plays have been led from their start memory to inputs, one after the other."""
+        states = list(self.pi.start)
+        for w in drives:
+            states = [min(max(s, w - r), w + r) for s, r in zip(states, self.pi.thresholds, strict=True)]
             states[0] = w
-            extremes.append(
-                math.fsum([*(p * s for p, s in zip(self.pi.weights, states, strict=True)), self.output_offset])
-            )
-        return extremes[0], extremes[1]
+        return math.fsum([*(p * s for p, s in zip(self.pi.weights, states, strict=True)), self.output_offset])
 
     @property
     def start_is_defined(self) -> bool:

@@ -738,6 +738,7 @@ def inverse_step(t: Tables, s: State, u: Any) -> Any:
     inside = clamp_drive(t, v)
     if inside != v:
         bits = bits | OUTPUT_CLAMPED
+        s.counts[HINT_K] = 0  # where the limit leads does not depend on what is asked for beyond it
     s.counts[BITS] = bits
     s.counts[STATUS] |= bits
     return answer(s, inside)

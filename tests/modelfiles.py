@@ -16,6 +16,11 @@ FILES = {
     "listed": head("listed")
     + PLAYS
     + "    initial_state: [0, 0.3, 0.1, -0.2, 0.3, 0.5, 0.1]\n  output_offset: 1.5\n",
+    "above": head("above", 0, 6) + PLAYS + "  output_offset: -0.5\n",
+    "below": head("below", -6, 0) + PLAYS,
+    "outside": head("outside", 1, 2.5)
+    + PLAYS
+    + "    initial_state: [2.5, 2.4, 2.2, 2, 1.8, 1.5, 1]\n  output_offset: -0.5\n",
     "bent": head("bent", -3, 3)
     + PLAYS
     + "  memoryless:\n    kind: dead_zone\n    thresholds: [-1.0, -0.4, 0, 0.4, 1.0]\n"

@@ -32,6 +32,7 @@ TOOLS = ("cppcheck", "clang-tidy", "gcc")
 
 MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("plain", "inverse", "float32", "corners", "self-contained"),
+    ("below", "inverse", "float32", "corners", "self-contained"),
     ("plain", "both", "q31", "corners", "shared-runtime"),
     ("plain", "inverse", "q15", "loop", "self-contained"),
     ("listed", "both", "float32", "corners", "single-header"),

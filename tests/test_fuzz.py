@@ -42,6 +42,8 @@ def fuzz(folder: Path, seconds: float, *module: str, change: Callable[[str], str
     ("name", "arithmetic", "engine"),
     [
         ("plain", "float32", "corners"),
+        ("outside", "float32", "corners"),
+        ("below", "float64", "corners"),
         ("bent", "float32", "corners"),
         ("two_branches", "float32", "corners"),
         ("mixed", "float64", "loop"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hystgen import reference
+from hystgen.emission.numbers import limits
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
 
@@ -72,7 +73,8 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
             fast = corners and not cascade.stages
             fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
             if fast:  # what stands before them
-                fields = ([8, 4, 4, play, play, 4, 4, 1] if fixed else [real] * 4) + fields
+                limited = not fixed and any(limits(cascade, options.arithmetic))
+                fields = ([8, 4, 4, play, play, 4, 4, 1] if fixed else [real] * (4 + 2 * limited)) + fields
         scalars = [(size, size) for size in fields]
         if corners:
             place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
@@ -93,8 +95,8 @@ def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTabl
 
     A search through the corner list bisects it, in fixed point after a look at the last corner; that through a block
     bisects it too, in fixed point after one or two looks: at most 3 + 2 b comparisons in all, b the bits of n. Corners
-    of a start list are bisected apart, but own a play each, so that no block is searched then. A drive that was limited
-    or committed is searched for when it is taken to memory, the answer once more.
+    of a start list are bisected apart, but own a play each, so that no block is searched then. A drive that is limited
+    or committed is searched for too, then or when it is taken to memory, the answer once more.
     """
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)

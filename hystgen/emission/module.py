@@ -223,6 +223,8 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
         roots.add(f"hystgen_{engine}_output")
     if options.inverse and values.fast and not family.fixed:
         roots |= {f"hystgen_corners_{part}" for part in ("begin", "find", "rise", "fall", "go")}
+        if values.limits_low or values.limits_high:
+            roots.add("hystgen_corners_reach")
     elif options.inverse:
         roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
     if options.inverse and engine == "corners":

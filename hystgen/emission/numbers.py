@@ -83,6 +83,7 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     if len(numbers.start) > 1:
         arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
+    limits_low, limits_high = limits(cascade, options.arithmetic)
     return {
         **_limits(numbers),
         "arrays": arrays,
@@ -96,6 +97,9 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "inverse_rounding_error": operand(_upward(bounds.rounding, dtype)) if options.inverse else "",
         "fast": options.inverse and corners and not stages,
         "shy": literal(_upward(_shy(cascade, float(np.finfo(dtype).eps)), dtype)),
+        "elsewhere": any(numbers.start) or not cascade.input_range[0] <= 0.0 <= cascade.input_range[1],
+        "limits_low": limits_low,
+        "limits_high": limits_high,
         "half": literal(dtype(0.5)),
         "has_offset": bool(numbers.limits[reference.OFFSET]),
         "wide_t": f"{name}_real_t",
@@ -117,6 +121,13 @@ def _shy(cascade: Cascade, epsilon: float) -> float:
     for the last sum, S for taking this off, 2 S and twice the offset for adding and taking off the offset: below 32.
     """
     return 16 * epsilon * (largest_sum(cascade) + abs(cascade.output_offset))
+
+
+def limits(cascade: Cascade, arithmetic: str) -> tuple[bool, bool]:
+    """Whether references in the output range may need a drive below, above the input range, by more than rounding."""
+    shy = _shy(cascade, float(np.finfo(arithmetic).eps))
+    (low, high), (lowest, highest) = cascade.swung, cascade.output_range
+    return low - lowest > shy, highest - high > shy
 
 
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:

@@ -817,6 +817,7 @@ static curved_real_t curved_inverse_look(curved_inverse_t *self, curved_real_t u
     inside = curved_clamp_drive(v);
     if (inside < v || inside > v) {
         bits |= CURVED_STATUS_OUTPUT_CLAMPED;
+        self->memory.there.k = 0; /* where the limit leads does not depend on what is asked for beyond it */
     }
     self->bits = bits;
     self->status |= bits;

@@ -768,13 +768,38 @@ static plain_real_t plain_inverse_hold(plain_inverse_t *self)
     return self->pending;
 }
 
+/* Answers with v, a limit of the drive whose place is known, so that the step behind it makes one move. References
+   beyond the edge can get nothing else. */
+static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v, plain_real_t edge)
+{
+    self->edge[0] = edge;
+    self->edge[1] = edge;
+    self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
+    self->fast = 3;
+    self->repeat = true;
+    self->bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
+    self->status |= PLAIN_STATUS_OUTPUT_CLAMPED;
+    return plain_inverse_answer(self, v);
+}
+
+/* The reference that the drive's limit v gives in the place that is known, and beyond it a little more than rounding can
+   be. */
+static plain_real_t plain_inverse_beyond_limit(const plain_inverse_t *self, plain_real_t v)
+{
+    const plain_place_t *p = &self->memory.there;
+    const plain_real_t edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
+    return v > PLAIN_DRIVE_MIN ? edge + 2.2984315e-05f : edge - 2.2984315e-05f;
+}
+
 /* A drive that is not what solving gave, or that is no move. */
 static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 {
     const plain_real_t inside = plain_clamp_drive(v);
     if (inside < v || inside > v) {
-        self->bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
-        self->status |= PLAIN_STATUS_OUTPUT_CLAMPED;
+        plain_memory_t *m = &self->memory;
+        plain_copy_place(&m->there, &m->here);
+        plain_corners_go(&plain_tables, &self->memory, self->corner, inside, &m->there);
+        return plain_inverse_limit(self, inside, plain_inverse_beyond_limit(self, inside));
     }
     self->repeat = true;
     self->fast = 0;
@@ -847,7 +872,7 @@ static plain_real_t plain_inverse_rise(plain_inverse_t *self, unsigned int depth
     return plain_inverse_enter(self, v, true);
 }
 
-/* The same for a falling move. */
+/* A falling move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that shorter ways save no registers for it */
 #endif
@@ -1131,6 +1156,33 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
     return beyond ? plain_inverse_beyond(self, u) : plain_inverse_look(self, u);
 }
 
+/* A sample behind one that was answered with a limit of the drive: mostly so again. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_at_limit(plain_inverse_t *self, plain_real_t u)
+{
+    plain_memory_t *m = &self->memory;
+    if (!plain_finite(u)) {
+        self->status |= PLAIN_STATUS_HELD;
+    } else {
+        if (u < self->reference || u > self->reference) {
+            const plain_real_t inside = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN
+                : u > PLAIN_OUTPUT_MAX ? PLAIN_OUTPUT_MAX : u;
+            if (!(self->falling ? inside < self->edge[0] : inside > self->edge[0])) {
+                plain_inverse_expect(self, self->pending);
+                return inside < u || inside > u ? plain_inverse_look(self, u) : plain_inverse_next(self, u);
+            }
+            plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED
+                | (inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u));
+        }
+        self->status |= self->bits;
+    }
+    plain_copy_place(&m->here, &m->there); /* the drive has come to the limit, and stays there */
+    m->w = self->pending;
+    return self->pending;
+}
+
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
 {
     if (u > self->edge[0] && u < self->edge[1]) { /* the usual sample; never so for NaN */
@@ -1144,6 +1196,9 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
     if (self->fast != 1) {
         if (self->fast == 0) {
             return plain_inverse_look(self, u);
+        }
+        if (self->fast == 3) {
+            return plain_inverse_at_limit(self, u);
         }
         if (!plain_finite(u)) {
             return plain_inverse_odd_behind(self);

@@ -1068,6 +1068,7 @@ static two_branches_real_t two_branches_inverse_deliver(two_branches_inverse_t *
     inside = two_branches_clamp_drive(v);
     if (inside < v || inside > v) {
         self->bits |= TWO_BRANCHES_STATUS_OUTPUT_CLAMPED;
+        self->memory.there.k = 0; /* where the limit leads does not depend on what is asked for beyond it */
     }
     self->status |= self->bits;
     return two_branches_inverse_answer(self, inside);
