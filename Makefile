@@ -38,7 +38,7 @@ lint: $(VENV)/ready
 	$(BIN)/mypy
 	$(BIN)/python tests/static_checks.py
 
-# Eight modules, five minutes each
+# Ten modules, five minutes each
 fuzz: $(VENV)/ready
 	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
 
