@@ -8,8 +8,9 @@ with the same care for NaN, range and status), same compiler, flags (-std=c99 -O
 the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
 one among them, then a sample after which the next one has to do more (`ways`), then jumps to everywhere; what lies
 near the dearest of these; and the same with a NaN, an infinity or a `commit` before the jump (`interrupted`). A sample
-that is no number right behind a commit, which sends the answer before the commit once more, is counted apart. Every
-answer that is counted has been compared with the bit reference.
+that is no number right behind a commit, which sends the answer before the commit once more, is counted apart. So is a
+range that begins where the plays rest, as those of most piezo drives do: from 0 on references may need less than its
+lower end. Every answer that is counted has been compared with the bit reference.
 
 Writes `targets.csv` and `targets.svg`. With `--check` the exit code is 1 where a goal is missed. All plays, cores and
 arithmetics take hours: `--parts` puts the tables of shorter runs together.
@@ -44,8 +45,9 @@ PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 SEARCHED = 200_000  # samples of a round of the search for the worst case
 KEPT = 30  # trials, the dearest ones, whose neighbours the next round is about
-RANGE = 10.0
+RANGE = 10.0  # half of it
 BEHIND = "no number behind a commit"
+FROM_0 = "worst case, range from 0"
 # of the textbook loop: what numbers are and what sums are
 TYPES = {
     "float32": ("float", "float"),
@@ -79,13 +81,25 @@ class Figures:
 KINDS = {name: {"str": str, "int": int, "float": float}[str(kind)] for name, kind in Figures.__annotations__.items()}
 
 
+@dataclass(frozen=True)
+class Case:
+    """What a build is about."""
+
+    target: targets.Target
+    compiler: str
+    n: int
+    operator: str
+    arithmetic: str
+    middle: float = 0.0  # of the range of the drive
+
+
 @functools.cache
-def model(n: int) -> Model:
+def model(n: int, middle: float = 0.0) -> Model:
     """n plays over nine tenths of what a full swing reaches, weights falling, as identified ones do."""
     thresholds = np.linspace(0.0, 0.9 * RANGE, n + 1)
     weights = np.concatenate([[0.7], 2.4 / n * np.exp(-thresholds[1:] / 5)])
     text = (
-        f"hystgen: 1\nname: bench\ninput_range: [-{RANGE}, {RANGE}]\nmodel:\n  pi:\n"
+        f"hystgen: 1\nname: bench\ninput_range: [{middle - RANGE}, {middle + RANGE}]\nmodel:\n  pi:\n"
         f"    thresholds: {thresholds.tolist()}\n    weights: {weights.tolist()}\n"
     )
     return Model(parse_parameters(text, "bench.yaml"))
@@ -111,12 +125,18 @@ def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
     return call, x
 
 
-def from_drive(n: int, operator: str, drive: Reals, call: Any = None) -> Reals:
-    """What the operator is given so that the plays see `drive`."""
-    if operator == "forward":
+def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
+    """What the operator is given so that the plays see `drive`, which is about the middle of the range.
+
+    Beyond a range whose ends the reference can ask for less than, the inverse is asked for that much less.
+    """
+    drive = case.middle + drive
+    if case.operator == "forward":
         return drive
-    session = simulation.Session(model(n).cascade, "forward")
-    return session.run(drive)[0] if call is None else session.operate(call, drive)[0]
+    cascade = model(case.n, case.middle).cascade
+    session = simulation.Session(cascade, "forward")
+    x = session.run(drive)[0] if call is None else session.operate(call, drive)[0]
+    return np.asarray(x + cascade.pi.weights[0] * (drive - np.clip(drive, *cascade.input_range)) * bool(case.middle))
 
 
 def blocks(n: int) -> Iterator[list[int]]:
@@ -154,10 +174,10 @@ def corner_lists(n: int) -> Iterator[Reals]:
             yield -points
 
 
-def activations(n: int, points: Reals) -> Reals:
+def activations(case: Case, points: Reals) -> Reals:
     """Drives beyond which a move from the last of `points` takes another play along, by formula (35); ascending."""
-    r = np.asarray(model(n).cascade.pi.thresholds)[1:]
-    plays = np.zeros(n)
+    r = np.asarray(model(case.n).cascade.pi.thresholds)[1:]
+    plays = np.full(case.n, -case.middle)
     for x in np.clip(points, -RANGE, RANGE):
         plays = np.maximum(x - r, np.minimum(x + r, plays))
     return np.unique(np.concatenate([plays - r, plays + r]).round(9))
@@ -168,14 +188,14 @@ def thinned(x: Reals, most: int) -> Reals:
     return x[np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int)]
 
 
-def landings(n: int, points: Reals, most: int = 129) -> Reals:
+def landings(case: Case, points: Reals, most: int = 129) -> Reals:
     """Drives that take different plays along from the last of `points` on; the outermost lie beyond the range."""
-    ends = np.array([-1.01 * RANGE, 1.01 * RANGE])
-    between = np.unique(np.concatenate([ends, np.clip(activations(n, points), -RANGE, RANGE)]))
-    return np.concatenate([ends, thinned((between[1:] + between[:-1]) / 2, most - 2)])
+    ends = RANGE * np.array([-1.01, 1.01, *([-1.1, -1.5] if case.middle else [])])
+    between = np.unique(np.concatenate([ends[:2], np.clip(activations(case, points), -RANGE, RANGE)]))
+    return np.concatenate([ends, thinned((between[1:] + between[:-1]) / 2, most - len(ends))])
 
 
-def trials(n: int) -> Iterator[Reals]:
+def trials(case: Case) -> Iterator[Reals]:
     """Every corner list, then a jump, since the search for where it leads is the work of a sample."""
     # first blocks of uneven sizes, which no rule makes: turning points at random, small among large, a few and many
     rng = np.random.default_rng(11)
@@ -184,12 +204,12 @@ def trials(n: int) -> Iterator[Reals]:
         if size < 100:
             yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
         yield turns  # and from the start
-    for points in corner_lists(n):
-        for jump in landings(n, points, 2000 // n + 20):
+    for points in corner_lists(case.n):
+        for jump in landings(case, points, 2000 // case.n + 20):
             yield np.append(points, jump)
 
 
-def ways(n: int, points: Reals, hair: float) -> Iterator[Reals]:
+def ways(case: Case, points: Reals, hair: float) -> Iterator[Reals]:
     """Steps on from `points` after which the next sample has more to do before it looks for its own place.
 
     A sample is fast where the one before it ended in the place that its search had found. That one did not where it led
@@ -198,7 +218,7 @@ def ways(n: int, points: Reals, hair: float) -> Iterator[Reals]:
     carried the answer to an activation point or across, at the first time or when the same was asked for again.
     """
     at, on = points[-1], 1.0 if len(points) < 2 else np.sign(points[-1] - points[-2])
-    first = model(n).cascade.pi.thresholds[1]
+    first = model(case.n).cascade.pi.thresholds[1]
     yield np.array([at - on * first])
     yield np.array([at - on * first, at - on * first / 2])
     for part in (0.5, 1.0, 1.5):
@@ -206,31 +226,31 @@ def ways(n: int, points: Reals, hair: float) -> Iterator[Reals]:
         yield np.array([at - part * hair])
     yield np.array([1.01 * RANGE])
     yield np.array([-1.01 * RANGE])
-    for a in thinned(activations(n, points), 8):
+    for a in thinned(activations(case, points), 8):
         for times in (1, 2):
             yield np.full(times, a - np.sign(a - at) * hair / 4)
 
 
-def longer(n: int, trial: Reals, hair: float) -> Iterator[Reals]:
+def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
     """A trial with a way between what it jumps from and its jump, which then leads anywhere."""
-    for way in ways(n, trial[:-1], hair):
+    for way in ways(case, trial[:-1], hair):
         points = np.concatenate([trial[:-1], way])
-        for jump in landings(n, points, 9):
+        for jump in landings(case, points, 9):
             yield np.append(points, jump)
 
 
-def neighbours(n: int, trial: Reals, hair: float) -> Iterator[Reals]:
+def neighbours(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
     """A trial with its last jump, or a point shortly before, led elsewhere; what is longer; and what has other numbers,
     on which the cost of floating point in software depends."""
     for place in range(-1, -min(5, len(trial)), -1):
-        for jump in landings(n, trial[:place], 65):
+        for jump in landings(case, trial[:place], 65):
             other = trial.copy()
             other[place] = jump
             yield other
     rng = np.random.default_rng(13)
-    for size in np.repeat([1.0, 0.3, 0.1], 30) * model(n).cascade.pi.thresholds[1]:
+    for size in np.repeat([1.0, 0.3, 0.1], 30) * model(case.n).cascade.pi.thresholds[1]:
         yield trial + rng.uniform(-size, size, len(trial))
-    yield from longer(n, trial, hair)
+    yield from longer(case, trial, hair)
 
 
 def within(most: int, found: Iterable[Reals]) -> list[Reals]:
@@ -244,17 +264,6 @@ def within(most: int, found: Iterable[Reals]) -> list[Reals]:
     return kept
 
 
-@dataclass(frozen=True)
-class Case:
-    """What a build is about."""
-
-    target: targets.Target
-    compiler: str
-    n: int
-    operator: str
-    arithmetic: str
-
-
 REALS = ("float32", "float64")
 
 
@@ -263,13 +272,13 @@ def lsbs(case: Case) -> tuple[float, float]:
     """Drive and output of a code; 1 in floating point."""
     if case.arithmetic in REALS:
         return 1.0, 1.0
-    form = fixed_tables.build(model(case.n).cascade, case.arithmetic, "corners", None, None)[1]
+    form = fixed_tables.build(model(case.n, case.middle).cascade, case.arithmetic, "corners", None, None)[1]
     return float(form.drive_lsb), float(form.output_lsb)
 
 
 def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
     """What the operator takes so that the plays see `drive`, in its own numbers: codes, `coarser` times the finest."""
-    x = from_drive(case.n, case.operator, drive, call)
+    x = from_drive(case, drive, call)
     real = comparison.REALS[case.arithmetic]
     if real.kind != "i":
         return x.astype(real)
@@ -305,7 +314,7 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
         for x in odd:
             add(jump[:-1], (step, x), (step, jump[-1]))
         if case.operator == "inverse" and len(trial) > 2:
-            applied = trial[-2] / lsbs(case)[0]
+            applied = (case.middle + trial[-2]) / lsbs(case)[0]
             add(jump[:-2], (step, aside[-1]), (commit, applied), (step, jump[-1]))
             add(jump[:-2], (commit, applied), (step, jump[-1]))
             for x, (*_, last) in itertools.product(odd, on):
@@ -339,7 +348,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._number = itertools.count()
-        self._emitted: dict[tuple[int, str, str], sources.Sources] = {}
+        self._emitted: dict[tuple[int, str, str, float], sources.Sources] = {}
         self._worst: dict[Case, list[Reals]] = {}
         self._worst_odd: dict[tuple[Case, bool], list[Reals]] = {}
 
@@ -352,18 +361,18 @@ class Bench:
         return emulator.Image.load(compiler.image(files, place, compilers.STRICT, cross.Layout(), entry))
 
     def _module(self, case: Case, engine: str) -> sources.Sources:
-        about = (case.n, engine, case.arithmetic)
+        about = (case.n, engine, case.arithmetic, case.middle)
         if about not in self._emitted:
-            options = emit_options(model(case.n), "both", case.arithmetic, engine)
-            folder = self._folder / f"{engine}-{case.arithmetic}-{case.n}"
-            self._emitted[about] = sources.write(folder, model(case.n), options)
+            options = emit_options(model(case.n, case.middle), "both", case.arithmetic, engine)
+            folder = self._folder / f"{engine}-{case.arithmetic}-{case.n}-{case.middle:g}"
+            self._emitted[about] = sources.write(folder, model(case.n, case.middle), options)
         return self._emitted[about]
 
     def _textbook(self, case: Case) -> sources.Sources:
         """The loop with its tables; in fixed point with codes of half the finest, so that sums of two fit."""
         folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
-        cascade = model(case.n).cascade
+        cascade = model(case.n, case.middle).cascade
         forward = case.operator == "forward"
         pi = cascade.pi if forward else cascade.pi.inverse()
         real, total = TYPES[case.arithmetic]
@@ -404,7 +413,7 @@ class Bench:
         core = emulator.Core(case.target, image)
         x = given(case, drive, 2)
         answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
-        cascade = model(case.n).cascade
+        cascade = model(case.n, case.middle).cascade
         forward = case.operator == "forward"
         into, out = (2 * lsb for lsb in (lsbs(case) if forward else lsbs(case)[::-1]))
         if case.arithmetic in REALS:
@@ -459,7 +468,7 @@ class Bench:
         counted: str = "step",
     ) -> emulator.Core:
         """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
-        numbers = model(case.n).tables(case.arithmetic, engine)
+        numbers = model(case.n, case.middle).tables(case.arithmetic, engine)
         calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8) if call is None else call, x)
         real = comparison.REALS[case.arithmetic]
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
@@ -480,8 +489,8 @@ class Bench:
             if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
                 best, rounds = self._worst_trials(replace(case, arithmetic="float32")), 1
             else:
-                _, best = self._dearest(case, within(SEARCHED // (1 + (most < SEARCHED)), trials(case.n)), 20)
-                best += within(most, (x for trial in best for x in longer(case.n, trial, hair)))
+                _, best = self._dearest(case, within(SEARCHED // (1 + (most < SEARCHED)), trials(case)), 20)
+                best += within(most, (x for trial in best for x in longer(case, trial, hair)))
             self._worst[case] = self._better(case, best, rounds, most, hair, plain)
         return self._worst[case]
 
@@ -497,8 +506,8 @@ class Bench:
             if case.arithmetic == "float64":
                 best += self._worst_interrupted(replace(case, arithmetic="float32"), behind)
             else:
-                every = max(1, sum(len(trial) for trial in trials(case.n)) // most)
-                best += within(most, itertools.islice(trials(case.n), None, None, every))
+                every = max(1, sum(len(trial) for trial in trials(case)) // most)
+                best += within(most, itertools.islice(trials(case), None, None, every))
             rounds = 1 if case.arithmetic == "float64" else 3
             self._worst_odd[case, behind] = self._better(case, best, rounds, most, hair, interrupted, behind)
         return self._worst_odd[case, behind]
@@ -521,7 +530,7 @@ class Bench:
         for _ in range(rounds):
             if dear == before:
                 break
-            before, near = dear, (x for trial in best for x in neighbours(case.n, trial, hair))
+            before, near = dear, (x for trial in best for x in neighbours(case, trial, hair))
             dear, best = self._dearest(case, [*best, *within(most, near)], KEPT, form, behind)
         return best
 
@@ -598,6 +607,9 @@ def measure(
                     found.append(bench.engine(case, "loop", some))
                     found.append(bench.engine(case, "corners", all_of_it))
                     found += bench.worst(case)
+                    if operator == "inverse" and arithmetic == "float32" and target.fpu:
+                        from_0 = bench.worst(replace(case, middle=RANGE))[0]
+                        found.append(replace(from_0, signal=FROM_0))
                 seconds = time.monotonic() - began
                 print(f"{target.name} {compiler} {arithmetic} n = {n}: {seconds:.1f} s", file=sys.stderr)
     return found
@@ -620,13 +632,13 @@ def key(f: Figures) -> tuple[Any, ...]:
 
 
 def table_text(figures: Iterable[Figures]) -> str:
-    """A row an operator and n: mean / max over the multisine, and the worst cases, of a NaN behind a commit and of a
-    commit too."""
+    """A row an operator and n: mean / max over the multisine, and the worst cases, of a NaN behind a commit, of a range
+    from 0 on and of a commit too."""
     rows: dict[tuple[Any, ...], dict[str, Figures]] = {}
     for f in figures:
         rows.setdefault(key(f), {})[f.engine if f.signal == "multisine" else f.signal] = f
     head = ("target", "compiler", "arithmetic", "operator", "n", "textbook", "loop", "corners", "worst", "NaN",
-            "commit", "flash", "library", "RAM", "stack", "textbook/corners")  # fmt: skip
+            "from 0", "commit", "flash", "library", "RAM", "stack", "textbook/corners")  # fmt: skip
     lines = [head]
     for about, row in rows.items():
         text, corners = row["textbook"], row["corners"]
@@ -637,7 +649,7 @@ def table_text(figures: Iterable[Figures]) -> str:
                 f"{row['loop'].mean:.0f} / {row['loop'].max}",
                 f"{corners.mean:.1f} / {corners.max}",
                 str(row["worst case"].max),
-                *(str(row[what].max) if what in row else "" for what in (BEHIND, "commit")),
+                *(str(row[what].max) if what in row else "" for what in (BEHIND, FROM_0, "commit")),
                 str(corners.flash),
                 str(corners.library),
                 str(corners.ram),
@@ -668,14 +680,12 @@ def goals(figures: Iterable[Figures]) -> list[tuple[str, float, float]]:
         for n, most in ((16, 60), (128, 70)):
             if f := get("cortex-m4f", "corners", n):
                 wanted.append((f"{core} n = {n}: mean", f.mean, most))
-        for n in PLAYS:
-            f, text = get("cortex-m4f", "corners", n, "worst case"), get("cortex-m4f", "textbook", n)
+        for n, what in itertools.product(PLAYS, ("worst case", BEHIND, FROM_0)):
+            f, text = get("cortex-m4f", "corners", n, what), get("cortex-m4f", "textbook", n)
             if f and text and n >= 16:
-                wanted.append((f"{core} n = {n}: worst, textbook's is {text.max}", f.max, text.max))
+                wanted.append((f"{core} n = {n}: {what}, textbook's is {text.max}", f.max, text.max))
                 if n == 128:
-                    wanted.append((f"{core} n = 128: worst", f.max, 400))
-                    if odd := get("cortex-m4f", "corners", n, BEHIND):
-                        wanted.append((f"{core} n = 128: a NaN behind a commit", odd.max, 400))
+                    wanted.append((f"{core} n = 128: {what}", f.max, 400))
         f, text = get("cortex-m0plus", "corners", 16), get("cortex-m0plus", "textbook", 16)
         if f and text:
             words = f"cortex-m0plus {compiler} n = 16: mean, a ninth of textbook's {text.mean}"

@@ -65,3 +65,18 @@ HYSTGEN_COPIES unsigned int hystgen_corners_find(const hystgen_tables_t *t, cons
     }
     return left;
 }
+
+/* First of the plays k .. high-1 that a way has not reached, by its output or by its input, or high. */
+static unsigned int hystgen_play_not_reached(const hystgen_tables_t *t, unsigned int k, unsigned int high,
+                                             hystgen_real_t output, hystgen_real_t input)
+{
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (output >= t->start_level[middle] && input >= t->threshold[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    return k;
+}

@@ -13,17 +13,15 @@ static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output
     p->rising = rising;
 }
 
-/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. Rounding is
-   kept from leading out of that place: then the plays that follow are those that will; *room is false where it is too
-   narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
-HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
-                                                bool *room)
+/* Where a rising move from w `from` to `output` ends, of which k plays follow and `left` corners hold the others, `end`
+   being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
+   Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
+   where it is too narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
+HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                       unsigned int left, unsigned int k, unsigned int end,
+                                       hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
+                                       bool *room)
 {
-    unsigned int end;
-    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, output, true);
     hystgen_real_t w;
     hystgen_real_t first;
     hystgen_real_t level;
@@ -83,13 +81,11 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const
 }
 
 /* The same for a falling move. */
-HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
-                                                bool *room)
+HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                       unsigned int left, unsigned int k, unsigned int end,
+                                       hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
+                                       bool *room)
 {
-    unsigned int end;
-    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, -output, false);
     hystgen_real_t w;
     hystgen_real_t first;
     hystgen_real_t level;
@@ -148,6 +144,30 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const
     return w;
 }
 
+/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
+HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                unsigned int start, unsigned int depth, unsigned int k,
+                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
+                                                bool *room)
+{
+    unsigned int end;
+    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, output, true);
+    return hystgen_rise_to(t, corner, left, k, end, from, output, p, room);
+}
+
+/* A falling move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
+HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                unsigned int start, unsigned int depth, unsigned int k,
+                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
+                                                bool *room)
+{
+    unsigned int end;
+    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, -output, false);
+    return hystgen_fall_to(t, corner, left, k, end, from, output, p, room);
+}
+
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
    a turn leaves its corner in the free slot above those that are held, which is scratch space. Or false, where no more
    plays are taken along; then *w is the input of the plays. Moves nothing. */
@@ -194,23 +214,118 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
                   : hystgen_corners_fall(t, corner, m->start, depth, k, m->w, output, &m->there, &room);
 }
 
-/* Where a move to w ends, which `depth` corners stand before: fills in the place that is known beforehand. */
-HYSTGEN_API void hystgen_corners_reach(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
-                                       unsigned int depth, hystgen_real_t w, bool rising)
+/* Whether a move to `limit` takes no more plays along: right at the activation of one, it does not follow yet. */
+static bool hystgen_takes_none(const hystgen_tables_t *t, const hystgen_memory_t *m, const hystgen_corner_t *corner,
+                               unsigned int depth, hystgen_real_t limit, bool rising)
+{
+    if (m->here.rising == rising) {
+        return !hystgen_past(limit, m->here.next, rising);
+    }
+    return depth > 0 && !hystgen_past(limit, hystgen_activation(t, &corner[depth - 1], 1, rising), rising);
+}
+
+/* Fills in the place of a move that ends at a limit of the drive, `limit` as the plays see it: k plays follow then and
+   `left` of `depth` corners are left, where it takes any along. */
+HYSTGEN_COPIES void hystgen_settle_at(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
+                                      unsigned int depth, unsigned int left, unsigned int k, hystgen_real_t limit,
+                                      bool rising)
 {
     hystgen_place_t *p = &m->there;
-    const bool on = m->here.rising == rising;
-    unsigned int k = on ? m->here.k : 1u;
-    if (on ? hystgen_past(w, m->here.next, rising)
-           : depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
-        k = k + 1;
-        depth = hystgen_find_by_input(t, corner, depth, &k, w, rising, false);
-    } else if (on) { /* a move that goes on as it was */
-        hystgen_copy_place(p, &m->here);
-        return;
+    if (hystgen_takes_none(t, m, corner, depth, limit, rising)) {
+        if (m->here.rising == rising) {
+            hystgen_copy_place(p, &m->here);
+            return;
+        }
+        k = 1;
+        left = depth;
     }
     p->k = (uint_least16_t)k;
-    p->depth = (uint_least16_t)depth;
+    p->depth = (uint_least16_t)left;
     p->rising = rising;
     hystgen_corners_settle(t, p, corner, rising);
+}
+
+/* Where a move ends that may lead to the input `limit` of the plays, which is that of a limit of the drive; what begins
+   it as above. No turning point lies beyond, so that all corners are left but those of the start and the first one
+   above them, which the caller has asked the output for. *limited tells whether it leads to the limit; then the place
+   is that of the limit. False where it would take more to know, and where rounding decides; then nothing is filled
+   in. */
+HYSTGEN_COPIES bool hystgen_move_within(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
+                                        unsigned int depth, unsigned int k, hystgen_real_t output,
+                                        hystgen_real_t limit, bool rising, hystgen_real_t *w, bool *room,
+                                        bool *limited)
+{
+    hystgen_place_t *p = &m->there;
+    const hystgen_corner_t *c = &corner[m->start];
+    const hystgen_real_t x = rising ? output : -output;
+    const unsigned int high = c->end - 1u;
+    unsigned int left = m->start + 1u;
+    unsigned int end = 0;
+    bool alike = true;
+    *w = limit;
+    *limited = true;
+    if (k > 1 && !hystgen_reached(limit, m->here.next, rising)) { /* before the next play */
+        hystgen_copy_place(p, &m->here);
+        return true;
+    }
+    if (depth < left) {
+        return false;
+    }
+    if (depth > left) {
+        k = corner[left].end;
+        end = k;
+    }
+    if (x >= c->pass[rising] && hystgen_reached(limit, hystgen_activation(t, c, high, rising), rising)) {
+        if (m->start > 0) {
+            return false;
+        }
+        left = 0; /* every play follows */
+        k = c->end;
+        end = k;
+    } else {
+        const hystgen_real_t way = hystgen_half(rising ? limit - c->extremum : c->extremum - limit);
+        const hystgen_real_t asked = hystgen_half(x + c->pass[!rising]);
+        if (c->side != (rising ? 1 : -1)) {
+            return false;
+        }
+        k = hystgen_play_not_reached(t, k, high, asked, way);
+        if (k < high ? asked >= t->start_level[k] : x >= c->pass[rising]) { /* for more plays than follow */
+            if (k < high && hystgen_reached(limit, hystgen_activation(t, c, k, rising), rising)) {
+                return false;
+            }
+            hystgen_settle_at(t, m, corner, depth, left, k, limit, rising);
+            return true;
+        }
+        alike = !(k < high && way >= t->threshold[k]);
+    }
+    *w = rising ? hystgen_rise_to(t, corner, left, k, end, m->w, output, p, room)
+                : hystgen_fall_to(t, corner, left, k, end, m->w, output, p, room);
+    *limited = hystgen_past(*w, limit, rising);
+    if (*limited) {
+        *w = limit;
+        if (!alike || (left > 0 && !hystgen_past(limit, p->anchor, rising))) {
+            hystgen_copy_place(p, &m->here);
+            return false;
+        }
+        if (hystgen_takes_none(t, m, corner, depth, limit, rising)) {
+            hystgen_settle_at(t, m, corner, depth, left, k, limit, rising);
+        }
+    }
+    return true;
+}
+
+HYSTGEN_API bool hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                             const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
+                                             hystgen_real_t output, hystgen_real_t limit, hystgen_real_t *w,
+                                             bool *room, bool *limited)
+{
+    return hystgen_move_within(t, m, corner, depth, k, output, limit, true, w, room, limited);
+}
+
+HYSTGEN_API bool hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                             const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
+                                             hystgen_real_t output, hystgen_real_t limit, hystgen_real_t *w,
+                                             bool *room, bool *limited)
+{
+    return hystgen_move_within(t, m, corner, depth, k, output, limit, false, w, room, limited);
 }

@@ -14,7 +14,11 @@ import types
 from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from hystgen.fixed import FixedTables
     from hystgen.reference import Tables
 
@@ -109,6 +113,20 @@ def _reference(fixed_point: bool, compiled: bool) -> types.SimpleNamespace:
     if not compiled:
         return bind_together(functions)
     return compile_together(functions, fixed.INLINED if fixed_point else plain.INLINED)
+
+
+def answers(
+    t: Tables | FixedTables, inverse: bool, call: Any, x: Any, compiled: bool = True
+) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+    """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
+    from hystgen.reference import new_state
+
+    code, state = reference(t, compiled), new_state(t)
+    code.init(t, state)
+    x = np.asarray(x).astype(t.threshold.dtype)
+    found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
+    code.run(t, state, int(inverse), np.asarray(call, dtype=np.uint8), x, found, status)
+    return found, status
 
 
 @functools.cache

@@ -52,6 +52,24 @@ def test_bits_equal(name: str, arithmetic: str, engine: str) -> None:
     check_codegen(name, arithmetic=arithmetic, engine=engine)
 
 
+ROUND = {
+    "fine": ([0, 20], [0, 1.25, 2.5, 3.75, 5, 6.25, 7.5, 8.75, 10], [0.7, 0.1, 0.13, 0.2, 0.15, 0.11, 0.1, 0.05, 0.02]),
+    "coarse": ([2.5, 20], [0, 1.25, 5, 7.5], [0.5, 0.25, 0.1, 0.1]),
+}
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize("name", ROUND)
+def test_bits_equal_where_corners_end_at_the_same_drive(name: str, arithmetic: str) -> None:
+    """Round numbers: which of two corners is left first, and which play follows, is rounding's choice."""
+    ends, thresholds, weights = ROUND[name]
+    pi = f"{{thresholds: {thresholds}, weights: {weights}}}"
+    text = f"hystgen: 1\nname: {name}\ninput_range: {ends}\nmodel:\n  pi: {pi}\n"
+    one = Model(parse_parameters(text, "round.yaml"))
+    report = hystgen.verify(one, arithmetic=arithmetic, engine="corners", compiler=["gcc"], length=400_000)
+    assert report.ok, report.table()
+
+
 @pytest.mark.parametrize("layout", LAYOUTS[1:])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hystgen import reference
-from hystgen.emission.numbers import limits
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
 
@@ -73,8 +72,7 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
             fast = corners and not cascade.stages
             fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
             if fast:  # what stands before them
-                limited = not fixed and any(limits(cascade, options.arithmetic))
-                fields = ([8, 4, 4, play, play, 4, 4, 1] if fixed else [real] * (4 + 2 * limited)) + fields
+                fields = ([8, 4, 4, play, play, 4, 4, 1] if fixed else [real] * 4) + fields
         scalars = [(size, size) for size in fields]
         if corners:
             place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))

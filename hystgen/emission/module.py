@@ -223,8 +223,8 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
         roots.add(f"hystgen_{engine}_output")
     if options.inverse and values.fast and not family.fixed:
         roots |= {f"hystgen_corners_{part}" for part in ("begin", "find", "rise", "fall", "go")}
-        if values.limits_low or values.limits_high:
-            roots.add("hystgen_corners_reach")
+        roots |= {"hystgen_corners_fall_within"} if values.limited_low else set()
+        roots |= {"hystgen_corners_rise_within"} if values.limited_high else set()
     elif options.inverse:
         roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
     if options.inverse and engine == "corners":

@@ -83,7 +83,8 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     if len(numbers.start) > 1:
         arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
-    limits_low, limits_high = limits(cascade, options.arithmetic)
+    fast = options.inverse and corners and not stages
+    low, high = limited(cascade, options.arithmetic) if fast else (None, None)
     return {
         **_limits(numbers),
         "arrays": arrays,
@@ -95,12 +96,11 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "forward_max_error": operand(_upward(bounds.forward, dtype)),
         "inverse_max_error": operand(_upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(_upward(bounds.rounding, dtype)) if options.inverse else "",
-        "fast": options.inverse and corners and not stages,
+        "fast": fast,
         "shy": literal(_upward(_shy(cascade, float(np.finfo(dtype).eps)), dtype)),
         "elsewhere": any(numbers.start) or not cascade.input_range[0] <= 0.0 <= cascade.input_range[1],
-        "limits_low": limits_low,
-        "limits_high": limits_high,
-        "half": literal(dtype(0.5)),
+        "limited_low": "" if low is None else operand(_upward(low, dtype)),
+        "limited_high": "" if high is None else operand(-_upward(-high, dtype)),
         "has_offset": bool(numbers.limits[reference.OFFSET]),
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
@@ -123,11 +123,14 @@ def _shy(cascade: Cascade, epsilon: float) -> float:
     return 16 * epsilon * (largest_sum(cascade) + abs(cascade.output_offset))
 
 
-def limits(cascade: Cascade, arithmetic: str) -> tuple[bool, bool]:
-    """Whether references in the output range may need a drive below, above the input range, by more than rounding."""
+def limited(cascade: Cascade, arithmetic: str) -> tuple[float | None, float | None]:
+    """References below, above which the drive may be at its lower, its upper limit; None where rounding alone can.
+
+    No memory makes the output at a limit lie further inside than that after the other end of the range.
+    """
     shy = _shy(cascade, float(np.finfo(arithmetic).eps))
     (low, high), (lowest, highest) = cascade.swung, cascade.output_range
-    return low - lowest > shy, highest - high > shy
+    return low + shy if low - lowest > shy else None, high - shy if highest - high > shy else None
 
 
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:

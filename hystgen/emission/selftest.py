@@ -63,12 +63,8 @@ def _samples(numbers: reference.Tables | FixedTables, inverse: bool) -> list[dic
         if i == 120:
             calls.append(reference.OP_RESET)
             arguments.append(at(low, high, 0.25))
-    state = reference.new_state(numbers)
-    code = compiled.reference(numbers, compiled=False)
-    code.init(numbers, state)
     x = np.array(arguments, dtype=numbers.threshold.dtype)
-    answers, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
-    code.run(numbers, state, int(inverse), np.array(calls, dtype=np.uint8), x, answers, status)
+    answers, status = compiled.answers(numbers, inverse, calls, x, compiled=False)
     return [
         {"call": CALLS[c], "argument": literal(a), "answer": literal(y), "status": int(s)}
         for c, a, y, s in zip(calls, x, answers, status, strict=True)

@@ -48,13 +48,9 @@ def expected_record(
     numbers: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
 ) -> Expected:
     """A record of calls, in numbers of type `real`, with the answers of the bit reference."""
-    code = compiled.reference(numbers)
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
-    state = reference.new_state(numbers)
-    answer, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
-    code.init(numbers, state)
-    code.run(numbers, state, int(inverse), op, x, answer, status)
+    answer, status = compiled.answers(numbers, inverse, op, x)
     return Expected(name, op, x.astype(real), answer.astype(real), status)
 
 

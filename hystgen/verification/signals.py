@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import fixed, reference
+from hystgen import compiled, fixed, reference
 from hystgen.fixed import FixedTables
 from hystgen.reference import Bytes
 
@@ -41,6 +41,34 @@ def _onto_the_plays(
             i += times
             at = at + float(least(at)) * int(rng.integers(-2, 3))
     return x
+
+
+def _coincidences(
+    tables: reference.Tables | FixedTables, inverse: bool, low: float, high: float, length: int,
+    rng: np.random.Generator,
+) -> tuple[Bytes, NDArray[np.float64]]:  # fmt: skip
+    """Turns right where plays start to follow, from other such turns and from the ends of the range.
+
+    With round thresholds several corners end at the same drive, to the last bit or but for it: no search may depend on
+    what it looks at first.
+    """
+    drive_low, drive_high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
+    finer = 2.0 ** int(tables.limits[fixed.FINE]) if isinstance(tables, FixedTables) else 1.0
+    ways = np.append(tables.threshold[1:].astype(float) / finer, drive_high - drive_low)
+    drive = np.empty(400)
+    at = drive_low
+    for i in range(len(drive)):
+        at = at + float(rng.choice(ways)) * int(rng.choice([-2, -1, 1, 2]))
+        drive[i] = at = min(max(at, drive_low), drive_high)
+    if not inverse:
+        return _steps(np.empty(length)), rng.choice(drive, length)
+    outputs = compiled.answers(tables, False, _steps(drive), drive)[0].astype(float)
+    beyond = 0.1 * (high - low) * np.array([-1.0, 0.0, 0.0, 1.0]) + [low, low, high, high]
+    near = low + (high - low) * np.array([0.004, 0.04, 0.5, 0.96, 0.996])
+    asked = np.where(rng.random(length) < 0.6, rng.choice(outputs, length), rng.choice([*beyond, *near], length))
+    op = np.where(rng.random(length) < 0.35, reference.OP_COMMIT, reference.OP_STEP).astype(np.uint8)
+    op[rng.random(length) < 0.005] = reference.OP_RESET
+    return op, np.where(op == reference.OP_COMMIT, rng.choice(drive, length), asked)
 
 
 def suite(
@@ -97,6 +125,7 @@ def _suite(
     if len(levels) > 0:
         bit = (lambda _: 1.0) if whole else (lambda at: np.spacing(real(abs(at))))
         yield record("onto the plays", _onto_the_plays(levels, bit, low, high, length, rng))
+        yield "coincidences", *_coincidences(tables, inverse, low, high, length, np.random.default_rng(20220917))
 
     if whole:
         most = float(np.iinfo(real_type).max)

@@ -461,17 +461,15 @@ static void plain_write_place(plain_place_t *p, plain_real_t anchor_output, plai
     p->rising = rising;
 }
 
-/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. Rounding is
-   kept from leading out of that place: then the plays that follow are those that will; *room is false where it is too
-   narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
-static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                plain_real_t from, plain_real_t output, plain_place_t *p,
-                                                bool *room)
+/* Where a rising move from w `from` to `output` ends, of which k plays follow and `left` corners hold the others, `end`
+   being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
+   Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
+   where it is too narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
+PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, const plain_corner_t *corner,
+                                       unsigned int left, unsigned int k, unsigned int end,
+                                       plain_real_t from, plain_real_t output, plain_place_t *p,
+                                       bool *room)
 {
-    unsigned int end;
-    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, output, true);
     plain_real_t w;
     plain_real_t first;
     plain_real_t level;
@@ -531,13 +529,11 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corn
 }
 
 /* The same for a falling move. */
-static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                plain_real_t from, plain_real_t output, plain_place_t *p,
-                                                bool *room)
+PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, const plain_corner_t *corner,
+                                       unsigned int left, unsigned int k, unsigned int end,
+                                       plain_real_t from, plain_real_t output, plain_place_t *p,
+                                       bool *room)
 {
-    unsigned int end;
-    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, -output, false);
     plain_real_t w;
     plain_real_t first;
     plain_real_t level;
@@ -594,6 +590,30 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corn
     }
     plain_write_place(p, level, next_level, first, next, k, left, false);
     return w;
+}
+
+/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corner_t *corner,
+                                                unsigned int start, unsigned int depth, unsigned int k,
+                                                plain_real_t from, plain_real_t output, plain_place_t *p,
+                                                bool *room)
+{
+    unsigned int end;
+    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, output, true);
+    return plain_rise_to(t, corner, left, k, end, from, output, p, room);
+}
+
+/* A falling move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corner_t *corner,
+                                                unsigned int start, unsigned int depth, unsigned int k,
+                                                plain_real_t from, plain_real_t output, plain_place_t *p,
+                                                bool *room)
+{
+    unsigned int end;
+    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, -output, false);
+    return plain_fall_to(t, corner, left, k, end, from, output, p, room);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
@@ -715,6 +735,11 @@ PLAIN_COPIES void plain_inverse_take(plain_inverse_t *self, plain_real_t w)
     self->memory.w = w;
 }
 
+PLAIN_COPIES plain_real_t plain_clamp_reference(plain_real_t u)
+{
+    return u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : u > PLAIN_OUTPUT_MAX ? PLAIN_OUTPUT_MAX : u;
+}
+
 /* Before a move: what is asked for, and the status it has. */
 static void plain_inverse_ask(plain_inverse_t *self, plain_real_t u, unsigned int bits)
 {
@@ -769,26 +794,20 @@ static plain_real_t plain_inverse_hold(plain_inverse_t *self)
 }
 
 /* Answers with v, a limit of the drive whose place is known, so that the step behind it makes one move. References
-   beyond the edge can get nothing else. */
-static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v, plain_real_t edge)
+   beyond the one that it gives, by a little more than rounding can be, can get nothing else. */
+static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
 {
+    const plain_place_t *p = &self->memory.there;
+    plain_real_t edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
+    self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
+    edge = self->falling ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
     self->edge[0] = edge;
     self->edge[1] = edge;
-    self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
     self->fast = 3;
     self->repeat = true;
     self->bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
     self->status |= PLAIN_STATUS_OUTPUT_CLAMPED;
     return plain_inverse_answer(self, v);
-}
-
-/* The reference that the drive's limit v gives in the place that is known, and beyond it a little more than rounding can
-   be. */
-static plain_real_t plain_inverse_beyond_limit(const plain_inverse_t *self, plain_real_t v)
-{
-    const plain_place_t *p = &self->memory.there;
-    const plain_real_t edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
-    return v > PLAIN_DRIVE_MIN ? edge + 2.2984315e-05f : edge - 2.2984315e-05f;
 }
 
 /* A drive that is not what solving gave, or that is no move. */
@@ -799,7 +818,7 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
         plain_memory_t *m = &self->memory;
         plain_copy_place(&m->there, &m->here);
         plain_corners_go(&plain_tables, &self->memory, self->corner, inside, &m->there);
-        return plain_inverse_limit(self, inside, plain_inverse_beyond_limit(self, inside));
+        return plain_inverse_limit(self, inside);
     }
     self->repeat = true;
     self->fast = 0;
@@ -807,8 +826,9 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
     return plain_inverse_send(self, inside);
 }
 
-/* A move by so little that rounding leaves the drive where it is: fast for what follows, which no sample is up to. The
-   place that is known is that of the memory, but for the number of its plays. */
+/* A move by so little that rounding leaves the drive where it is, which may lie a little off the line that is followed:
+   the next step goes on from there, unless it asks for the same again. The place that is known is that of the memory,
+   but for the number of its plays. */
 static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
@@ -817,13 +837,10 @@ static plain_real_t plain_inverse_rest(plain_inverse_t *self)
         return plain_inverse_stay(self, m->w);
     }
     m->there.k = m->here.k;
-    self->falling = !m->here.rising;
-    self->edge[self->falling] = self->reference;
-    self->edge[!self->falling] = self->falling ? FLT_MAX : -FLT_MAX;
-    self->gain = plain_reciprocal[m->here.k];
-    self->fast = 1;
-    self->pending = m->w;
-    return m->w;
+    plain_inverse_expect(self, m->w);
+    self->fast = 4;
+    self->repeat = true;
+    return plain_inverse_answer(self, m->w);
 }
 
 /* Where a move has ended, at v: from there samples are fast up to the reference at which another play follows, so that
@@ -852,6 +869,19 @@ PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_
     return v;
 }
 
+/* Where solving has led to, which is as it is known where there was room for it. */
+PLAIN_COPIES plain_real_t plain_inverse_land(plain_inverse_t *self, plain_real_t v, bool room, bool rising)
+{
+    const plain_real_t from = self->memory.w;
+    if (!(rising ? v > from : v < from)) {
+        return plain_inverse_rest(self);
+    }
+    if (!room) {
+        return plain_inverse_stay(self, v);
+    }
+    return plain_inverse_enter(self, v, rising);
+}
+
 /* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that shorter ways save no registers for it */
@@ -859,17 +889,10 @@ __attribute__((noinline)) /* so that shorter ways save no registers for it */
 static plain_real_t plain_inverse_rise(plain_inverse_t *self, unsigned int depth, unsigned int k,
     plain_real_t u)
 {
-    const plain_real_t from = self->memory.w;
     bool room = true;
-    const plain_real_t v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, from, u,
+    const plain_real_t v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, self->memory.w, u,
         &self->memory.there, &room);
-    if (!(v > from)) {
-        return plain_inverse_rest(self);
-    }
-    if (!room) {
-        return plain_inverse_stay(self, v);
-    }
-    return plain_inverse_enter(self, v, true);
+    return plain_inverse_land(self, v, room, true);
 }
 
 /* A falling move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
@@ -879,17 +902,10 @@ __attribute__((noinline)) /* so that shorter ways save no registers for it */
 static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth, unsigned int k,
     plain_real_t u)
 {
-    const plain_real_t from = self->memory.w;
     bool room = true;
-    const plain_real_t v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, from, u,
+    const plain_real_t v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, self->memory.w, u,
         &self->memory.there, &room);
-    if (!(v < from)) {
-        return plain_inverse_rest(self);
-    }
-    if (!room) {
-        return plain_inverse_stay(self, v);
-    }
-    return plain_inverse_enter(self, v, false);
+    return plain_inverse_land(self, v, room, false);
 }
 
 /* A move that takes no more plays along, and is fast from there on. */
@@ -945,7 +961,7 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
             self->status |= PLAIN_STATUS_HELD;
             return self->repeat ? self->answer : plain_inverse_return(self);
         }
-        u = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX;
+        u = plain_clamp_reference(u);
     }
     if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
         self->status |= self->bits;
@@ -1024,7 +1040,7 @@ static plain_real_t plain_inverse_beyond(plain_inverse_t *self, plain_real_t u)
 }
 
 /* Where a fast move goes on to `output` and takes just one more play of the same corner along, as it mostly does: the
-   drive *v, or false. */
+   drive *v, or false, as where the next play may follow by rounding, since another corner may be left there too. */
 PLAIN_COPIES bool plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_real_t output, bool rising,
     plain_real_t *v)
 {
@@ -1034,20 +1050,17 @@ PLAIN_COPIES bool plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_
     const unsigned int k = p->k + 1u;
     if (k < c->end && !(rising ? c->side < 0 : c->side > 0)) {
         const plain_real_t y = rising ? c->pass[0] : c->pass[1]; /* where it rises with its sign changed */
-        const plain_real_t way = rising ? output + y : y - output;
         plain_real_t r = plain_threshold[k];
         plain_real_t z = plain_start_level[k];
-        bool first = way < z;
         if (c->side != 0) {
-            first = way * 0.5f < z;
             r = r + r;
             z = z + z;
         }
         r = rising ? c->extremum + r : c->extremum - r;
-        z = rising ? z - y : y - z; /* the last play of a corner goes by this output, the others by the way */
+        z = rising ? z - y : y - z;
         *v = p->next + (output - p->next_output) * plain_reciprocal[k];
-        if (first && (rising ? output < z && *v < r && *v <= PLAIN_DRIVE_MAX
-                             : output > z && *v > r && *v >= PLAIN_DRIVE_MIN)) {
+        if (rising ? output < z - 2.2984315e-05f && *v < r && *v <= PLAIN_DRIVE_MAX
+                   : output > z + 2.2984315e-05f && *v > r && *v >= PLAIN_DRIVE_MIN) {
             if (!(rising ? *v > self->pending : *v < self->pending)) {
                 plain_inverse_take(self, self->pending);
                 plain_inverse_ask(self, u, 0);
@@ -1166,15 +1179,22 @@ static plain_real_t plain_inverse_at_limit(plain_inverse_t *self, plain_real_t u
     if (!plain_finite(u)) {
         self->status |= PLAIN_STATUS_HELD;
     } else {
-        if (u < self->reference || u > self->reference) {
-            const plain_real_t inside = u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN
-                : u > PLAIN_OUTPUT_MAX ? PLAIN_OUTPUT_MAX : u;
-            if (!(self->falling ? inside < self->edge[0] : inside > self->edge[0])) {
-                plain_inverse_expect(self, self->pending);
-                return inside < u || inside > u ? plain_inverse_look(self, u) : plain_inverse_next(self, u);
+        const plain_real_t inside = plain_clamp_reference(u);
+        const unsigned int bits = inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u;
+        if (!(self->falling ? inside < self->edge[0] : inside > self->edge[0])) {
+            const plain_place_t *p = &m->there;
+            const plain_real_t output = inside;
+            const plain_real_t v = p->anchor + (output - p->anchor_output) * plain_reciprocal[p->k];
+            if (p->rising ? output < p->next_output && v < self->pending : output > p->next_output && v > self->pending) {
+                const bool rising = !p->rising;
+                const unsigned int depth = plain_inverse_turn(self, u, bits, !rising);
+                return rising ? plain_inverse_rise(self, depth, 1, inside) : plain_inverse_fall(self, depth, 1, inside);
             }
-            plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED
-                | (inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u));
+            plain_inverse_expect(self, self->pending); /* by rounding alone */
+            return plain_inverse_look(self, u);
+        }
+        if (u < self->reference || u > self->reference) {
+            plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED | bits);
         }
         self->status |= self->bits;
     }
@@ -1200,6 +1220,10 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         if (self->fast == 3) {
             return plain_inverse_at_limit(self, u);
         }
+        if (self->fast == 4 && !(u < self->reference) && !(u > self->reference) && plain_finite(u)) {
+            self->status |= self->bits;
+            return self->pending;
+        }
         if (!plain_finite(u)) {
             return plain_inverse_odd_behind(self);
         }
@@ -1222,6 +1246,9 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
         } else if (self->memory.there.k == self->memory.here.k && self->memory.there.rising == self->memory.here.rising) {
             self->memory.there.k = 0; /* it found nothing new */
         }
+    }
+    if (self->fast > 2) {
+        self->memory.there.k = 0; /* where a limit leads, or no move, says nothing of another drive */
     }
     v = plain_clamp_drive(applied);
     if (v < applied || v > applied) {

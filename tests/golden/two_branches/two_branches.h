@@ -738,17 +738,15 @@ static void two_branches_write_place(two_branches_place_t *p, two_branches_real_
     p->rising = rising;
 }
 
-/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. Rounding is
-   kept from leading out of that place: then the plays that follow are those that will; *room is false where it is too
-   narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
-static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
-                                                bool *room)
+/* Where a rising move from w `from` to `output` ends, of which k plays follow and `left` corners hold the others, `end`
+   being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
+   Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
+   where it is too narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
+TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                       unsigned int left, unsigned int k, unsigned int end,
+                                       two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
+                                       bool *room)
 {
-    unsigned int end;
-    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, output, true);
     two_branches_real_t w;
     two_branches_real_t first;
     two_branches_real_t level;
@@ -808,13 +806,11 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
 }
 
 /* The same for a falling move. */
-static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
-                                                bool *room)
+TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                       unsigned int left, unsigned int k, unsigned int end,
+                                       two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
+                                       bool *room)
 {
-    unsigned int end;
-    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, -output, false);
     two_branches_real_t w;
     two_branches_real_t first;
     two_branches_real_t level;
@@ -871,6 +867,30 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
     }
     two_branches_write_place(p, level, next_level, first, next, k, left, false);
     return w;
+}
+
+/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                unsigned int start, unsigned int depth, unsigned int k,
+                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
+                                                bool *room)
+{
+    unsigned int end;
+    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, output, true);
+    return two_branches_rise_to(t, corner, left, k, end, from, output, p, room);
+}
+
+/* A falling move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
+   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, const two_branches_corner_t *corner,
+                                                unsigned int start, unsigned int depth, unsigned int k,
+                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
+                                                bool *room)
+{
+    unsigned int end;
+    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, -output, false);
+    return two_branches_fall_to(t, corner, left, k, end, from, output, p, room);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
