@@ -188,7 +188,7 @@ class TestEffects:
         assert self.left(found) == pytest.approx(item.unabsorbed, rel=0.15)
 
     @staticmethod
-    def left(found: case.Case) -> float:
+    def left(found: case.Case, records: NDArray[np.bool_] | None = None) -> float:
         from scipy.optimize import lsq_linear
 
         course = refit.track(found.session)
@@ -198,6 +198,8 @@ class TestEffects:
         matrix = np.hstack((columns, offsets))
         lower = np.concatenate((np.zeros(40), np.full(offsets.shape[1], -np.inf)))
         y = np.concatenate(found.clean)
+        if records is not None:
+            matrix, y = matrix[records[record]], y[records[record]]
         x = lsq_linear(matrix, y, (lower, np.inf)).x
         return float(np.sqrt(np.mean((y - matrix @ x) ** 2)))
 
@@ -280,6 +282,33 @@ class TestEffects:
             pair = made("pair", seed)
             assert len({item.effect.name for item in pair.present}) == 2
             assert all(item.unabsorbed > 2.5 * pair.noise() for item in pair.present)
+
+    def test_held_out_records_alone_show_no_effect(self, made: Made) -> None:
+        """What is left in the records to fit, after a refit to these, by another solver; and what it is good for."""
+        for kind, seed in (("single", NAMES.index("slew_limit")), ("pair", 2)):
+            found = made(kind, seed)
+            held_out = np.array([record.held_out for record in found.session.records])
+            for item, told in zip(found.present, labels.label(found, with_rivals=False)["effects"], strict=True):
+                alone = Plant(found.plant.hysteresis, (item.effect,))
+                fine = alone.respond(found.session)
+                clean = tuple(found.session.sampled(fine, record) for record in found.session.records)
+                assert self.left(replace(found, clean=clean), ~held_out) == pytest.approx(item.to_fit, rel=0.15)
+                assert told["ratio_fit"] == pytest.approx(item.to_fit / found.noise(False))
+                assert told["ratio_fit"] > 1.5
+
+    def test_strength_is_wanted_in_both_groups_of_records(self) -> None:
+        effect = Effect("slew_limit", "current", 1.0, {})
+        assert case._off(case.Present(effect, 10.0, 9.0, 8.0), 10.0) == 0.0
+        assert case._off(case.Present(effect, 10.0, 30.0, 4.0), 10.0) == pytest.approx(math.log(5.0 / 4.0))
+        assert case._off(case.Present(effect, 10.0, 0.5, 12.0), 10.0) == pytest.approx(math.log(10.0))
+        assert case._off(case.Present(effect, 20.0, 20.0, 20.0), 10.0) == pytest.approx(math.log(2.0))
+
+    def test_what_held_out_records_alone_show_is_not_visible(self, made: Made) -> None:
+        found = made("pair", 2)
+        first, second = found.present
+        for share, visible in ((1.6, True), (1.4, False)):
+            weak = replace(second, to_fit=share * found.noise(False))
+            assert labels.label(replace(found, present=(first, weak)), with_rivals=False)["visible"] is visible
 
 
 class TestRecords:
@@ -526,6 +555,13 @@ class TestScore:
         assert table["lag"] == {"creep": 1}
         assert table["none"] == {score.NOTHING: 1}
         assert "creep" in score.text(some, score.figures(some))
+
+    def test_what_is_not_visible_is_not_counted_but_told(self) -> None:
+        hidden = outcome("pair", ("lag", "creep"), (), ratio=2.0)
+        some = [hidden, *[outcome("pair", ("lag", "creep"), ("lag", "creep"))] * 3]
+        (figure,) = [figure for figure in score.figures(some) if figure.what == "pair: both names"]
+        assert (figure.value, figure.cases) == (1.0, 3)
+        assert score.asides(some)["pair: not visible, not counted"] == 0.25
 
 
 FAKE = """

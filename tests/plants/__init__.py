@@ -14,6 +14,10 @@ run, score                the package's command line on every case; the figures 
 that `hystgen diagnose --plan` writes; `--kind single --seeds 0:13` then hides every effect once.
 
 An effect counts as visible from three times the noise on, by the rms that it alone leaves when a fine play sum and an
-offset a record are refitted to the noise-free records. A name that leaves at most 5 % more on the held-out records
+offset a record are refitted to the noise-free records. Held-out records are never fitted, so that what they alone show
+cannot be found: of its strength at least half is wanted in the held-out records and, after a refit to these alone, in
+the records to fit. Where five draws do not make that (a slew limit that is met by the edges of one held-out staircase
+only) the nearest is kept, and an effect that leaves less than half of three times the noise in the records to fit
+counts as not visible. A name that leaves at most 5 % more on the held-out records
 than the plant's true form is indistinguishable there; for a pair this is settled for each effect alone.
 """

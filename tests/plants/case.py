@@ -30,6 +30,11 @@ PURE = 0.25
 """Most that a fine play sum may leave of an effect-free plant, in units of the noise."""
 
 VISIBLE = 3.0
+"""Least rms that is left of an effect, in units of the noise, for its name to be asked for."""
+
+SHOWN = 0.5
+"""Share of the strength that held-out records, and those to fit, have to show each by themselves."""
+
 CLOSE = 0.25
 """Largest log of the ratio between the wanted and the made strength."""
 
@@ -55,11 +60,12 @@ LEAST = {"resonance": 0.6, "slew_limit": 0.6, "delay": 0.3, "lag": 0.3}
 @dataclass(frozen=True)
 class Present:
     """An effect of the plant, and the rms that it alone leaves after a refit of a fine play sum [output], in all
-    records and in the held-out ones."""
+    records and in the held-out ones; `to_fit`: in the others, after a refit to these alone."""
 
     effect: Effect
     unabsorbed: float
     held_out: float
+    to_fit: float
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,7 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
     course = refit.track(stage)
     span_out = stage.bench.span_out
     twin = _seen(stage, Plant(hysteresis))
-    remainder = refit.unabsorbed(course, np.concatenate(twin), stage.bench.span)[0]
+    remainder = refit.unabsorbed(course, np.concatenate(twin), stage.bench.span).everywhere
     noise = max(between(streams[1], *NOISE) * span_out, remainder / PURE)
     colour = measure.COLOURS[(0, 0, 0, 1, 2)[int(streams[1].integers(5))]]
     if kind == "none":
@@ -127,7 +133,7 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
     present, noise = _effects(streams[2], kind, names, stage, course, hysteresis, noise, remainder)
     plant = Plant(hysteresis, tuple(item.effect for item in present))
     clean = _seen(stage, plant)
-    unabsorbed = refit.unabsorbed(course, np.concatenate(clean), stage.bench.span)[0]
+    unabsorbed = refit.unabsorbed(course, np.concatenate(clean), stage.bench.span).everywhere
     converters = measure.draw(streams[3], noise, span_out, stage.bench.span, colour)
     v = [converters.drive(streams[4], stage.sampled(stage.v, item)) for item in stage.records]
     y = [converters.output(streams[4], part) for part in clean]
@@ -266,13 +272,14 @@ def _effects(
 def _alone(stage: session.Session, course: refit.Track, hysteresis: base.Base, effect: Effect) -> Present:
     output = np.concatenate(_seen(stage, Plant(hysteresis, (effect,))))
     least = 1e-12 * stage.bench.span_out
-    everywhere, held_out = refit.unabsorbed(course, output, stage.bench.span)
-    return Present(effect, max(everywhere, least), max(held_out, least))
+    left = refit.unabsorbed(course, output, stage.bench.span)
+    return Present(effect, max(left.everywhere, least), max(left.held_out, least), max(left.to_fit, least))
 
 
 def _off(item: Present, wanted: float) -> float:
-    """How far the strength is from the wanted one; held-out records have to show at least half of it."""
-    return max(abs(math.log(item.unabsorbed / wanted)), math.log(0.5 * wanted / item.held_out))
+    """How far the strength is from the wanted one; held-out records, and those to fit, have to show half of it."""
+    shown = min(item.held_out, item.to_fit)
+    return max(abs(math.log(item.unabsorbed / wanted)), math.log(SHOWN * wanted / shown))
 
 
 def _scaled(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import refit, rivals
-from .case import REPORT, VISIBLE, Case, make
+from .case import REPORT, SHOWN, VISIBLE, Case, make
 from .plant import Plant
 from .session import Given
 
@@ -67,7 +67,11 @@ def parameters(case: Case) -> str:
 
 
 def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
-    """The truth about a case. Lengths of displacement are in output units; `ratio` is unabsorbed rms over noise rms."""
+    """The truth about a case. Lengths of displacement are in output units.
+
+    `ratio` is unabsorbed rms over noise rms; `ratio_holdout`, `ratio_fit` are those of the held-out records, and of the
+    others after a refit to these alone.
+    """
     noise = case.noise()
     effects = []
     for item in case.present:
@@ -81,6 +85,7 @@ def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
                 "unabsorbed": item.unabsorbed,
                 "ratio": item.unabsorbed / noise,
                 "ratio_holdout": item.held_out / case.noise(True),
+                "ratio_fit": item.to_fit / case.noise(False),
                 "rivals": {name: _digits(x) for name, x in sorted(against.items(), key=lambda pair: pair[1])},
                 "indistinguishable": sorted(
                     name for name, x in against.items() if x <= rivals.ALIKE and name != item.effect.name
@@ -105,7 +110,7 @@ def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
         },
         "unabsorbed": case.unabsorbed,
         "ratio": case.unabsorbed / noise,
-        "visible": bool(effects) and all(item["ratio"] >= VISIBLE for item in effects),
+        "visible": bool(effects) and all(map(_visible, effects)),
         "remainder": case.remainder / noise,
         "excitation": "rich" if case.rich else "poor",
         "history": "known" if stage.history else "unknown",
@@ -116,6 +121,11 @@ def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
         "output_range": stage.bench.span_out,
         "samples": sum(record.samples for record in stage.records),
     }
+
+
+def _visible(effect: dict[str, Any]) -> bool:
+    """Whether an effect of a label is strong enough, and not in the held-out records alone."""
+    return bool(effect["ratio"] >= VISIBLE and effect["ratio_fit"] >= SHOWN * VISIBLE)
 
 
 def compared(case: Case, plant: Plant) -> dict[str, float]:

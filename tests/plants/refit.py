@@ -94,15 +94,26 @@ def fit(columns: Array, y: Array, free: int = 0) -> Array:
     return np.asarray(found[: len(scale)] / scale)
 
 
-def residual(course: Track, output: Array, span: float) -> Array:
-    """What is left of a noise-free output (seen samples) after a joint refit to all records."""
+@dataclass(frozen=True)
+class Left:
+    """Rms that is left of a noise-free output: over all records and over the held-out ones after a joint refit to all,
+    and over the records to fit after a refit to these alone."""
+
+    everywhere: float
+    held_out: float
+    to_fit: float
+
+
+def unabsorbed(course: Track, output: Array, span: float) -> Left:
+    """What a fine play sum leaves of an output (seen samples)."""
     record = course.record[course.seen]
     columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
     y = centred(output, record)
-    return np.asarray(y - columns @ fit(columns, y))
+    left = y - columns @ fit(columns, y)
+    fitted = course.of(False)
+    alone = y[fitted] - columns[fitted] @ fit(columns[fitted], y[fitted])
+    return Left(_rms(left), _rms(left[course.of(True)]), _rms(alone))
 
 
-def unabsorbed(course: Track, output: Array, span: float) -> tuple[float, float]:
-    """Rms of `residual` over all records, and over the held-out ones alone."""
-    left = residual(course, output, span)
-    return float(np.sqrt(np.mean(left**2))), float(np.sqrt(np.mean(left[course.of(True)] ** 2)))
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2)))

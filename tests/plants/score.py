@@ -213,6 +213,8 @@ def asides(outcomes: Sequence[Outcome]) -> dict[str, float]:
         ("single: left open though separable", singles, lambda x: x.overcautious),
         ("single: nothing named", singles, lambda x: not x.names),
         ("pair: exact set", pairs, lambda x: x.exact),
+        ("single: not visible, not counted", _of(outcomes, "single"), lambda x: not x.label["visible"]),
+        ("pair: not visible, not counted", _of(outcomes, "pair"), lambda x: not x.label["visible"]),
         ("poor excitation: right name first", poor, lambda x: x.first_right),
         ("poor excitation: nothing named", poor, lambda x: not x.names),
         ("foreign: refused as bad input", foreign, lambda x: x.refused),
