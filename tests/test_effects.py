@@ -64,6 +64,7 @@ EVERY = [
     make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
     make("noncongruent", coefficients=((0.1,), (0.05, 0.02), (-0.1,))),
     make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
+    make("saturation", shape="stops", lower=-0.5, upper=2.0, give=0.2),
 ]
 
 
@@ -131,6 +132,8 @@ NOTHING = [
     make("slew_limit", rate=1e30),
     make("saturation", level=1e30),
     make("saturation", shape="hard", level=1e30),
+    make("saturation", shape="stops", lower=-1e30, upper=1e30),
+    make("saturation", shape="stops", lower=-0.5, upper=0.5, give=1.0),
     make("thermal"),
     make("thermal", source="self_heating", gain_per_degree=0.1, time_constant=1.0, heating=0.0),
     make("drift", rate=0.0),
@@ -271,7 +274,11 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     "lag": st.builds(lambda tau: {"time_constant": tau}, times),
     "delay": st.builds(lambda time: {"time": time}, times),
     "slew_limit": st.builds(lambda a, b: {"rate": a, "falling_rate": b}, positive, positive),
-    "saturation": st.builds(lambda s, x: {"shape": s, "level": x}, st.sampled_from(["tanh", "hard"]), positive),
+    "saturation": st.builds(lambda s, x: {"shape": s, "level": x}, st.sampled_from(["tanh", "hard"]), positive)
+    | st.builds(
+        lambda a, b, give: {"shape": "stops", "lower": -a, "upper": b, "give": give},
+        positive, positive, st.floats(0, 1),
+    ),
     "thermal": st.one_of(
         st.builds(lambda a, b, c: {"gain_per_degree": a, "offset_per_degree": b, "reference": c}, share, share, share),
         st.builds(
@@ -673,6 +680,11 @@ def test_sensor_polynomial_and_saturation_and_their_order() -> None:
     assert np.max(np.abs(Chain(CASCADE, parts).simulate([Run(t, v)])[0] - expected)) < 1e-12
     hard = make("saturation", shape="hard", level=1.0)
     assert np.max(np.abs(of(hard, t, v) - (np.minimum(np.maximum(h, -1), 1) + 0.3))) < 1e-12
+    stops = make("saturation", shape="stops", lower=-0.4, upper=0.9, give=0.25)
+    beyond = [0.9 + 0.25 * (x - 0.9) if x > 0.9 else -0.4 + 0.25 * (x + 0.4) if x < -0.4 else x for x in h.tolist()]
+    assert max(beyond) > 1.0
+    assert min(beyond) < -0.5
+    assert np.max(np.abs(of(stops, t, v) - (np.array(beyond) + 0.3))) < 1e-12
 
 
 def test_order_of_the_chain_is_not_that_of_the_file() -> None:

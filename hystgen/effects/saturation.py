@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
-from hystgen.param_models import Positive
+from hystgen.param_models import NotNegative, Number, Positive
 
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
 """Starts within the output: a limit beyond what was measured does nothing, and neither does a small change of it."""
+
+
+INSIDE, GIVE = (0.03, 0.1), 0.2
+"""Stops from which a search starts: shares of the output range inside its ends, and what they give."""
+
+AWAY, FARTHEST = -0.3, 0.45
+"""Stops are sought up to so far beyond the ends, where they do nothing, and inside them."""
 
 
 class _Saturation(Effect):
@@ -23,6 +31,8 @@ class _Saturation(Effect):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact inside the range, clamped outside"
 
+
+class _Level(_Saturation):
     @classmethod
     def _candidate(cls, label: str, about: About, high: float) -> Candidate:
         def build(x: Array) -> Effect:
@@ -32,7 +42,7 @@ class _Saturation(Effect):
         return Candidate(label, np.array([-1.0]), np.array([high]), np.array([0.3]), build, np.array([high]), LEVELS)
 
 
-class TanhSaturation(_Saturation):
+class TanhSaturation(_Level):
     """Smooth limit `y = level tanh(h/level)` of the output in front of the offset."""
 
     shape: Literal["tanh"] = Field(default="tanh", description="smooth limit")
@@ -48,7 +58,7 @@ class TanhSaturation(_Saturation):
         return [cls._candidate("saturation behind, tanh", about, 3.0)]
 
 
-class HardSaturation(_Saturation):
+class HardSaturation(_Level):
     """Hard limit `y = min(max(h, -level), level)` of the output in front of the offset."""
 
     shape: Literal["hard"] = Field(description="hard limit")
@@ -61,7 +71,61 @@ class HardSaturation(_Saturation):
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """The level, from a tenth of the output range to ten."""
-        return [cls._candidate("saturation behind, hard", about, 1.0)]
+        return [cls._candidate(HARD, about, 1.0)]
 
 
-SHAPES = (TanhSaturation, HardSaturation)
+HARD = "saturation behind, hard"
+
+
+class Stops(_Saturation):
+    """Elastic stops at either end: beyond `upper` and `lower` the output goes on with `give` of its slope.
+
+    A stage that meets a stop moves on by what the stop's stiffness beside its own lets it, and its travel need not be
+    centred between the two.
+    """
+
+    shape: Literal["stops"] = Field(description="elastic stops at either end")
+    lower: Number = Field(description="where the lower one begins, output units", examples=[-1.0])
+    upper: Number = Field(description="where the upper one begins, above lower, output units", examples=[38.0])
+    give: Annotated[NotNegative, Field(le=1.0)] = Field(
+        default=0.0, description="slope beyond them over that between, 0 is hard", examples=[0.1]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """lower < upper."""
+        if not self.lower < self.upper:
+            yield ("upper",), f"{self.upper!r} is not above lower = {self.lower!r}; give lower < upper"
+
+    def mapped(self, y: Array, run: Run) -> Array:
+        """The output between the stops, and what they give beyond."""
+        inside = np.clip(y, self.lower, self.upper)
+        return np.asarray(inside + self.give * (y - inside))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Where they begin and what they give, where a hard limit takes something away."""
+        low, high = about.drive
+        wide = about.output_range
+        bottom, top = (wide * v / (high - low) for v in about.drive)  # of plays without hysteresis
+
+        def build(x: Array) -> Stops:
+            return cls(
+                name="saturation", shape="stops", lower=bottom + wide * float(x[1]), upper=top - wide * float(x[0]),
+                give=float(x[2]),
+            )  # fmt: skip
+
+        def grown(hard: Array) -> Array:
+            level = wide * 10.0 ** float(hard[0])
+            places = np.array([top - level, -level - bottom]) / wide
+            return np.append(np.clip(places, AWAY, FARTHEST), GIVE)
+
+        one, other = (np.array([share, share, GIVE]) for share in INSIDE)
+        return [
+            Candidate(
+                "saturation behind, stops", np.array([AWAY, AWAY, 0.0]), np.array([FARTHEST, FARTHEST, 0.9]), one,
+                build, np.array([AWAY, AWAY, GIVE]), (other,), HARD, grown,
+            )
+        ]  # fmt: skip
+
+
+SHAPES = (TanhSaturation, HardSaturation, Stops)
