@@ -26,6 +26,9 @@ Array = NDArray[np.float64]
 SET_ASIDE = 0.3
 """Share of a single record, its end, that is held out where nothing else can be."""
 
+REACHED = 0.5
+"""A record is a fast one from this share of the largest rate of the drive on, and a wide one from that of its swing."""
+
 
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
     """The believed front as a family around it, and the shape that it has in that family."""
@@ -69,14 +72,15 @@ class Prepared:
 def prepare(
     records: Sequence[Record], holdout: Sequence[Record], history: tuple[float, ...] | None, rest: float
 ) -> Prepared:
-    """Items for the fits; without held-out records every third one is held out, or the end of a single one.
+    """Items for the fits; without held-out records one in three is held out, or the end of a single one.
 
     Raises IdentificationError.
     """
     notes: list[str] = []
     if not holdout and len(records) > 2:
-        holdout = list(records)[2::3]
-        records = [record for k, record in enumerate(records) if k % 3 != 2]
+        aside = set_aside(records)
+        holdout = [records[k] for k in aside]
+        records = [record for k, record in enumerate(records) if k not in aside]
         notes.append("no record was given as held out: " + ", ".join(record.name for record in holdout) + " set aside")
     fit_courses, held_courses = (
         [prepared.bridged(pi.course(record, history, 0)) for record in group] for group in (records, holdout)
@@ -103,6 +107,23 @@ def prepare(
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
     places = np.array(thresholds.dense(reach, samples).thresholds)
     return Prepared(to_fit, held, notes, repaired, drive, places)
+
+
+def set_aside(records: Sequence[Record]) -> list[int]:
+    """Every third record, in a count or with a neighbour in place of one by which either side has fast and wide drives.
+
+    What a fast edge shows cannot be found where none is fitted, nor judged where none is held out.
+    """
+    rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
+    swings = np.array([float(np.ptp(record.v)) for record in records])
+    showing = [{k for k, x in enumerate(found) if x >= REACHED * np.max(found)} for found in (rates, swings)]
+
+    def shared(aside: Sequence[int]) -> int:
+        return sum(bool(some.intersection(aside)) and bool(some.difference(aside)) for some in showing)
+
+    counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
+    others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
+    return max(counts + others, key=shared)
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:
