@@ -19,13 +19,13 @@ from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import floor, options, selection, structure
+from hystgen.diagnosis import believed, floor, options, selection, structure
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import Run
 from hystgen.effects.creep import ExponentialCreep
 from hystgen.effects.drift import LinearDrift
 from hystgen.effects.sensor_nonlinearity import SensorPolynomial
-from hystgen.identification.fronts import Bent, DeadZones, Ends
+from hystgen.identification.fronts import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record
 from tests.plants import run as plants_run
 from tests.plants.__main__ import main as plants
@@ -345,6 +345,67 @@ def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> N
     slope = (output(steps, 7001.0) - output(steps, 6999.0)) / 2.0
     assert abs(found["effects"][0]["parameters"]["rate"] - 7000.0) <= 4.0 * 0.05 / np.linalg.norm(slope)
     assert not any("hold out others" in advice for advice in found["advice"])
+
+
+@pytest.mark.parametrize(("weight", "left"), [(0.0, 1.0), (1e-4, 1.0), (0.2, 0.0)])
+def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: float) -> None:
+    """A ramp that looks like the beginning of a slow state is one only where the state has weight enough."""
+    v = wander(1, turns=40)
+    run = Run(np.arange(len(v)) * 1e-3, v)
+    actuator = structure.Actuator(
+        np.array([0.0]), (), (ExponentialCreep(name="creep", time_constants=(50.0,), weights=(weight,)),)
+    )
+    p = np.ones(1)
+    rows, _ = actuator.columns(Item("still", run, v, None, 100.0), p)
+    ramp = 0.2 * np.linspace(-1.0, 1.0, len(v))
+    (error,) = structure.Fitted(_only(actuator), np.empty(0), p, 0.0).errors(
+        [Item("ramp", run, rows[0] + 3.0 + ramp, None, 100.0)]
+    )
+    assert np.sqrt(np.mean(error**2) / np.mean(ramp**2)) == pytest.approx(left, abs=0.02)
+
+
+def _only(actuator: structure.Actuator) -> structure.Structure:
+    return structure.Structure(actuator.thresholds, Kept(), tuple(map(structure.kept, actuator.effects)))
+
+
+def test_stops_that_are_not_centred_and_give(tmp_path: Path) -> None:
+    """Met from one side on, behind the plays: no front and no limit that is the same at both ends explains it."""
+    lower, upper, give = -5.0, 118.0, 0.3
+    records = []
+    for number in range(1, 7):
+        v = wander(number, turns=40)
+        h = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0)
+        y = np.clip(h, lower, upper)
+        y = y + give * (h - y) + 7.0
+        records.append(record(v, noisy(y, 0.05, number), f"record {number}"))
+    content = hystgen.diagnose(_model(tmp_path), records[:4], holdout=records[4:], history=[0.0]).content
+    (effect,) = content["effects"]
+    found = effect["parameters"]
+    assert (effect["name"], found["shape"]) == ("saturation", "stops")
+    assert found["upper"] == pytest.approx(upper, abs=0.5)
+    assert found["give"] == pytest.approx(give, abs=0.03)
+    assert content["gap"]["after"]["holdout"] < 1.1 * 0.05
+
+
+@pytest.mark.parametrize(
+    ("rates", "aside"),
+    [
+        ([1, 1, 1, 1, 1, 1], [2, 5]),
+        ([1, 1, 9, 1, 6, 1], [2, 5]),  # a fast one to fit, another to judge by
+        ([1, 1, 9, 1, 1, 8], [1, 5]),  # neither would be fitted, or none judge, in any count of three
+        ([1, 9, 1, 1, 8, 1], [1, 5]),
+        ([1, 1, 9, 1, 1, 1], [2, 5]),  # a single one cannot be on both
+        ([1, 9, 1, 1, 8, 7], [2, 5]),
+        ([9, 1, 1, 8, 1], [0, 4]),
+        ([1, 1, 9, 8], [2]),
+    ],
+)
+def test_either_side_has_fast_records(rates: list[float], aside: list[int]) -> None:
+    records = []
+    for number, rate in enumerate(rates):
+        t = np.arange(400) * 0.01
+        records.append(Record(f"record {number}", t, 50.0 * np.abs((rate * t) % 2.0 - 1.0), t, sample_time=0.01))
+    assert believed.set_aside(records) == aside
 
 
 def test_held_out_records_take_no_part_in_the_fit(tmp_path: Path) -> None:

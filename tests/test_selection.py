@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -70,8 +71,9 @@ class World:
     @property
     def records(self) -> Any:
         return SimpleNamespace(
-            to_fit=self.to_fit, held=self.held, noise=NOISE, extensions=self.extensions, left=self.gap
-        )
+            to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
+            left=self.gap,
+        )  # fmt: skip
 
 
 def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, float] | None = None) -> list[str]:
@@ -151,22 +153,50 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
 def test_what_is_free_in_a_record_is_no_merit(held_out: float, fitted: float, first: str) -> None:
     """The simpler one has fewer numbers, and with what the richer one leaves free explains held-out records so well."""
 
-    class Made:
-        def __init__(self, name: str, free: int, left: dict[tuple[int, bool], float]) -> None:
-            self.name, self.left, self.shape = name, left, np.zeros(2)
-            self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
+    rich = Made("rich", 5, (1.0, 1.0), (1.0, 1.0))
+    simple = Made("simple", 1, (2.0, 2.0), (fitted, held_out))
+    assert first_of(rich, simple) == first
 
-        def errors(self, items: tuple[int, ...], like: Any = None) -> list[Array]:
-            random = np.random.default_rng([len(self.name), len(items)])
-            share = self.left[len(items), like is not None and like is not self]
-            return [share * random.normal(size=2000) for _ in items]
 
-    to_fit, held = (0, 1, 2, 3), (4, 5, 6)
-    rich = Made("rich", 5, {(4, False): 1.0, (3, False): 1.0})
-    simple = Made("simple", 1, {(4, False): 2.0, (3, False): 2.0, (4, True): fitted, (3, True): held_out})
-    tried = []
-    for made in (rich, simple):
-        errors, option = made.errors(held), SimpleNamespace(name=made.name)
-        tried.append(selection.Tried(option, made, (made.name,), 1.0, errors))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=to_fit, held=held)
-    assert selection._simplest_first(tried, records)[0].name == first
+@pytest.mark.parametrize(
+    ("held_out", "fitted", "first"), [(1.02, 0.95, "other"), (1.02, 1.0, "best"), (1.08, 0.9, "best")]
+)
+def test_all_records_decide_between_equal_numbers(held_out: float, fitted: float, first: str) -> None:
+    """Held-out ones alone only where they tell the two apart."""
+    assert first_of(Made("best", 1, (1.0, 1.0)), Made("other", 1, (fitted, held_out))) == first
+
+
+TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
+
+
+class Made:
+    """What an option leaves of records to fit and of held-out ones; `on_equal_terms`: of these with what is free in
+    the other option's."""
+
+    def __init__(
+        self, name: str, free: int, left: tuple[float, float], on_equal_terms: tuple[float, float] | None = None
+    ) -> None:
+        self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
+        self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
+
+    def errors(self, items: Sequence[int], like: Any = None) -> list[Array]:
+        random = np.random.default_rng(0)
+        share = self.left if like is None or like is self else self.on_equal_terms
+        return [share[item in HELD] * random.normal(size=2000) for item in items]
+
+
+def first_of(best: Made, other: Made) -> str:
+    tried: list[Any] = [
+        selection.Tried(SimpleNamespace(name=made.name), made, (made.name,), 1.0, made.errors(HELD))  # type: ignore[arg-type]
+        for made in (best, other)
+    ]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    return str(selection._simplest_first(tried, records)[0].name)
+
+
+def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
+    """Held-out records ruled by what another effect makes of their edges, of which fitted ones have hardly any."""
+    records: Any = SimpleNamespace(gap=1.0)
+    assert selection._Merit(0.08, 0.0, 1e-9).worth(1.0, records)
+    assert selection._Merit(0.06, 0.5, 1e-9).worth(1.0, records)
+    assert not selection._Merit(0.06, 0.06, 1e-9).worth(1.0, records)

@@ -50,7 +50,8 @@ ROUNDS, RIVALS = 5, 3
 """Effects that are added at most, and how many others of about the same use are tried in place of the latest."""
 
 SHARE = 0.07
-"""What an effect removes has an rms of at least this share of the refitted gap, or it gets no name.
+"""What an effect removes has an rms of at least this share of the refitted gap, of the records that judge or of those
+that were fitted, or it gets no name: the one may be ruled by edges that the other hardly has.
 
 What a right name in a wrong shape leaves to a second one, and no better shape takes, is up to 5 % on tuning cases.
 """
@@ -154,6 +155,8 @@ class _Records:
     known: About
     user: Sequence[type[Effect]]
     noise: float
+    gap: float
+    """what the refitted model leaves of the records to fit"""
     tick: Callable[[], None]
     jobs: int
 
@@ -202,6 +205,7 @@ def select(
         about(to_fit, refitted.structure.thresholds),
         user,
         noise,
+        fits.rms(refitted.errors(to_fit)),
         tick,
         _jobs(to_fit),
     )
@@ -240,10 +244,16 @@ def select(
 
 @dataclass(frozen=True)
 class _Merit:
-    """What an effect is good for: the rms of what it removes, and how sure the difference is."""
+    """What an effect is good for: the rms of what it removes of held-out records and of fitted ones, and how sure the
+    difference is."""
 
     removed: float
+    fitted: float
     p_value: float
+
+    def worth(self, gap: float, records: _Records) -> bool:
+        """Whether it is a share of the gap that deserves a name."""
+        return self.removed >= SHARE * gap or self.fitted >= SHARE * records.gap
 
 
 @dataclass(frozen=True)
@@ -261,15 +271,15 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     # what the effect leaves free in a record must not count as its merit
     errors = now.errors(records.held, best.fitted)
     equal = fits.rms(errors)
-    removed = math.sqrt(max(equal**2 - best.held_out**2, 0.0))
+    removed = _apart(equal, best.held_out)
     if removed < ABOVE_NOISE * max(records.noise, best.held_out):
         return None
     p_value = difference(errors, best.errors)
     if p_value > REPEATED:
         return None
-    fitted = now.errors(records.to_fit, best.fitted)
-    sure = p_value <= SURE or difference(fitted, best.fitted.errors(records.to_fit)) <= SURE
-    return _Merit(removed, p_value) if sure else None
+    without, fitted = now.errors(records.to_fit, best.fitted), best.fitted.errors(records.to_fit)
+    sure = p_value <= SURE or difference(without, fitted) <= SURE
+    return _Merit(removed, _apart(fits.rms(without), fits.rms(fitted)), p_value) if sure else None
 
 
 def _step(
@@ -285,7 +295,7 @@ def _step(
         return None
     for best in _simplest_first(tried, records):
         merit = _merit(now, best, records)
-        if merit is not None and merit.removed >= SHARE * gap:
+        if merit is not None and merit.worth(gap, records):
             return _Step(now, tried, best, merit)
     return _Step(now, tried, tried[0], None)
 
@@ -329,7 +339,7 @@ def _together(failed: _Step, gap: float, records: _Records) -> tuple[Found, _Ste
         if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
             continue
         merit = _merit(failed.now, back.best, records)
-        if merit is not None and merit.removed >= SHARE * gap:
+        if merit is not None and merit.worth(gap, records):
             return replace(_found(second, records), before=gap, after=min(records.left(alone), gap)), back
     return None
 
@@ -356,10 +366,19 @@ def _alike(other: Tried, best: Tried, noise: float) -> bool:
 
     What one explains more than the other has to be as much as makes an effect worth a name, and no chance.
     """
-    more = math.sqrt(max(other.held_out**2 - best.held_out**2, 0.0))
-    if more < ABOVE_NOISE * max(noise, best.held_out):
+    if _no_worse(other.held_out, best.held_out, noise):
         return True
     return other.held_out <= (1.0 + UNSURE) * best.held_out and difference(other.errors, best.errors) > DIFFERENT
+
+
+def _apart(more: float, less: float) -> float:
+    """rms of what one error has that another has not."""
+    return math.sqrt(max(more**2 - less**2, 0.0))
+
+
+def _no_worse(left: float, least: float, noise: float) -> bool:
+    """Whether an error is so little above the least that the rest would be no effect."""
+    return _apart(left, least) < ABOVE_NOISE * max(noise, least)
 
 
 def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[tuple[Option, Fitted]]:
@@ -461,22 +480,27 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     """All, the best and those about as good before the others, and of these the ones of fewer numbers first.
 
     About as good: where all leave the same free in every record, held-out records find them no worse, whatever more the
-    best explains of those it was fitted to; or alike within a few per cent, and fitted ones by chance.
+    best explains of those it was fitted to; or alike within a few per cent, and what more it explains of fitted ones
+    would be no effect. Between equal numbers of numbers all records decide.
     """
     if not tried:
         return []
     best, held = tried[0], records.held
-    enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
-    near, others = [best], []
+    enough, least = (1.0 + SIMPLER) * best.held_out, fits.rms(best.fitted.errors(records.to_fit))
+    near, others = [(best.numbers(held), _everywhere(best, best, records), best)], []
     for each in tried[1:]:
         left = fits.rms(each.fitted.errors(held, best.fitted))
-        if left <= best.held_out or (
-            left <= enough and difference(each.fitted.errors(records.to_fit, best.fitted), fitted) > SURE
-        ):
-            near.append(each)
+        fitted = fits.rms(each.fitted.errors(records.to_fit, best.fitted))
+        if left <= best.held_out or (left <= enough and _no_worse(fitted, least, records.noise)):
+            near.append((each.numbers(held), _everywhere(each, best, records), each))
         else:
             others.append(each)
-    return [*sorted(near, key=lambda each: (each.numbers(held), each.held_out)), *others]
+    return [*(each for *_, each in sorted(near, key=lambda one: one[:2])), *others]
+
+
+def _everywhere(each: Tried, best: Tried, records: _Records) -> float:
+    """rms error over all records, with what the best leaves free in them."""
+    return fits.rms(each.fitted.errors([*records.to_fit, *records.held], best.fitted))
 
 
 def _without_needless(now: Fitted, found: list[Found], records: _Records) -> tuple[Fitted, list[Found]]:

@@ -32,6 +32,9 @@ REMEMBERED, MOST_BYTES = 3, 2**28
 """Movements of the plays that are remembered for a record, and the size of one that is."""
 
 
+FAR = 2.0
+"""The start state may come from a drive so many times as wide as the recorded one."""
+
 SETTLED = 3
 """Most steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
 
@@ -297,10 +300,18 @@ class Actuator:
             free += [found for effect in self.effects if len(found := effect.transients(item.run))]
         return np.concatenate(free) if offset is None else np.concatenate(free) * offset
 
-    def error(self, item: Item, p: Array, free: Array | None = None) -> Array:
+    def largest(self, item: Item, p: Array) -> Array:
+        """(k,) how large the factors of `nuisances` may be: an effect of little weight has little left from a start."""
+        span = FAR * float(np.sum(p)) * float(np.ptp((item.session or item.run).v))
+        limits = [np.full(1, np.inf)]
+        if item.history is None:
+            limits += [span * effect.largest(item.run) for effect in self.effects]
+        return np.concatenate(limits)
+
+    def error(self, item: Item, p: Array, like: Fitted | None = None) -> Array:
         """Measured less predicted, what is free in the record fitted away; NaN where it is not compared.
 
-        `free`: `nuisances` of another model, to compare the two on equal terms.
+        `like`: another model whose `nuisances` are free in place of its own, to compare the two on equal terms.
         """
         rows, constant = self.columns(item, p)
         h = rows[0] + constant
@@ -310,10 +321,25 @@ class Actuator:
             h = self.mapped(h, level, item)
         e = item.y - h - self.added(item)
         known = np.isfinite(e)
-        free = (self.nuisances(item, offset) if free is None else free)[:, known].T
-        solution, *_ = np.linalg.lstsq(free, e[known], rcond=1e-10)
-        e[known] -= free @ solution
+        free = (self.nuisances(item, offset) if like is None else like.actuator.nuisances(item))[:, known].T
+        largest = self.largest(item, p) if like is None else like.actuator.largest(item, like.weights)
+        e[known] -= free @ _within(free, e[known], largest)
         return np.asarray(e)
+
+
+def _within(columns: Array, y: Array, largest: Array) -> Array:
+    """Factors (k,) of columns (N, k) that fit y best, none larger than it may be."""
+    solution, *_ = np.linalg.lstsq(columns, y, rcond=1e-10)
+    if np.all(np.abs(solution) <= largest):
+        return np.asarray(solution)
+    from scipy.optimize import lsq_linear
+
+    able = largest > 0.0
+    q, r = np.linalg.qr(columns[:, able])
+    limits = largest[able]
+    found = np.zeros(len(largest))
+    found[able] = lsq_linear(r, q.T @ y, (-limits, limits), method="bvls").x
+    return found
 
 
 class _Block:
@@ -423,8 +449,8 @@ class Fitted:
 
     def errors(self, items: Sequence[Item], like: Fitted | None = None) -> list[Array]:
         """Error signals over records; `like`: with what another model leaves free in them."""
-        actuator, free = self.actuator, (like or self).actuator
-        return [actuator.error(item, self.weights, free.nuisances(item)) for item in items]
+        actuator = self.actuator
+        return [actuator.error(item, self.weights, like) for item in items]
 
 
 def fit(

@@ -220,6 +220,10 @@ class Effect(BaseModel):
         """Responses (k, N) to an unknown start state, which a fit may add to a record with free factors."""
         return np.empty((0, len(run.t)))
 
+    def largest(self, run: Run) -> Array:
+        """Largest of these factors (k,) that any start state makes, in spans of the play sum; inf: no such limit."""
+        return np.full(len(self.transients(run)), np.inf)
+
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """Shapes to try in a fit, simplest first."""

@@ -75,6 +75,10 @@ class ExponentialCreep(_Creep):
         """`exp(-t/tau_i)`."""
         return _fading(run, np.array(self.time_constants))
 
+    def largest(self, run: Run) -> Array:
+        """A state lags behind the play sum by its span at most."""
+        return np.array(self.weights)
+
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """One, two and three states; time constants from a few samples to beyond the session, weights to 10 %."""
@@ -143,6 +147,11 @@ class LogarithmicCreep(_Creep):
     def transients(self, run: Run) -> Array:
         """`exp(-t/tau_i)` for one time constant a decade, enough for any start of the spectrum."""
         return _fading(run, self.spectrum()[0][::PER_DECADE])
+
+    def largest(self, run: Run) -> Array:
+        """Each stands for the states of a decade, which lag behind the play sum by its span at most."""
+        tau, weight = self.spectrum()
+        return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
