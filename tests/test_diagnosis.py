@@ -347,20 +347,22 @@ def test_what_shows_in_held_out_records_alone_is_not_fitted(tmp_path: Path) -> N
     assert not any("hold out others" in advice for advice in found["advice"])
 
 
+@pytest.mark.parametrize("curve", [None, 0.3])
 @pytest.mark.parametrize(("weight", "left"), [(0.0, 1.0), (1e-4, 1.0), (0.2, 0.0)])
-def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: float) -> None:
-    """A ramp that looks like the beginning of a slow state is one only where the state has weight enough."""
+def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: float, curve: float | None) -> None:
+    """A ramp that looks like the beginning of a slow state is one only where the state has weight enough, be it seen by
+    a curved sensor."""
     v = wander(1, turns=40)
     run = Run(np.arange(len(v)) * 1e-3, v)
-    actuator = structure.Actuator(
-        np.array([0.0]), (), (ExponentialCreep(name="creep", time_constants=(50.0,), weights=(weight,)),)
-    )
+    slow = ExponentialCreep(name="creep", time_constants=(50.0,), weights=(weight,))
+    bent = SensorPolynomial(name="sensor_nonlinearity", coefficients=(curve or 0.0,), scale=100.0)
+    actuator = structure.Actuator(np.array([0.0]), (), (slow,) if curve is None else (slow, bent))
     p = np.ones(1)
     rows, _ = actuator.columns(Item("still", run, v, None, 100.0), p)
     ramp = 0.2 * np.linspace(-1.0, 1.0, len(v))
-    (error,) = structure.Fitted(_only(actuator), np.empty(0), p, 0.0).errors(
-        [Item("ramp", run, rows[0] + 3.0 + ramp, None, 100.0)]
-    )
+    y = bent.mapped(rows[0] + 3.0 + ramp, run)
+    (error,) = structure.Fitted(_only(actuator), np.empty(0), p, 0.0).errors([Item("ramp", run, y, None, 100.0)])
+    error /= 1.0 + 2.0 * (curve or 0.0) * (rows[0] + 3.0 + ramp) / 100.0
     assert np.sqrt(np.mean(error**2) / np.mean(ramp**2)) == pytest.approx(left, abs=0.02)
 
 

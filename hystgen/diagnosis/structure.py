@@ -254,15 +254,17 @@ class Actuator:
                 h = effect.mapped(h, item.run)
         return h
 
-    def level(self, h: Array, item: Item) -> tuple[Array, Array]:
+    def level(self, h: Array, item: Item, largest: Array | None = None) -> tuple[Array, Array]:
         """The best offset (N,) in front of a sensor and behind a limit, and how the output changes with it (N,).
 
         A sensor sees the responses to an unknown start state too, so they are part of it, and what is added at the very
-        end is none of it: a curve about the wrong offset would be another one.
+        end is none of it: a curve about the wrong offset would be another one. `largest`: limits of their factors.
         """
         known = item.compared
         y = item.y - self.added(item)
         free = self.nuisances(item)
+        limits = np.full(len(free), np.inf) if largest is None else largest
+        factors = np.zeros(len(free))
         level = np.full(len(h), float(np.mean((y - h)[known])))
         step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
         for _ in range(SETTLED):
@@ -272,6 +274,9 @@ class Actuator:
                 break
             slopes = (free * moved)[:, known]
             change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ (y - bent)[known], rcond=1e-12)
+            if np.any(np.abs(factors + change) > limits):
+                change = _within(slopes.T, (y - bent)[known], -limits - factors, limits - factors)
+            factors += change
             shift = change @ free
             level = level + shift
             if np.max(np.abs(shift)) < step:
@@ -317,28 +322,27 @@ class Actuator:
         h = rows[0] + constant
         offset = None
         if self.bends:
-            level, offset = self.level(h, item)
+            level, offset = self.level(h, item, self.largest(item, p))
             h = self.mapped(h, level, item)
         e = item.y - h - self.added(item)
         known = np.isfinite(e)
         free = (self.nuisances(item, offset) if like is None else like.actuator.nuisances(item))[:, known].T
         largest = self.largest(item, p) if like is None else like.actuator.largest(item, like.weights)
-        e[known] -= free @ _within(free, e[known], largest)
+        e[known] -= free @ _within(free, e[known], -largest, largest)
         return np.asarray(e)
 
 
-def _within(columns: Array, y: Array, largest: Array) -> Array:
-    """Factors (k,) of columns (N, k) that fit y best, none larger than it may be."""
+def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
+    """Factors (k,) of columns (N, k) that fit y best between their limits; 0 lies between them."""
     solution, *_ = np.linalg.lstsq(columns, y, rcond=1e-10)
-    if np.all(np.abs(solution) <= largest):
+    if np.all((low <= solution) & (solution <= high)):
         return np.asarray(solution)
     from scipy.optimize import lsq_linear
 
-    able = largest > 0.0
+    able = high > low
     q, r = np.linalg.qr(columns[:, able])
-    limits = largest[able]
-    found = np.zeros(len(largest))
-    found[able] = lsq_linear(r, q.T @ y, (-limits, limits), method="bvls").x
+    found = np.zeros(len(low))
+    found[able] = lsq_linear(r, q.T @ y, (low[able], high[able]), method="bvls").x
     return found
 
 
