@@ -284,14 +284,16 @@ def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
     v = wander(5, turns=40)
     v[:40] = np.linspace(0.0, v[40], 40)
     t = np.arange(len(v)) * 1e-3
-    xi = (brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + 20.0 + start * np.exp(-t / 0.4)) / 100.0
+    creep = ExponentialCreep(name="creep", shape="exponential", time_constants=(0.4,), weights=(0.2,))
+    slow = creep.filtered(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), Run(t, v)) + start * np.exp(-t / 0.4)
+    xi = (slow + 20.0) / 100.0
     y = 100.0 * (xi - 0.12 * xi**2) + 50.0 + rate * t
     made = (
         LinearDrift(name="drift", rate=rate),
-        ExponentialCreep(name="creep", shape="exponential", time_constants=(0.4,), weights=(1e-12,)),
+        creep,
         SensorPolynomial(name="sensor_nonlinearity", coefficients=(-0.12,), scale=100.0),
     )
-    # where the drift begins is free, and no creep: a sensor tells the one from the other
+    # where the drift begins is free, and where the creep does
     item = Item("made", Run(t, v), y - 50.0, None, float(np.ptp(y)))
     error = structure.Actuator(np.array([0.0, 10.0]), (), made).error(item, np.array([1.0, 0.5]))
     assert np.max(np.abs(error)) < 1e-6
