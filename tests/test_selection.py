@@ -200,3 +200,13 @@ def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
     assert selection._Merit(0.08, 0.0, 1e-9).worth(1.0, records)
     assert selection._Merit(0.06, 0.5, 1e-9).worth(1.0, records)
     assert not selection._Merit(0.06, 0.06, 1e-9).worth(1.0, records)
+
+
+@pytest.mark.parametrize(("own", "accepted"), [(1.0, True), (0.5, False)])
+def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -> None:
+    """The hypothesis leaves more with the effect's small start states than with its own; the effect is to beat both."""
+    now, better = Made("now", 5, (own, own), (1.0, 1.0)), Made("better", 5, (0.6, 0.6))
+    option: Any = SimpleNamespace(name="better")
+    best = selection.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    assert (selection._merit(now, best, records) is not None) is accepted  # type: ignore[arg-type]

@@ -268,8 +268,7 @@ class _Step:
 
 def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     """None where chance explains the difference, or what is removed is too little to be told from the noise."""
-    # what the effect leaves free in a record must not count as its merit
-    errors = now.errors(records.held, best.fitted)
+    errors = _without_merit(now, best, records.held)
     equal = fits.rms(errors)
     removed = _apart(equal, best.held_out)
     if removed < ABOVE_NOISE * max(records.noise, best.held_out):
@@ -277,9 +276,17 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     p_value = difference(errors, best.errors)
     if p_value > REPEATED:
         return None
-    without, fitted = now.errors(records.to_fit, best.fitted), best.fitted.errors(records.to_fit)
+    without, fitted = _without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)
     sure = p_value <= SURE or difference(without, fitted) <= SURE
     return _Merit(removed, _apart(fits.rms(without), fits.rms(fitted)), p_value) if sure else None
+
+
+def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:
+    """Errors of a hypothesis with what an effect leaves free in a record, which must not count as its merit.
+
+    Or with what it leaves free itself, if that is more: less is no merit either.
+    """
+    return min(now.errors(items, best.fitted), now.errors(items), key=fits.rms)
 
 
 def _step(
