@@ -28,6 +28,12 @@ SCREENED = 12_000
 FIRST_STEPS, SCREENING_STEPS = 2, 2
 """Steps of a search from each start, and then from the best one, while the shapes are told apart."""
 
+STARTS = 2
+"""Of its starts a search goes on from those with the least error."""
+
+COARSE = 1e-3
+"""Until it is known which shapes are hopeful, a search ends when a step lowers the error by less than this share."""
+
 FALLING, LONGER = 0.8, 4
 """The error of a search that goes on falls below this share within SCREENING_STEPS; and at most so many times those.
 
@@ -401,14 +407,17 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
         starts = list(option.starts)
         if option.grown is not None:
             starts.append(option.grown(simpler[option.beyond].fitted.shape))
-        begun = [fits.fit(option.alone, records.thin, start, now.weights, FIRST_STEPS) for start in starts]
-        best = min(begun, key=lambda each: each.rms)
-        fitted = fits.fit(option.alone, records.thin, best.shape, best.weights, SCREENING_STEPS)
+        begun = sorted(
+            (fits.begun(option.alone, records.thin, start, now.weights) for start in starts),
+            key=lambda each: each.now.rms,
+        )
+        best = min((each.further(FIRST_STEPS, COARSE) for each in begun[:STARTS]), key=lambda each: each.now.rms)
+        search = best.further(SCREENING_STEPS, COARSE)
         for _ in range(LONGER - 1):
-            if fitted.rms >= FALLING * best.rms:
+            if search.now.rms >= FALLING * best.now.rms:
                 break
-            best, fitted = fitted, fits.fit(option.alone, records.thin, fitted.shape, fitted.weights, SCREENING_STEPS)
-        return fitted
+            best, search = search, search.further(SCREENING_STEPS, COARSE)
+        return search.found(now.weights)
 
     def begun(some: Sequence[Option]) -> list[_Screened]:
         return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
@@ -458,7 +467,8 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
     def begin(k: int) -> Fitted:
         option, screened = kept[k]
         shape = option.joined(now, screened.shape)
-        return fits.fit(option.structure, records.to_fit, shape, screened.weights, JOINT_STEPS)
+        search = fits.begun(option.structure, records.to_fit, shape, screened.weights)
+        return search.further(JOINT_STEPS, COARSE).found(screened.weights)
 
     def go_on(k: int) -> Fitted:
         fitted = begun[k].fitted

@@ -34,6 +34,8 @@ REMEMBERED, MOST_BYTES = 3, 2**28
 
 FAR = 2.0
 """The start state may come from a drive so many times as wide as the recorded one."""
+POLISHED = 1e-5
+"""A search ends when a step lowers the error by less than this share: far below what any decision looks at."""
 
 SETTLED = 3
 """Most steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
@@ -457,15 +459,35 @@ class Fitted:
         return [actuator.error(item, self.weights, like) for item in items]
 
 
-def fit(
-    structure: Structure, items: Sequence[Item], start: Array, p: Array, steps: int = joint.MOST_STEPS
-) -> Fitted:
-    """Search from a start; `p`: weights near which to begin."""
-    low, high = structure.bounds
-    found = joint.search(
-        lambda shape, q: linear(structure, items, shape, q), structure, np.clip(start, low, high), p, steps
-    )
-    return Fitted(structure, found.shape, found.best if math.isfinite(found.rms) else p, found.rms)
+@dataclass(frozen=True)
+class Search:
+    """A search for the numbers of a structure, as far as it has come; it can go on from there."""
+
+    structure: Structure
+    items: Sequence[Item]
+    now: Shaped
+
+    def further(self, steps: int = joint.MOST_STEPS, little: float = POLISHED) -> Search:
+        """So many steps further at most, until one lowers the error by too `little`."""
+        found = joint.search(
+            lambda shape, p: linear(self.structure, self.items, shape, p), self.structure, self.now, steps, little
+        )
+        return replace(self, now=found)
+
+    def found(self, otherwise: Array) -> Fitted:
+        """What was found; `otherwise`: weights where the numbers lie too far from what the records are like."""
+        best = self.now.best if math.isfinite(self.now.rms) else otherwise
+        return Fitted(self.structure, self.now.shape, best, self.now.rms)
+
+
+def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Search:
+    """A search at its start; `p`: weights near which to begin."""
+    return Search(structure, items, linear(structure, items, np.clip(start, *structure.bounds), p))
+
+
+def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:
+    """The end of a search from a start; `p`: weights near which to begin."""
+    return begun(structure, items, start, p).further().found(p)
 
 
 def rms(errors: Sequence[Array]) -> float:

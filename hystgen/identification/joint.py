@@ -92,7 +92,11 @@ def refine(
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
     p = weights.non_negative(plain.whole, np.arange(len(thresholds)))
-    return search(lambda s, q: _linear(courses, front, s, q, thresholds, tick), front, shape, p)
+
+    def linear(s: Array, q: Array) -> Shaped:
+        return _linear(courses, front, s, q, thresholds, tick)
+
+    return search(linear, front, linear(shape, p))
 
 
 class Limits(Protocol):
@@ -107,10 +111,13 @@ class Limits(Protocol):
 
 
 def search(
-    linear: Callable[[Array, Array], Shaped], limits: Limits, shape: Array, p: Array, most: int = MOST_STEPS
+    linear: Callable[[Array, Array], Shaped], limits: Limits, now: Shaped, most: int = MOST_STEPS, little: float = 0.0
 ) -> Shaped:
-    """The best shape near `shape`; `linear` gives the system that is linear about a shape and weights."""
-    now = linear(shape, p)
+    """The best shape near that of `now`; `linear` gives the system that is linear about a shape and weights.
+
+    `little`: the search ends with a step that lowers the error by less than this share, too.
+    """
+    shape = now.shape
     low, high = limits.bounds
     damping = 1e-3
     for _ in range(most if len(shape) else 0):
@@ -125,7 +132,7 @@ def search(
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
-            done = now.rms - trial.rms < 0.5 * ENOUGH * now.rms / now.samples
+            done = now.rms - trial.rms < max(0.5 * ENOUGH / now.samples, little) * now.rms
             now, damping = trial, damping * 0.2
             if done:
                 break
