@@ -6,7 +6,8 @@ from typing import Any
 
 
 def alone() -> Any:
-    """Context in which the linear algebra library uses a single thread."""
+    """Context in which the linear algebra libraries use a single thread."""
+    import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
     from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
     return threadpool_limits(1)
