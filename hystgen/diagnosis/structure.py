@@ -25,11 +25,12 @@ from hystgen.models import Stage
 
 Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]
+Sums = dict[object, Array]
 
 ALL = slice(None)
 
-REMEMBERED, MOST_BYTES = 3, 2**28
-"""Movements of the plays that are remembered for a record, and the size of one that is."""
+REMEMBERED, MOST_BYTES = 5, 2**28
+"""Movements of the plays that are remembered for a record, and the size of them all."""
 
 
 FAR = 2.0
@@ -89,7 +90,7 @@ class Item:
 
     def remember(self, by: object, plays: Array) -> None:
         """Remember how the plays moved, in place of what was asked for least lately."""
-        while len(self.moved) >= REMEMBERED:
+        while self.moved and plays.nbytes * (len(self.moved) + 1) > MOST_BYTES or len(self.moved) >= REMEMBERED:
             del self.moved[next(iter(self.moved))]
         if plays.nbytes <= MOST_BYTES:
             self.moved[by] = plays
@@ -158,8 +159,22 @@ class Structure:
         """What the numbers make."""
         return Actuator(self.thresholds, self.front.stages(self.pieces(shape)[0]), tuple(self.effects(shape)))
 
+    def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
+        """What the numbers make with one after the other changed by `DIFFERENCE`; the rest is that of `here`."""
+        front, numbers = self.pieces(shape)
+        ends = len(front) + np.cumsum([len(x) for x in numbers])
 
-_ORDER = {place: k for k, place in enumerate(Place)}
+        def one(j: int) -> Actuator:
+            other = shape.copy()
+            other[j] += DIFFERENCE
+            front_shape, changed = self.pieces(other)
+            if j < len(front):
+                return replace(here, stages=self.front.stages(front_shape), gains=dict(here.gains))
+            k = int(np.searchsorted(ends, j, side="right"))
+            effects = (*here.effects[:k], self.parts[k].candidate.build(changed[k]), *here.effects[k + 1 :])
+            return replace(here, effects=effects, gains=dict(here.gains))
+
+        return [one(j) for j in range(len(shape))]
 
 
 @dataclass(frozen=True)
@@ -171,23 +186,29 @@ class Actuator:
     effects: tuple[Effect, ...]
     gains: dict[tuple[int, int], tuple[Array, Array]] = field(default_factory=dict, compare=False, repr=False)
 
-    def at(self, place: Place) -> list[Effect]:
+    def at(self, place: Place) -> Sequence[Effect]:
         """The effects at one place of the chain, in its order."""
-        return sorted((e for e in self.effects if e.place is place), key=lambda e: e.order)
+        return self._at.get(place, ())
 
-    def columns(self, item: Item, p: Array | None = None, at: Samples = ALL) -> tuple[Array, Array]:
+    @cached_property
+    def _at(self) -> dict[Place, list[Effect]]:
+        found: dict[Place, list[Effect]] = {}
+        for effect in sorted(self.effects, key=lambda each: each.order):
+            found.setdefault(effect.place, []).append(effect)
+        return found
+
+    def columns(
+        self, item: Item, p: Array | None = None, at: Samples = ALL, sums: Sums | None = None
+    ) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and what is added to them without a weight.
 
-        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once. `at`: which samples.
+        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once. `at`: which samples;
+        `sums`: sums of the same weights, of actuators that have effects in common.
         """
         run = item.run
-        rows = self._plays(item) if p is None else self._summed(item, p)[None, :]
+        rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
         constant = np.zeros(rows.shape[1])
-        linear = self.at(Place.LINEAR)
-        for effect in linear:
-            if effect.order == 0:
-                rows = effect.filtered(rows, run)
-        behind = [effect for effect in linear if effect.order > 0]
+        behind = [effect for effect in self.at(Place.LINEAR) if effect.order > 0]
         now = ALL if behind else at  # without a filter behind it, a gain is needed at these samples alone
         rows, constant = rows[:, now], constant[now]
         whole = item.session or run
@@ -199,6 +220,38 @@ class Actuator:
         for effect in behind:
             rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
         return (rows[:, at], constant[at]) if behind else (rows, constant)
+
+    def _slow(self, item: Item) -> Array:
+        """(n + 1, N) plays behind the filters that follow them, if there are any; remembered like the plays."""
+        filters = self._filters
+        if not filters:
+            return self._plays(item)
+        by = (self._moving, self._bending, filters)
+        rows = item.recalled(by)
+        if rows is None:
+            rows = self._plays(item)
+            for effect in filters:
+                rows = effect.filtered(rows, item.run)
+            item.remember(by, rows)
+        return rows
+
+    def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
+        """(N,) their weighted sum; one number more or less changes a part of the chain alone."""
+        by: object = (self._moving, self._bending)
+        if by not in sums:
+            sums[by] = self._summed(item, p)
+        total = sums[by]
+        for effect in self._filters:
+            by = (by, effect)
+            if by not in sums:
+                sums[by] = effect.filtered(total, item.run)
+            total = sums[by]
+        return total
+
+    @cached_property
+    def _filters(self) -> tuple[Effect, ...]:
+        """The filters right behind the plays."""
+        return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
 
     def _plays(self, item: Item) -> Array:
         """(n + 1, N) plays along the record; those of the last few hypotheses are remembered."""
@@ -393,19 +446,20 @@ class _Block:
         if not varied:
             return self._without_free([part.triangle for part in self._reduced])
         table = np.empty((len(varied), self.samples)).T
+        sums: Sums = {}
         for j, other in enumerate(varied):
-            table[:, j] = (self._of(other) - self._sum) / DIFFERENCE
+            table[:, j] = (self._of(other, sums) - self._sum) / DIFFERENCE
         parts = zip(self._reduced, self._cut(table), strict=True)
         return self._without_free([part.extended(columns) for part, columns in parts])
 
-    def _of(self, other: Actuator) -> Array:
+    def _of(self, other: Actuator, sums: Sums) -> Array:
         """What other numbers predict, with the same weights and offset."""
         item, at = self._item, self._item.compared
         if other.bends:
-            rows, constant = other.columns(item, self._p)
+            rows, constant = other.columns(item, self._p, sums=sums)
             moved = other.mapped(rows[0] + constant, self._level, item)[at]
         else:
-            rows, constant = other.columns(item, self._p, at)
+            rows, constant = other.columns(item, self._p, at, sums)
             moved = rows[0] + constant
         return moved + other.added(item)[at]
 
@@ -422,11 +476,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
     samples = sum(block.samples for block in blocks)
 
     def derived() -> Reduced:
-        varied = []
-        for j in range(len(shape)):
-            one = shape.copy()
-            one[j] += DIFFERENCE
-            varied.append(structure.actuator(one))
+        varied = structure.varied(shape, here)
         whole = reduction.triangle(*(block.system(varied) for block in blocks))
         measured_last = [*range(n1), *range(n1 + 1, whole.shape[1]), n1]
         return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))

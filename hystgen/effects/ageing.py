@@ -46,9 +46,12 @@ class LogarithmicAgeing(_Ageing):
 
     def gain(self, run: Run) -> Array:
         """The falling gain."""
+        return np.asarray(1.0 - self.loss * run.remembered(("decades", self.travel), lambda: self._decades(run)))
+
+    def _decades(self, run: Run) -> Array:
+        """Decades of travel; a search changes the loss more often than the travel."""
         with np.errstate(over="ignore"):
-            travels = np.minimum(run.travelled / self.travel, 1e300)
-        return np.asarray(1.0 - self.loss * np.log10(1.0 + travels))
+            return np.asarray(np.log10(1.0 + np.minimum(run.travelled / self.travel, 1e300)))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -65,7 +68,8 @@ class ExponentialAgeing(_Ageing):
 
     def gain(self, run: Run) -> Array:
         """The falling gain."""
-        return np.asarray(1.0 + self.loss * np.expm1(-run.travelled / self.travel))
+        worn = run.remembered(("worn", self.travel), lambda: np.asarray(np.expm1(-run.travelled / self.travel)))
+        return np.asarray(1.0 + self.loss * worn)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

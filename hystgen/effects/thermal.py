@@ -87,8 +87,11 @@ class SelfHeating(_Thermal):
     compensation: ClassVar[str] = "flagged: the temperature is not measured"
 
     def above(self, run: Run) -> Array:
-        """Temperature rise, K."""
-        decay, kept, none = run.remembered(("heat", self.time_constant), lambda: _kept(run.steps / self.time_constant))
+        """Temperature rise, K; a search comes back to it with other gains and offsets."""
+        return run.remembered(("above", self.time_constant, self.heating), lambda: self._rise(run))
+
+    def _rise(self, run: Run) -> Array:
+        decay, kept, none = _kept(run.steps / self.time_constant)
         out = np.empty(len(run.t))
         code().follow(np.append(self.heating * run.heat, 0.0), decay, kept, none, 0.0, out)
         return out
