@@ -90,7 +90,7 @@ class Item:
 
     def remember(self, by: object, plays: Array) -> None:
         """Remember how the plays moved, in place of what was asked for least lately."""
-        while self.moved and plays.nbytes * (len(self.moved) + 1) > MOST_BYTES or len(self.moved) >= REMEMBERED:
+        while (self.moved and plays.nbytes * (len(self.moved) + 1) > MOST_BYTES) or len(self.moved) >= REMEMBERED:
             del self.moved[next(iter(self.moved))]
         if plays.nbytes <= MOST_BYTES:
             self.moved[by] = plays
