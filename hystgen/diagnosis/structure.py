@@ -509,7 +509,7 @@ class Fitted:
         return [actuator.error(item, self.weights, like) for item in items]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Search:
     """A search for the numbers of a structure, as far as it has come; it can go on from there."""
 

@@ -83,6 +83,10 @@ def figure(width: float, height: float) -> Any:
 
 def content(drawn: Any, kind: str) -> bytes:
     """The bytes of a PNG or SVG (`kind`) of a figure, without date or version."""
+    engine = drawn.get_layout_engine()
+    if engine is not None:  # savefig would draw everything twice to have it laid out
+        engine.execute(drawn)
+        drawn.set_layout_engine(None)
     out = io.BytesIO()
     metadata = {"Software": None} if kind == "png" else dict.fromkeys(("Date", "Creator", "Format", "Type"))
     drawn.savefig(out, format=kind, metadata=metadata)
