@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen import operators
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 from hystgen.effects.recursions import code
 from hystgen.param_models import MAX_PLAYS, NotNegative, Positive
+
+Places = NDArray[np.intp]
 
 
 class _RateDependence(Effect):
@@ -26,28 +29,22 @@ class _RateDependence(Effect):
             yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
     @abstractmethod
-    def follower(self, w: Array, run: Run, thresholds: Array, start: Array) -> Callable[[int, Array], None]:
-        """What writes the play of a number above 0 into a row (N,)."""
+    def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
+        """Write the plays of these numbers, all above 0, into rows (len(chosen), N)."""
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """The drive itself, and the plays."""
-        follow = self.follower(w, run, thresholds, start)
         out = np.empty((len(thresholds), len(w)))
         out[0] = w
-        for i in range(1, len(thresholds)):
-            follow(i, out[i])
+        self.follow(np.arange(1, len(thresholds)), w, run, thresholds, start, out[1:])
         return out
 
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """The sum of those that have a weight."""
-        follow = self.follower(w, run, thresholds, start)
-        total: Array = p[0] * w
-        one = np.empty(len(w))
-        for i in range(1, len(p)):
-            if p[i] != 0.0:
-                follow(i, one)
-                total += p[i] * one
-        return total
+        chosen = 1 + np.flatnonzero(p[1:])
+        rows = np.empty((len(chosen), len(w)))
+        self.follow(chosen, w, run, thresholds, start, rows)
+        return np.asarray(p[0] * w + p[chosen] @ rows)
 
 
 class ThresholdRate(_RateDependence):
@@ -82,16 +79,13 @@ class ThresholdRate(_RateDependence):
             return []
         return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} a second"]
 
-    def follower(self, w: Array, run: Run, thresholds: Array, start: Array) -> Callable[[int, Array], None]:
-        """A play with a dynamic threshold."""
+    def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
+        """Plays with a dynamic threshold."""
         with np.errstate(over="ignore"):
             slope = np.minimum(np.abs(np.diff(w)) / run.steps, 1e300)
         rate = np.concatenate([[0.0], slope])
-
-        def follow(i: int, out: Array) -> None:
-            code().dilated_play(w, rate, float(thresholds[i]), self.betas[i - 1], float(start[i]), out)
-
-        return follow
+        for i, row in zip(chosen.tolist(), out, strict=True):
+            code().dilated_play(w, rate, float(thresholds[i]), self.betas[i - 1], float(start[i]), row)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -135,17 +129,13 @@ class RelaxingPlays(_RateDependence):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "one implicit step a sample"
 
-    def follower(self, w: Array, run: Run, thresholds: Array, start: Array) -> Callable[[int, Array], None]:
-        """A viscous play."""
+    def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
+        """Viscous plays."""
+        if self.time_constant == 0.0:
+            out[:] = operators.plays(w, thresholds[chosen], start[chosen])
+            return
         about = (self.time_constant, self.exponent, float(thresholds[-1]))
-
-        def follow(i: int, out: Array) -> None:
-            if self.time_constant == 0.0:
-                out[:] = operators.play(w, float(thresholds[i]), float(start[i]))
-            else:
-                code().relaxing_play(w, run.steps, float(thresholds[i]), *about, float(start[i]), out)
-
-        return follow
+        code().relaxing_plays(w, run.steps, thresholds[chosen], *about, start[chosen], out)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -122,13 +122,13 @@ def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float
     q1 = m * c1 * q0 * d
     c2 = -step * q1 / 2
     q2 = ((m - 1) * c1 * q1 + 2 * m * c2 * q0) * d / 2
-    c3 = -step * q2 / 3
-    q3 = ((m - 2) * c1 * q2 + (2 * m - 1) * c2 * q1 + 3 * m * c3 * q0) * d / 3
+    c3 = step * q2 * (-1 / 3)
+    q3 = ((m - 2) * c1 * q2 + (2 * m - 1) * c2 * q1 + 3 * m * c3 * q0) * d * (1 / 3)
     c4 = -step * q3 / 4
     q4 = ((m - 3) * c1 * q3 + (2 * m - 2) * c2 * q2 + (3 * m - 1) * c3 * q1 + 4 * m * c4 * q0) * d / 4
-    c5 = -step * q4 / 5
+    c5 = step * q4 * (-1 / 5)
     q5 = (m - 4) * c1 * q4 + (2 * m - 3) * c2 * q3 + (3 * m - 2) * c3 * q2 + (4 * m - 1) * c4 * q1 + 5 * m * c5 * q0
-    c6 = -step * q5 * d / 30
+    c6 = step * q5 * d * (-1 / 30)
     return c1 + (c2 + (c3 + (c4 + (c5 + c6)))), c6
 
 
@@ -209,42 +209,56 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
     return e, 0.0
 
 
-def relaxing_play(
-    w: Array, steps: Array, r: float, tau: float, exponent: float, scale: float, state: float, out: Array
+def relaxed(
+    x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
+) -> float:
+    """State of a play that follows its input viscously, after the input's way from `x` to `target` in the time `left`.
+
+    `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold.
+    """
+    speed = (target - x) / left
+    side = 0.0
+    if x - r - state > 0.0:
+        side = 1.0
+    elif state - r - x > 0.0:
+        side = -1.0
+    if side != 0.0:
+        e, left = stretch(side * (x - state) - r, side * speed, left, tau, exponent, scale)
+        if left > 0.0:  # caught up, with the input on its way back
+            x = target - speed * left
+            state = x - side * r
+            side = 0.0
+        else:
+            state = target - side * (r + e)
+    if side == 0.0 and left > 0.0:
+        way = 1.0 if target > x else -1.0
+        beyond = way * (target - state) - r
+        if beyond > 0.0:
+            taken = left * min(beyond / (way * (target - x)), 1.0)
+            e, _ = stretch(0.0, way * speed, taken, tau, exponent, scale)
+            state = target - way * (r + e)
+    return state
+
+
+def relaxing_plays(
+    w: Array, steps: Array, r: Array, tau: float, exponent: float, scale: float, states: Array, out: Array
 ) -> None:
-    """Play that follows its input viscously: `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold."""
-    state = min(max(state, w[0] - r), w[0] + r)
-    out[0] = state
+    """Plays of thresholds `r` that follow their input viscously, from `states`, into the rows of `out`.
+
+    Side by side, since each by itself waits for its own last sample.
+    """
+    for i in range(len(r)):
+        states[i] = min(max(states[i], w[0] - r[i]), w[0] + r[i])
+        out[i, 0] = states[i]
     for k in range(len(w) - 1):
-        x = w[k]
-        target = w[k + 1]
-        left = steps[k]
-        speed = (target - x) / left
-        side = 0.0
-        if x - r - state > 0.0:
-            side = 1.0
-        elif state - r - x > 0.0:
-            side = -1.0
-        if side != 0.0:
-            e, left = stretch(side * (x - state) - r, side * speed, left, tau, exponent, scale)
-            if left > 0.0:  # caught up, with the input on its way back
-                x = target - speed * left
-                state = x - side * r
-                side = 0.0
-            else:
-                state = target - side * (r + e)
-        if side == 0.0 and left > 0.0:
-            way = 1.0 if target > x else -1.0
-            beyond = way * (target - state) - r
-            if beyond > 0.0:
-                taken = left * min(beyond / (way * (target - x)), 1.0)
-                e, _ = stretch(0.0, way * speed, taken, tau, exponent, scale)
-                state = target - way * (r + e)
-        out[k + 1] = state
+        for i in range(len(r)):
+            states[i] = relaxed(w[k], w[k + 1], steps[k], r[i], tau, exponent, scale, states[i])
+            out[i, k + 1] = states[i]
 
 
 COMPILED: list[Callable[..., Any]] = [
-    follow, creep, limit, ring, curve, dilated_play, mean_decay, bent_decay, taylor, stretch, relaxing_play,
+    follow, creep, limit, ring, curve, dilated_play, mean_decay, bent_decay, taylor, stretch, relaxed,
+    relaxing_plays,
 ]  # fmt: skip
 
 
@@ -264,4 +278,4 @@ def load() -> None:
     run.ring(u, step, step, step, step, 1.0, out)
     run.curve(u, 1.0, step, 1.0, out)
     run.dilated_play(u, u, 1.0, 1.0, 0.0, out)
-    run.relaxing_play(u, step, 1.0, 1.0, 1.0, 1.0, 0.0, out)
+    run.relaxing_plays(u, step, step, 1.0, 1.0, 1.0, np.zeros(1), out[None, :])
