@@ -35,6 +35,7 @@ REMEMBERED, MOST_BYTES = 5, 2**28
 
 FAR = 2.0
 """The start state may come from a drive so many times as wide as the recorded one."""
+
 POLISHED = 1e-5
 """A search ends when a step lowers the error by less than this share: far below what any decision looks at."""
 

@@ -66,7 +66,7 @@ def _mode(h: Array, dt: Array, w: float, damping: float) -> Array:
     return out
 
 
-# -- saturation behind the hysteresis: a stage that meets elastic stops ------------------------------------------------
+# -- saturation behind the hysteresis: a stage that meets round stops, by Hertz's law ----------------------------------
 
 
 def stops(effect: Effect, y: Array, around: Surroundings) -> Array:
@@ -77,11 +77,26 @@ def stops(effect: Effect, y: Array, around: Surroundings) -> Array:
     cut = effect.strength * bench.span_out
     give = effect.values["softness"]
     top = slope * bench.high - cut
-    y = np.where(y > top, top + give * (y - top), y)
+    y = y - _taken(y - top, cut, give)
     if bench.two_sided:
         bottom = slope * bench.low + cut * effect.values["unlike"]
-        y = np.where(y < bottom, bottom + give * (y - bottom), y)
+        y = y + _taken(bottom - y, cut, give)
     return y
+
+
+def _taken(beyond: Array, depth: float, give: float) -> Array:
+    """Travel that a stop takes from a stage that would go so far beyond it: of `depth` all but the share `give`.
+
+    The force on a ball grows like its indentation to the power 3/2 and is that of the stage's stiffness on the travel
+    taken; solved by bisection.
+    """
+    stiffness = (1.0 - give) * depth / (give * depth) ** 1.5
+    low, high = np.zeros_like(beyond), np.maximum(beyond, 0.0)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        more = stiffness * middle**1.5 < beyond - middle
+        low, high = np.where(more, middle, low), np.where(more, high, middle)
+    return np.asarray(np.maximum(beyond, 0.0) - low)
 
 
 # -- sensor nonlinearity -----------------------------------------------------------------------------------------------
