@@ -13,14 +13,13 @@ static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output
     p->rising = rising;
 }
 
-/* Where a rising move from w `from` to `output` ends, of which k plays follow and `left` corners hold the others, `end`
+/* Where a rising move to `output` ends, of which k plays follow and `left` corners hold the others, `end`
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
-   where it is too narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
-HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                       unsigned int left, unsigned int k, unsigned int end,
-                                       hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
-                                       bool *room)
+   where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
+HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                             const hystgen_corner_t *corner, unsigned int left, unsigned int k,
+                                             unsigned int end, hystgen_real_t output, bool *room)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -73,18 +72,17 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, const h
             *room = !(least > next);
         }
     }
-    if (!(w > from)) {
-        return from;
+    if (!(w > m->w)) {
+        return m->w;
     }
-    hystgen_write_place(p, level, next_level, first, next, k, left, true);
+    hystgen_write_place(&m->there, level, next_level, first, next, k, left, true);
     return w;
 }
 
 /* The same for a falling move. */
-HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                       unsigned int left, unsigned int k, unsigned int end,
-                                       hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
-                                       bool *room)
+HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                             const hystgen_corner_t *corner, unsigned int left, unsigned int k,
+                                             unsigned int end, hystgen_real_t output, bool *room)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -137,35 +135,31 @@ HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, const h
             *room = !(least < next);
         }
     }
-    if (!(w < from)) {
-        return from;
+    if (!(w < m->w)) {
+        return m->w;
     }
-    hystgen_write_place(p, level, next_level, first, next, k, left, false);
+    hystgen_write_place(&m->there, level, next_level, first, next, k, left, false);
     return w;
 }
 
-/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
-HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
-                                                bool *room)
+/* A rising move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
+HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
+                                                hystgen_real_t output, bool *room)
 {
     unsigned int end;
-    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, corner, left, k, end, from, output, p, room);
+    const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, room);
 }
 
-/* A falling move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
-HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                hystgen_real_t from, hystgen_real_t output, hystgen_place_t *p,
-                                                bool *room)
+/* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
+HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
+                                                hystgen_real_t output, bool *room)
 {
     unsigned int end;
-    const unsigned int left = hystgen_corners_find(t, corner, start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, corner, left, k, end, from, output, p, room);
+    const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, room);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
@@ -210,8 +204,8 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
         return w;
     }
     m->there.k = 0;
-    return rising ? hystgen_corners_rise(t, corner, m->start, depth, k, m->w, output, &m->there, &room)
-                  : hystgen_corners_fall(t, corner, m->start, depth, k, m->w, output, &m->there, &room);
+    return rising ? hystgen_corners_rise(t, m, corner, depth, k, output, &room)
+                  : hystgen_corners_fall(t, m, corner, depth, k, output, &room);
 }
 
 /* Whether a move to `limit` takes no more plays along: right at the activation of one, it does not follow yet. */
@@ -258,8 +252,8 @@ HYSTGEN_COPIES bool hystgen_move_within(const hystgen_tables_t *t, hystgen_memor
     hystgen_place_t *p = &m->there;
     const hystgen_corner_t *c = &corner[m->start];
     const hystgen_real_t x = rising ? output : -output;
-    const unsigned int high = c->end - 1u;
     unsigned int left = m->start + 1u;
+    unsigned int high;
     unsigned int end = 0;
     bool alike = true;
     *w = limit;
@@ -271,6 +265,7 @@ HYSTGEN_COPIES bool hystgen_move_within(const hystgen_tables_t *t, hystgen_memor
     if (depth < left) {
         return false;
     }
+    high = c->end - 1u;
     if (depth > left) {
         k = corner[left].end;
         end = k;
@@ -298,8 +293,8 @@ HYSTGEN_COPIES bool hystgen_move_within(const hystgen_tables_t *t, hystgen_memor
         }
         alike = !(k < high && way >= t->threshold[k]);
     }
-    *w = rising ? hystgen_rise_to(t, corner, left, k, end, m->w, output, p, room)
-                : hystgen_fall_to(t, corner, left, k, end, m->w, output, p, room);
+    *w = rising ? hystgen_rise_to(t, m, corner, left, k, end, output, room)
+                : hystgen_fall_to(t, m, corner, left, k, end, output, room);
     *limited = hystgen_past(*w, limit, rising);
     if (*limited) {
         *w = limit;

@@ -63,12 +63,10 @@ hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_r
 bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                            hystgen_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
                            hystgen_real_t *w);
-hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
-                                    unsigned int depth, unsigned int k, hystgen_real_t from, hystgen_real_t output,
-                                    hystgen_place_t *p, bool *room);
-hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, const hystgen_corner_t *corner, unsigned int start,
-                                    unsigned int depth, unsigned int k, hystgen_real_t from, hystgen_real_t output,
-                                    hystgen_place_t *p, bool *room);
+hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
+                                    unsigned int depth, unsigned int k, hystgen_real_t output, bool *room);
+hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
+                                    unsigned int depth, unsigned int k, hystgen_real_t output, bool *room);
 bool hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
                                  unsigned int depth, unsigned int k, hystgen_real_t output, hystgen_real_t limit,
                                  hystgen_real_t *w, bool *room, bool *limited);

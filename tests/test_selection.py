@@ -158,6 +158,15 @@ def test_what_is_free_in_a_record_is_no_merit(held_out: float, fitted: float, fi
     assert first_of(rich, simple) == first
 
 
+@pytest.mark.parametrize(("fitted", "first"), [(1.04, "simple"), (2.0, "rich")])
+def test_a_number_at_its_end_is_none_of_its_own(fitted: float, first: str) -> None:
+    """A resonance as high as it may be, say, which looks like a delay: the simpler one is named."""
+    rich, simple = Made("rich", 5, (1.0, 1.0)), Made("simple", 1, (fitted, 1.03))
+    assert first_of(rich, simple) == "rich"
+    rich.shape = rich.structure.bounds[1]
+    assert first_of(rich, simple) == first
+
+
 @pytest.mark.parametrize(
     ("held_out", "fitted", "first"), [(1.02, 0.95, "other"), (1.02, 1.0, "best"), (1.08, 0.9, "best")]
 )
@@ -177,6 +186,7 @@ class Made:
         self, name: str, free: int, left: tuple[float, float], on_equal_terms: tuple[float, float] | None = None
     ) -> None:
         self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
+        self.structure = SimpleNamespace(bounds=(np.full(2, -1.0), np.full(2, 1.0)))
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
 
     def errors(self, items: Sequence[int], like: Any = None) -> list[Array]:

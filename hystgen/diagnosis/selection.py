@@ -299,9 +299,7 @@ def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Arra
     return min(now.errors(items, best.fitted), now.errors(items), key=fits.rms)
 
 
-def _step(
-    now: Fitted, gap: float, records: _Records, worth: Callable[[Option], bool] | None = None
-) -> _Step | None:
+def _step(now: Fitted, gap: float, records: _Records, worth: Callable[[Option], bool] | None = None) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
 
     What explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is
@@ -443,7 +441,10 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
 
 
 def _each(
-    found: Sequence[Option], structures: Sequence[Structure], search: Callable[[int], Fitted], held: Sequence[Item],
+    found: Sequence[Option],
+    structures: Sequence[Structure],
+    search: Callable[[int], Fitted],
+    held: Sequence[Item],
     records: _Records,
 ) -> list[_Screened]:
     """What a search finds for each option, counted by its number, and its rms error on some records.
@@ -500,22 +501,37 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     """All, the best and those about as good before the others, and of these the ones of fewer numbers first.
 
     About as good: where all leave the same free in every record, held-out records find them no worse, whatever more the
-    best explains of those it was fitted to; or alike within a few per cent, and what more it explains of fitted ones
-    would be no effect. Between equal numbers of numbers all records decide.
+    best explains of those it was fitted to; or they find them alike within a few per cent, and fitted ones no worse, or
+    by chance, or by less than an effect is where the best has come to the end of what one of its numbers may be.
+    Between equal numbers of numbers all records decide.
     """
     if not tried:
         return []
     best, held = tried[0], records.held
-    enough, least = (1.0 + SIMPLER) * best.held_out, fits.rms(best.fitted.errors(records.to_fit))
+    enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
+
+    def no_worse(errors: list[Array]) -> bool:
+        more, less = fits.rms(errors), fits.rms(fitted)
+        return (
+            more <= less
+            or difference(errors, fitted) > SURE
+            or (_at_an_end(best.fitted) and _no_worse(more, less, records.noise))
+        )
+
     near, others = [(best.numbers(held), _everywhere(best, best, records), best)], []
     for each in tried[1:]:
         left = fits.rms(each.fitted.errors(held, best.fitted))
-        fitted = fits.rms(each.fitted.errors(records.to_fit, best.fitted))
-        if left <= best.held_out or (left <= enough and _no_worse(fitted, least, records.noise)):
+        if left <= best.held_out or (left <= enough and no_worse(each.fitted.errors(records.to_fit, best.fitted))):
             near.append((each.numbers(held), _everywhere(each, best, records), each))
         else:
             others.append(each)
     return [*(each for *_, each in sorted(near, key=lambda one: one[:2])), *others]
+
+
+def _at_an_end(fitted: Fitted) -> bool:
+    """Whether a number is the least or the most that it may be."""
+    low, high = fitted.structure.bounds
+    return bool(np.any((fitted.shape <= low) | (fitted.shape >= high)))
 
 
 def _everywhere(each: Tried, best: Tried, records: _Records) -> float:

@@ -461,14 +461,13 @@ static void plain_write_place(plain_place_t *p, plain_real_t anchor_output, plai
     p->rising = rising;
 }
 
-/* Where a rising move from w `from` to `output` ends, of which k plays follow and `left` corners hold the others, `end`
+/* Where a rising move to `output` ends, of which k plays follow and `left` corners hold the others, `end`
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
-   where it is too narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
-PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, const plain_corner_t *corner,
-                                       unsigned int left, unsigned int k, unsigned int end,
-                                       plain_real_t from, plain_real_t output, plain_place_t *p,
-                                       bool *room)
+   where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
+PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, plain_memory_t *m,
+                                             const plain_corner_t *corner, unsigned int left, unsigned int k,
+                                             unsigned int end, plain_real_t output, bool *room)
 {
     plain_real_t w;
     plain_real_t first;
@@ -521,18 +520,17 @@ PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, const plain_cor
             *room = !(least > next);
         }
     }
-    if (!(w > from)) {
-        return from;
+    if (!(w > m->w)) {
+        return m->w;
     }
-    plain_write_place(p, level, next_level, first, next, k, left, true);
+    plain_write_place(&m->there, level, next_level, first, next, k, left, true);
     return w;
 }
 
 /* The same for a falling move. */
-PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, const plain_corner_t *corner,
-                                       unsigned int left, unsigned int k, unsigned int end,
-                                       plain_real_t from, plain_real_t output, plain_place_t *p,
-                                       bool *room)
+PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, plain_memory_t *m,
+                                             const plain_corner_t *corner, unsigned int left, unsigned int k,
+                                             unsigned int end, plain_real_t output, bool *room)
 {
     plain_real_t w;
     plain_real_t first;
@@ -585,35 +583,31 @@ PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, const plain_cor
             *room = !(least < next);
         }
     }
-    if (!(w < from)) {
-        return from;
+    if (!(w < m->w)) {
+        return m->w;
     }
-    plain_write_place(p, level, next_level, first, next, k, left, false);
+    plain_write_place(&m->there, level, next_level, first, next, k, left, false);
     return w;
 }
 
-/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
-static plain_real_t plain_corners_rise(const plain_tables_t *t, const plain_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                plain_real_t from, plain_real_t output, plain_place_t *p,
-                                                bool *room)
+/* A rising move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static plain_real_t plain_corners_rise(const plain_tables_t *t, plain_memory_t *m,
+                                                const plain_corner_t *corner, unsigned int depth, unsigned int k,
+                                                plain_real_t output, bool *room)
 {
     unsigned int end;
-    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, output, true);
-    return plain_rise_to(t, corner, left, k, end, from, output, p, room);
+    const unsigned int left = plain_corners_find(t, corner, m->start, depth, &k, &end, output, true);
+    return plain_rise_to(t, m, corner, left, k, end, output, room);
 }
 
-/* A falling move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
-static plain_real_t plain_corners_fall(const plain_tables_t *t, const plain_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                plain_real_t from, plain_real_t output, plain_place_t *p,
-                                                bool *room)
+/* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static plain_real_t plain_corners_fall(const plain_tables_t *t, plain_memory_t *m,
+                                                const plain_corner_t *corner, unsigned int depth, unsigned int k,
+                                                plain_real_t output, bool *room)
 {
     unsigned int end;
-    const unsigned int left = plain_corners_find(t, corner, start, depth, &k, &end, -output, false);
-    return plain_fall_to(t, corner, left, k, end, from, output, p, room);
+    const unsigned int left = plain_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
+    return plain_fall_to(t, m, corner, left, k, end, output, room);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
@@ -832,10 +826,6 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
-    if (m->w < PLAIN_DRIVE_MIN || m->w > PLAIN_DRIVE_MAX) {
-        m->there.k = 0;
-        return plain_inverse_stay(self, m->w);
-    }
     m->there.k = m->here.k;
     plain_inverse_expect(self, m->w);
     self->fast = 4;
@@ -867,22 +857,7 @@ PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_
     self->fast = 1;
     self->pending = v;
     return v;
-}
-
-/* Where solving has led to, which is as it is known where there was room for it. */
-PLAIN_COPIES plain_real_t plain_inverse_land(plain_inverse_t *self, plain_real_t v, bool room, bool rising)
-{
-    const plain_real_t from = self->memory.w;
-    if (!(rising ? v > from : v < from)) {
-        return plain_inverse_rest(self);
-    }
-    if (!room) {
-        return plain_inverse_stay(self, v);
-    }
-    return plain_inverse_enter(self, v, rising);
-}
-
-/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
+}/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that shorter ways save no registers for it */
 #endif
@@ -890,9 +865,14 @@ static plain_real_t plain_inverse_rise(plain_inverse_t *self, unsigned int depth
     plain_real_t u)
 {
     bool room = true;
-    const plain_real_t v = plain_corners_rise(&plain_tables, self->corner, self->memory.start, depth, k, self->memory.w, u,
-        &self->memory.there, &room);
-    return plain_inverse_land(self, v, room, true);
+    const plain_real_t v = plain_corners_rise(&plain_tables, &self->memory, self->corner, depth, k, u, &room);
+    if (!(v > self->memory.w)) {
+        return plain_inverse_rest(self);
+    }
+    if (!room) {
+        return plain_inverse_stay(self, v);
+    }
+    return plain_inverse_enter(self, v, true);
 }
 
 /* A falling move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
@@ -903,9 +883,14 @@ static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth
     plain_real_t u)
 {
     bool room = true;
-    const plain_real_t v = plain_corners_fall(&plain_tables, self->corner, self->memory.start, depth, k, self->memory.w, u,
-        &self->memory.there, &room);
-    return plain_inverse_land(self, v, room, false);
+    const plain_real_t v = plain_corners_fall(&plain_tables, &self->memory, self->corner, depth, k, u, &room);
+    if (!(v < self->memory.w)) {
+        return plain_inverse_rest(self);
+    }
+    if (!room) {
+        return plain_inverse_stay(self, v);
+    }
+    return plain_inverse_enter(self, v, false);
 }
 
 /* A move that takes no more plays along, and is fast from there on. */
@@ -1182,15 +1167,7 @@ static plain_real_t plain_inverse_at_limit(plain_inverse_t *self, plain_real_t u
         const plain_real_t inside = plain_clamp_reference(u);
         const unsigned int bits = inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u;
         if (!(self->falling ? inside < self->edge[0] : inside > self->edge[0])) {
-            const plain_place_t *p = &m->there;
-            const plain_real_t output = inside;
-            const plain_real_t v = p->anchor + (output - p->anchor_output) * plain_reciprocal[p->k];
-            if (p->rising ? output < p->next_output && v < self->pending : output > p->next_output && v > self->pending) {
-                const bool rising = !p->rising;
-                const unsigned int depth = plain_inverse_turn(self, u, bits, !rising);
-                return rising ? plain_inverse_rise(self, depth, 1, inside) : plain_inverse_fall(self, depth, 1, inside);
-            }
-            plain_inverse_expect(self, self->pending); /* by rounding alone */
+            plain_inverse_expect(self, self->pending); /* mostly where rounding has led beyond */
             return plain_inverse_look(self, u);
         }
         if (u < self->reference || u > self->reference) {
@@ -1220,7 +1197,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         if (self->fast == 3) {
             return plain_inverse_at_limit(self, u);
         }
-        if (self->fast == 4 && !(u < self->reference) && !(u > self->reference) && plain_finite(u)) {
+        if (self->fast == 4 && u >= self->reference && u <= self->reference) {
             self->status |= self->bits;
             return self->pending;
         }

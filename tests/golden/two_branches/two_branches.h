@@ -738,14 +738,13 @@ static void two_branches_write_place(two_branches_place_t *p, two_branches_real_
     p->rising = rising;
 }
 
-/* Where a rising move from w `from` to `output` ends, of which k plays follow and `left` corners hold the others, `end`
+/* Where a rising move to `output` ends, of which k plays follow and `left` corners hold the others, `end`
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
-   where it is too narrow for that. And from leading back: then `from` is returned, and nothing filled in. */
-TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                       unsigned int left, unsigned int k, unsigned int end,
-                                       two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
-                                       bool *room)
+   where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
+TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_tables_t *t, two_branches_memory_t *m,
+                                             const two_branches_corner_t *corner, unsigned int left, unsigned int k,
+                                             unsigned int end, two_branches_real_t output, bool *room)
 {
     two_branches_real_t w;
     two_branches_real_t first;
@@ -798,18 +797,17 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_
             *room = !(least > next);
         }
     }
-    if (!(w > from)) {
-        return from;
+    if (!(w > m->w)) {
+        return m->w;
     }
-    two_branches_write_place(p, level, next_level, first, next, k, left, true);
+    two_branches_write_place(&m->there, level, next_level, first, next, k, left, true);
     return w;
 }
 
 /* The same for a falling move. */
-TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                       unsigned int left, unsigned int k, unsigned int end,
-                                       two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
-                                       bool *room)
+TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_tables_t *t, two_branches_memory_t *m,
+                                             const two_branches_corner_t *corner, unsigned int left, unsigned int k,
+                                             unsigned int end, two_branches_real_t output, bool *room)
 {
     two_branches_real_t w;
     two_branches_real_t first;
@@ -862,35 +860,31 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_
             *room = !(least < next);
         }
     }
-    if (!(w < from)) {
-        return from;
+    if (!(w < m->w)) {
+        return m->w;
     }
-    two_branches_write_place(p, level, next_level, first, next, k, left, false);
+    two_branches_write_place(&m->there, level, next_level, first, next, k, left, false);
     return w;
 }
 
-/* A rising move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
-static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
-                                                bool *room)
+/* A rising move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t *t, two_branches_memory_t *m,
+                                                const two_branches_corner_t *corner, unsigned int depth, unsigned int k,
+                                                two_branches_real_t output, bool *room)
 {
     unsigned int end;
-    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, output, true);
-    return two_branches_rise_to(t, corner, left, k, end, from, output, p, room);
+    const unsigned int left = two_branches_corners_find(t, corner, m->start, depth, &k, &end, output, true);
+    return two_branches_rise_to(t, m, corner, left, k, end, output, room);
 }
 
-/* A falling move from w `from` to `output`, of which k plays are known to follow and `depth` corners, `start` of them of
-   the start, hold the others: fills in the place where it ends, and returns the input of the plays there. */
-static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, const two_branches_corner_t *corner,
-                                                unsigned int start, unsigned int depth, unsigned int k,
-                                                two_branches_real_t from, two_branches_real_t output, two_branches_place_t *p,
-                                                bool *room)
+/* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
+static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t *t, two_branches_memory_t *m,
+                                                const two_branches_corner_t *corner, unsigned int depth, unsigned int k,
+                                                two_branches_real_t output, bool *room)
 {
     unsigned int end;
-    const unsigned int left = two_branches_corners_find(t, corner, start, depth, &k, &end, -output, false);
-    return two_branches_fall_to(t, corner, left, k, end, from, output, p, room);
+    const unsigned int left = two_branches_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
+    return two_branches_fall_to(t, m, corner, left, k, end, output, room);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
@@ -935,8 +929,8 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
         return w;
     }
     m->there.k = 0;
-    return rising ? two_branches_corners_rise(t, corner, m->start, depth, k, m->w, output, &m->there, &room)
-                  : two_branches_corners_fall(t, corner, m->start, depth, k, m->w, output, &m->there, &room);
+    return rising ? two_branches_corners_rise(t, m, corner, depth, k, output, &room)
+                  : two_branches_corners_fall(t, m, corner, depth, k, output, &room);
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
