@@ -917,7 +917,7 @@ static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked
     } else {
         v = plain_inverse_along(self, v, rising);
     }
-    if (self->fast != 0 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
+    if (self->fast == 1 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
         plain_inverse_leave_fast(self);
     }
     return v;
