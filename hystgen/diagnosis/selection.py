@@ -14,7 +14,7 @@ from hystgen import parallel
 from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
-from hystgen.diagnosis.structure import Fitted, Item, Structure
+from hystgen.diagnosis.structure import Fitted, Item, Search, Structure
 from hystgen.effects import recursions
 from hystgen.effects.base import About, Effect
 from hystgen.identification.fronts import Kept
@@ -33,6 +33,12 @@ AWAY = 5.0
 
 The best end has been reached from starts with up to 3.5 times the error of another on tuning cases: a limit of the
 output does nothing where it lies beyond all that was measured.
+"""
+
+IDLE = 0.01
+"""Where the error is that without the effect within this share, the effect does nothing yet, and others go first.
+
+Behind a large effect that is found, every start of the next may be worse than none before its first steps.
 """
 
 COARSE = 1e-3
@@ -69,6 +75,9 @@ What a right name in a wrong shape leaves to a second one, and no better shape t
 HELPS = 0.05
 """A shape has to lower the error by this share while they are told apart, or those that contain it are not tried."""
 
+NEARLY_ALL = 0.25
+"""Or it leaves at most so much of the error before it: beside a far larger effect that share may be out of reach."""
+
 ABOVE_NOISE = 0.6
 """The part that it removes has an rms of at least so many times what is left, or the noise if that is more."""
 
@@ -81,6 +90,9 @@ lower probability than that."""
 
 SIMPLER = 0.05
 """A shape with fewer numbers is taken for one whose held-out rms is better by less than this share."""
+
+FAR_LESS = 0.5
+"""An error over fitted records is far less than another from this share of it on."""
 
 EXCHANGE = 0.05
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
@@ -259,11 +271,13 @@ class _Merit:
 
     removed: float
     fitted: float
+    left: float
+    """share of the held-out rms that it leaves"""
     p_value: float
 
     def worth(self, gap: float, records: _Records) -> bool:
-        """Whether it is a share of the gap that deserves a name."""
-        return self.removed >= SHARE * gap or self.fitted >= SHARE * records.gap
+        """Whether it is a share of the gap, or of what was left of it, that deserves a name."""
+        return self.removed >= SHARE * gap or self.fitted >= SHARE * records.gap or self.left <= NEARLY_ALL
 
 
 @dataclass(frozen=True)
@@ -288,7 +302,8 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
         return None
     without, fitted = _without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)
     sure = p_value <= SURE or difference(without, fitted) <= SURE
-    return _Merit(removed, _apart(fits.rms(without), fits.rms(fitted)), p_value) if sure else None
+    explained = _apart(fits.rms(without), fits.rms(fitted))
+    return _Merit(removed, explained, best.held_out / equal, p_value) if sure else None
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:
@@ -405,20 +420,23 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
     simpler: dict[str, _Screened] = {}
 
+    def acting(searches: Sequence[Search]) -> Sequence[Search]:
+        return [each for each in searches if abs(each.now.rms - without[0]) > IDLE * without[0]] or searches
+
     def begin(option: Option) -> Fitted:
         starts = list(option.starts)
         if option.grown is not None:
             starts.append(option.grown(simpler[option.beyond].fitted.shape))
         begun = [fits.begun(option.alone, records.thin, start, now.weights) for start in starts]
-        near = AWAY * min(each.now.rms for each in begun)
+        near = AWAY * min(each.now.rms for each in acting(begun))
         searches = [each.further(FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
-        best = min(searches, key=lambda each: each.now.rms)
+        best = min(acting(searches), key=lambda each: each.now.rms)
         search = best.further(SCREENING_STEPS, COARSE)
         for _ in range(LONGER - 1):
             if search.now.rms >= FALLING * best.now.rms:
                 break
             best, search = search, search.further(SCREENING_STEPS, COARSE)
-        return search.found(now.weights)
+        return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
     def begun(some: Sequence[Option]) -> list[_Screened]:
         return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
@@ -503,11 +521,14 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     About as good: where all leave the same free in every record, held-out records find them no worse, whatever more the
     best explains of those it was fitted to; or they find them alike within a few per cent, and fitted ones no worse, or
     by chance, or by less than an effect is where the best has come to the end of what one of its numbers may be.
-    Between equal numbers of numbers all records decide.
+    Between equal numbers of numbers all records decide. What leaves far more of the fitted records than another is not
+    the best for a small lead on held-out ones, which may hold little more than what yet another effect leaves there.
     """
     if not tried:
         return []
-    best, held = tried[0], records.held
+    enough = (1.0 + UNSURE) * tried[0].held_out
+    far = min((each for each in tried if each.held_out <= enough), key=lambda each: each.fitted.rms)
+    best, held = far if far.fitted.rms <= FAR_LESS * tried[0].fitted.rms else tried[0], records.held
     enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
 
     def no_worse(errors: list[Array]) -> bool:
@@ -519,9 +540,13 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
         )
 
     near, others = [(best.numbers(held), _everywhere(best, best, records), best)], []
-    for each in tried[1:]:
+    for each in tried:
+        if each is best:
+            continue
         left = fits.rms(each.fitted.errors(held, best.fitted))
-        if left <= best.held_out or (left <= enough and no_worse(each.fitted.errors(records.to_fit, best.fitted))):
+        if FAR_LESS * each.fitted.rms >= best.fitted.rms:
+            others.append(each)
+        elif left <= best.held_out or (left <= enough and no_worse(each.fitted.errors(records.to_fit, best.fitted))):
             near.append((each.numbers(held), _everywhere(each, best, records), each))
         else:
             others.append(each)

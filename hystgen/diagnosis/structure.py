@@ -517,13 +517,19 @@ class Search:
     structure: Structure
     items: Sequence[Item]
     now: Shaped
+    damping: float = joint.DAMPING
 
     def further(self, steps: int = joint.MOST_STEPS, little: float = POLISHED) -> Search:
         """So many steps further at most, until one lowers the error by too `little`."""
-        found = joint.search(
-            lambda shape, p: linear(self.structure, self.items, shape, p), self.structure, self.now, steps, little
+        now, damping = joint.search(
+            lambda shape, p: linear(self.structure, self.items, shape, p),
+            self.structure,
+            self.now,
+            steps,
+            little,
+            self.damping,
         )
-        return replace(self, now=found)
+        return replace(self, now=now, damping=damping)
 
     def found(self, otherwise: Array) -> Fitted:
         """What was found; `otherwise`: weights where the numbers lie too far from what the records are like."""

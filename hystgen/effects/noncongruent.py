@@ -15,6 +15,13 @@ from hystgen.param_models import MAX_PLAYS, Number, Positive
 
 MAX_TERMS = 8
 
+CUBIC = "noncongruent, cubic"
+
+PLACES = 101
+
+LOWEST, HIGHEST = -0.8, 2.5
+"""Amplitudes of a bump from which a search starts."""
+
 
 class _Noncongruent(Effect):
     name: Literal["noncongruent"] = Field(description="name of the effect")
@@ -102,10 +109,10 @@ class PlayFunctions(_Noncongruent):
         even = np.ones(plays)
         return [
             candidate("noncongruent, parabola", 1, even),
-            candidate("noncongruent, cubic", 2, even),
+            candidate(CUBIC, 2, even),
             candidate("noncongruent, cubic over r", 2, 1.0 - share, share),
             candidate(
-                "noncongruent, quartic", 3, even, beyond="noncongruent, cubic", grown=lambda x: np.append(x, 0.0)
+                "noncongruent, quartic", 3, even, beyond=CUBIC, grown=lambda x: np.append(x, 0.0)
             ),
         ]
 
@@ -132,7 +139,10 @@ class LoopCentre(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Amplitude, centre in the middle half of the drive and beyond, width."""
+        """Amplitude, centre in the middle half of the drive and beyond, width; where a cubic takes something away.
+
+        How a bump begins is read off the density that the cubic has: from far away no search finds its place.
+        """
         if len(about.thresholds) < 2:
             return []
         low, high = about.drive
@@ -146,10 +156,19 @@ class LoopCentre(_Noncongruent):
                 centre=low + wide * float(x[1]), width=10.0 ** float(x[2]),
             )  # fmt: skip
 
+        def grown(cubic: Array) -> Array:
+            largest = max(map(abs, about.drive))
+            at = np.linspace(low, high, PLACES)
+            density = np.maximum(1.0 + 0.2 * cubic[0] * at / largest + 0.3 * cubic[1] * (at / largest) ** 2, 0.05)
+            outside = 0.5 * float(density[0] + density[-1])
+            k = int(np.argmax(np.abs(density - outside)))
+            amplitude = float(np.clip(density[k] / outside - 1.0, LOWEST, HIGHEST))
+            return np.array([amplitude, k / (PLACES - 1), start])
+
         return [
             Candidate(
                 "noncongruent, loop centre", np.array([-0.9, -0.5, ends[0]]), np.array([3.0, 1.5, ends[1]]),
-                np.array([0.05, 0.5, start]), build, none=np.array([0.0, 0.5, start]),
+                np.array([0.05, 0.5, start]), build, np.array([0.0, 0.5, start]), (), CUBIC, grown,
             )
         ]  # fmt: skip
 

@@ -30,6 +30,9 @@ DIFFERENCE = 1e-6
 
 MOST_STEPS = 25
 
+DAMPING = 1e-3
+"""Of the first step, against the diagonal of its equations."""
+
 ENOUGH = 0.005
 """The search ends when the sum of squares falls by less than this many times its share of one sample.
 
@@ -96,7 +99,7 @@ def refine(
     def linear(s: Array, q: Array) -> Shaped:
         return _linear(courses, front, s, q, thresholds, tick)
 
-    return search(linear, front, linear(shape, p))
+    return search(linear, front, linear(shape, p))[0]
 
 
 class Limits(Protocol):
@@ -111,15 +114,20 @@ class Limits(Protocol):
 
 
 def search(
-    linear: Callable[[Array, Array], Shaped], limits: Limits, now: Shaped, most: int = MOST_STEPS, little: float = 0.0
-) -> Shaped:
-    """The best shape near that of `now`; `linear` gives the system that is linear about a shape and weights.
+    linear: Callable[[Array, Array], Shaped],
+    limits: Limits,
+    now: Shaped,
+    most: int = MOST_STEPS,
+    little: float = 0.0,
+    damping: float = DAMPING,
+) -> tuple[Shaped, float]:
+    """The best shape near that of `now`, and the damping with which the search goes on from there.
 
-    `little`: the search ends with a step that lowers the error by less than this share, too.
+    `linear` gives the system that is linear about a shape and weights. `little`: the search ends with a step that
+    lowers the error by less than this share, too. Steps that fail are damped more, and counted.
     """
     shape = now.shape
     low, high = limits.bounds
-    damping = 1e-3
     for _ in range(most if len(shape) else 0):
         if damping > 1e6 or now.rms == 0.0 or not math.isfinite(now.rms):
             break
@@ -138,7 +146,7 @@ def search(
                 break
         else:
             damping = max(damping, 1e-4) * 5.0
-    return now
+    return now, damping
 
 
 def _allowed(limits: Limits, shape: Array) -> bool:
