@@ -27,6 +27,9 @@ WINDOW = 15
 AROUND, CLEAR = 6, 2.5
 """It jumps away and back by more than so many times what so many samples on either side move in a step."""
 
+AT_ONCE = 0.7
+"""Each of the two jumps is at least so much of how far the samples lie from the line between their neighbours."""
+
 TAIL, NORMAL_TAIL = 0.98, 2.326
 """A quantile of the deviations, and what it is for normal ones of standard deviation one."""
 
@@ -81,13 +84,16 @@ def _stepped(v: Array) -> NDArray[np.bool_]:
 
 
 def _stands_out(e: Array, first: int, last: int) -> bool:
-    """Whether samples [first, last) jump away and back by far more than the signal moves around them.
+    """Whether samples [first, last) jump away and back at once, by far more than the signal moves around them.
 
-    The tip of a triangle does not, where a model misses what happens at a reversal.
+    The tip of a triangle does not, nor a move of few samples, where a model misses what happens there.
     """
     if first == 0 or last == len(e):
         return False
     jump = min(abs(e[first] - e[first - 1]), abs(e[last] - e[last - 1]))
+    line = np.interp(np.arange(first, last), [first - 1, last], [e[first - 1], e[last]])
+    if jump < AT_ONCE * float(np.max(np.abs(e[first:last] - line))):
+        return False
     before, after = np.diff(e[max(first - AROUND, 0) : first]), np.diff(e[last : last + AROUND])
     around = np.sort(np.abs(np.concatenate([before, after])))
     # another outlier near by makes two large steps
