@@ -57,6 +57,7 @@ EVERY = [
     make("saturation", shape="hard", level=2.0),
     make("thermal", gain_per_degree=0.01, offset_per_degree=0.02, reference=21.0),
     make("thermal", source="self_heating", gain_per_degree=0.01, time_constant=2.0, heating=0.2),
+    make("thermal", source="hysteresis", gain_per_degree=0.01, time_constant=2.0, heating=0.2, reach=1.0),
     make("drift", rate=0.5),
     make("drift", shape="curved", rate=0.5, change=-0.1),
     make("ageing", loss=0.1, travel=20.0),
@@ -136,6 +137,7 @@ NOTHING = [
     make("saturation", shape="stops", lower=-0.5, upper=0.5, give=1.0),
     make("thermal"),
     make("thermal", source="self_heating", gain_per_degree=0.1, time_constant=1.0, heating=0.0),
+    make("thermal", source="hysteresis", gain_per_degree=0.1, time_constant=1.0, heating=0.0, reach=1.0),
     make("drift", rate=0.0),
     make("drift", shape="curved", rate=0.0, change=0.0),
     make("ageing", loss=0.0, travel=1.0),
@@ -284,6 +286,12 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
         st.builds(
             lambda a, b, c: {"source": "self_heating", "gain_per_degree": a, "time_constant": b, "heating": c},
             share, positive, times,
+        ),
+        st.builds(
+            lambda a, b, c, r: {
+                "source": "hysteresis", "gain_per_degree": a, "time_constant": b, "heating": c, "reach": r,
+            },
+            share, positive, times, positive,
         ),
     ),
     "drift": st.one_of(
@@ -665,6 +673,38 @@ def test_self_heating_is_frequency_times_amplitude_squared(shape: Callable[[Arra
     effect = make("thermal", source="self_heating", gain_per_degree=1.0, time_constant=1.0, heating=heating)
     rise = effect.gain(Run(t, amplitude * shape(2 * np.pi * frequency * t))) - 1.0
     assert np.mean(rise[-2000:]) == pytest.approx(heating * frequency * amplitude**2, rel=2e-3)
+
+
+def test_heat_of_hysteresis_is_what_many_plays_lose() -> None:
+    rng = np.random.default_rng(8)
+    v = np.concatenate([[0.4], rng.uniform(-3.0, 3.0, 400), np.linspace(-3.0, 3.0, 50), 2.0 * np.sin(np.arange(300.0))])
+    v[100:103] = v[100]  # a rest
+    t = np.arange(len(v)) * 0.1
+    plays, tau, heating, reach = 4000, 5.0, 0.3, 1.7
+    z, lost = np.full(plays, v[0]), np.empty(len(v) - 1)
+    r = (np.arange(plays) + 0.5) * (reach / plays)
+    for k, x in enumerate(v[1:].tolist()):
+        moved = np.minimum(np.maximum(z, x - r), x + r)
+        lost[k] = np.sum(r * np.abs(moved - z)) * (reach / plays)
+        z = moved
+    rise = [0.0]
+    for q in lost / 0.1:
+        rise.append(rise[-1] * math.exp(-0.1 / tau) + heating * q * -math.expm1(-0.1 / tau))
+    effect = make(
+        "thermal", source="hysteresis", gain_per_degree=1.0, time_constant=tau, heating=heating, reach=reach
+    )
+    assert np.max(np.abs(effect.gain(Run(t, v)) - 1.0 - rise)) < 1e-6 * max(rise)
+
+
+def test_heat_of_small_loops_grows_with_the_cube_of_the_amplitude() -> None:
+    amplitude, frequency, heating = 3.0, 50.0, 0.2
+    t = np.arange(200_000) * 1e-4
+    v = 70.0 + amplitude * np.sin(2 * np.pi * frequency * t)
+    effect = make(
+        "thermal", source="hysteresis", gain_per_degree=1.0, time_constant=1.0, heating=heating, reach=10.0
+    )
+    rise = effect.gain(Run(t, v)) - 1.0
+    assert np.mean(rise[-2000:]) == pytest.approx(heating * frequency * 2 / 3 * amplitude**3, rel=2e-3)
 
 
 def test_sensor_polynomial_and_saturation_and_their_order() -> None:

@@ -84,6 +84,9 @@ ABOVE_NOISE = 0.6
 SURE, REPEATED = 1e-3, 0.05
 """Largest p-value of the difference in held-out error; or of that where the fitted records show it with the first."""
 
+SEEN = 0.15
+"""It removes at least so many times as much of the fitted records: what it does to others alone may be another's."""
+
 UNSURE, DIFFERENT = 0.25, 0.01
 """Effects cannot be told apart within this share of the held-out rms, unless chance explains the difference with a
 lower probability than that."""
@@ -291,7 +294,8 @@ class _Step:
 
 
 def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
-    """None where chance explains the difference, or what is removed is too little to be told from the noise."""
+    """None where chance explains the difference, or what is removed is too little to be told from the noise, or all but
+    nothing of it is in the records that its numbers are from."""
     errors = _without_merit(now, best, records.held)
     equal = fits.rms(errors)
     removed = _apart(equal, best.held_out)
@@ -303,7 +307,9 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
     without, fitted = _without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)
     sure = p_value <= SURE or difference(without, fitted) <= SURE
     explained = _apart(fits.rms(without), fits.rms(fitted))
-    return _Merit(removed, explained, best.held_out / equal, p_value) if sure else None
+    if not sure or explained < SEEN * removed:
+        return None
+    return _Merit(removed, explained, best.held_out / equal, p_value)
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:

@@ -256,9 +256,54 @@ def relaxing_plays(
             out[i, k + 1] = states[i]
 
 
+def rubbed(way: float, reach: float) -> float:
+    """What plays of thresholds up to `reach` lose to friction on a way on which more and more of them follow.
+
+    One of threshold r follows behind r and then loses r a unit of the way, dr r for all within dr; `min(way, reach)^2/2`
+    is lost a unit of it then.
+    """
+    rising = min(way, reach)
+    return rising * rising * (rising / 6.0 + 0.5 * (way - rising))
+
+
+def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
+    """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `v[0]`, lose in each step of `v`.
+
+    Behind a turning point a play follows when the way is twice its threshold. Turning points that are passed are
+    forgotten (Madelung's rules): there the way goes on from an earlier one, or on the initial curve.
+    """
+    depth = 0
+    w = v[0]
+    up = True
+    for k in range(len(v) - 1):
+        x = v[k + 1]
+        out[k] = 0.0
+        if x == w:
+            continue
+        if (x > w) != up:
+            up = x > w
+            if w != v[0] or depth > 0:
+                corner[depth] = w
+                depth += 1
+        sign = 1.0 if up else -1.0
+        while x != w:
+            if depth == 0:
+                out[k] += rubbed(abs(x - v[0]), reach) - rubbed(abs(w - v[0]), reach)
+                w = x
+                break
+            last = corner[depth - 1]
+            end = corner[depth - 2] if depth > 1 else 2.0 * v[0] - last
+            ends = sign * (x - end) >= 0.0
+            to = end if ends else x
+            out[k] += 2.0 * (rubbed(0.5 * sign * (to - last), reach) - rubbed(0.5 * sign * (w - last), reach))
+            w = to
+            if ends:
+                depth -= min(depth, 2)
+
+
 COMPILED: list[Callable[..., Any]] = [
     follow, creep, limit, ring, curve, dilated_play, mean_decay, bent_decay, taylor, stretch, relaxed,
-    relaxing_plays,
+    relaxing_plays, rubbed, lost,
 ]  # fmt: skip
 
 
@@ -278,4 +323,5 @@ def load() -> None:
     run.ring(u, step, step, step, step, 1.0, out)
     run.curve(u, 1.0, step, 1.0, out)
     run.dilated_play(u, u, 1.0, 1.0, 0.0, out)
+    run.lost(u, 1.0, np.empty(2), np.empty(1))
     run.relaxing_plays(u, step, step, 1.0, 1.0, 1.0, np.zeros(1), out[None, :])
