@@ -62,6 +62,7 @@ EVERY = [
     make("drift", shape="curved", rate=0.5, change=-0.1),
     make("ageing", loss=0.1, travel=20.0),
     make("ageing", shape="exponential", loss=0.1, travel=20.0),
+    make("ageing", shape="exponentials", losses=(0.1, 0.05), travels=(20.0, 3.0)),
     make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
     make("noncongruent", coefficients=((0.1,), (0.05, 0.02), (-0.1,))),
     make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
@@ -143,6 +144,7 @@ NOTHING = [
     make("ageing", loss=0.0, travel=1.0),
     make("ageing", loss=0.0, travel=5e-324),
     make("ageing", shape="exponential", loss=0.0, travel=1.0),
+    make("ageing", shape="exponentials", losses=(0.0, 0.0), travels=(1.0, 2.0)),
     make("sensor_nonlinearity", coefficients=(0.0, 0.0), scale=1.0),
     make("noncongruent", coefficients=((0.0,), (0.0,), (0.0,))),
     make("noncongruent", shape="centre", amplitude=0.0, centre=1.0, width=1.0),
@@ -301,6 +303,10 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     "ageing": st.builds(
         lambda s, a, b: {"shape": s, "loss": a, "travel": b},
         st.sampled_from(["logarithmic", "exponential"]), share, positive,
+    )
+    | st.builds(
+        lambda a, b, d, e: {"shape": "exponentials", "losses": (a, b), "travels": (d, e)},
+        share, share, positive, positive,
     ),
     "sensor_nonlinearity": st.builds(
         lambda a, b, s: {"coefficients": (a, b), "scale": s}, share, share, st.floats(1e-30, 1e30)
@@ -623,6 +629,9 @@ def test_ageing_against_the_distance_travelled() -> None:
     assert np.allclose(logarithmic, 1 - 0.05 * np.log10(1 + distance / 3.0), rtol=1e-12)
     exponential = make("ageing", shape="exponential", loss=0.05, travel=3.0).gain(Run(t, v))
     assert np.allclose(exponential, 1 - 0.05 * (1 - np.exp(-distance / 3.0)), rtol=1e-12)
+    both = make("ageing", shape="exponentials", losses=(0.05, -0.02), travels=(3.0, 7.0)).gain(Run(t, v))
+    two = 1 - 0.05 * (1 - np.exp(-distance / 3.0)) + 0.02 * (1 - np.exp(-distance / 7.0))
+    assert np.allclose(both, two, rtol=1e-12)
     still = make("ageing", loss=0.05, travel=3.0).gain(Run(t, np.ones(len(t))))
     assert np.array_equal(still, np.ones(len(t)))
 

@@ -73,7 +73,10 @@ What a right name in a wrong shape leaves to a second one, and no better shape t
 """
 
 HELPS = 0.05
-"""A shape has to lower the error by this share while they are told apart, or those that contain it are not tried."""
+"""A shape has to lower the error by this share while they are told apart, or those that contain it are not tried.
+
+And these have to lower the error that it leaves by as much again.
+"""
 
 NEARLY_ALL = 0.25
 """Or it leaves at most so much of the error before it: beside a far larger effect that share may be out of reach."""
@@ -84,8 +87,8 @@ ABOVE_NOISE = 0.6
 SURE, REPEATED = 1e-3, 0.05
 """Largest p-value of the difference in held-out error; or of that where the fitted records show it with the first."""
 
-SEEN = 0.15
-"""It removes at least so many times as much of the fitted records: what it does to others alone may be another's."""
+SEEN = 0.25
+"""And so many times what is left, or the noise, from fitted records: what it does to others alone may be another's."""
 
 UNSURE, DIFFERENT = 0.25, 0.01
 """Effects cannot be told apart within this share of the held-out rms, unless chance explains the difference with a
@@ -306,8 +309,8 @@ def _merit(now: Fitted, best: Tried, records: _Records) -> _Merit | None:
         return None
     without, fitted = _without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)
     sure = p_value <= SURE or difference(without, fitted) <= SURE
-    explained = _apart(fits.rms(without), fits.rms(fitted))
-    if not sure or explained < SEEN * removed:
+    explained, unexplained = _apart(fits.rms(without), fits.rms(fitted)), fits.rms(fitted)
+    if not sure or explained < SEEN * max(records.noise, unexplained):
         return None
     return _Merit(removed, explained, best.held_out / equal, p_value)
 
@@ -421,7 +424,7 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
 
     What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
-    a simpler one is tried where that takes something away.
+    a simpler one is tried where that takes something away, and goes on where it takes more.
     """
     without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
     simpler: dict[str, _Screened] = {}
@@ -447,11 +450,15 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
     def begun(some: Sequence[Option]) -> list[_Screened]:
         return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
 
+    def helps(each: _Screened, rms: float, left: float) -> bool:
+        return each.fitted.rms < (1.0 - HELPS) * rms or each.left < (1.0 - HELPS) * left
+
     tried = begun([option for option in found if not option.beyond])
-    for each in tried:
-        if any(left < (1.0 - HELPS) * b for left, b in zip((each.fitted.rms, each.left), without, strict=True)):
-            simpler[each.option.label] = each
-    tried += begun([option for option in found if option.beyond in simpler])
+    simpler = {each.option.label: each for each in tried if helps(each, *without)}
+    for each in begun([option for option in found if option.beyond in simpler]):
+        less = simpler[each.option.beyond]
+        if helps(each, less.fitted.rms, less.left):
+            tried.append(each)
     tried = [each for each in tried if math.isfinite(each.left)]
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)
@@ -461,6 +468,8 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
                 break
             if sum(other.option.name == each.option.name for other in kept) < SHAPES and each not in kept:
                 kept.append(each)
+    contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
+    kept += [each for each in contained if each not in kept]  # whether more numbers are worth it shows when all fit
     return [(each.option, each.fitted) for each in kept]
 
 
@@ -532,13 +541,15 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     """
     if not tried:
         return []
-    enough = (1.0 + UNSURE) * tried[0].held_out
-    far = min((each for each in tried if each.held_out <= enough), key=lambda each: each.fitted.rms)
-    best, held = far if far.fitted.rms <= FAR_LESS * tried[0].fitted.rms else tried[0], records.held
-    enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(records.to_fit)
+    best, held, to_fit = tried[0], records.held, records.to_fit
+    about_as_good = [each for each in tried if each.held_out <= (1.0 + UNSURE) * best.held_out]
+    closest = min(about_as_good, key=lambda each: each.fitted.rms)
+    if fits.rms(closest.fitted.errors(to_fit)) <= FAR_LESS * fits.rms(best.fitted.errors(to_fit, closest.fitted)):
+        best = closest
+    enough, fitted = (1.0 + SIMPLER) * best.held_out, best.fitted.errors(to_fit)
+    less = fits.rms(fitted)
 
-    def no_worse(errors: list[Array]) -> bool:
-        more, less = fits.rms(errors), fits.rms(fitted)
+    def no_worse(errors: list[Array], more: float) -> bool:
         return (
             more <= less
             or difference(errors, fitted) > SURE
@@ -549,10 +560,9 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     for each in tried:
         if each is best:
             continue
-        left = fits.rms(each.fitted.errors(held, best.fitted))
-        if FAR_LESS * each.fitted.rms >= best.fitted.rms:
-            others.append(each)
-        elif left <= best.held_out or (left <= enough and no_worse(each.fitted.errors(records.to_fit, best.fitted))):
+        left, errors = fits.rms(each.fitted.errors(held, best.fitted)), each.fitted.errors(to_fit, best.fitted)
+        more = fits.rms(errors)
+        if less > FAR_LESS * more and (left <= best.held_out or (left <= enough and no_worse(errors, more))):
             near.append((each.numbers(held), _everywhere(each, best, records), each))
         else:
             others.append(each)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 from hystgen.param_models import Number, Positive
+
+EXPONENTIAL = "ageing, exponential"
+
+LEAST, MOST, APART = -3.0, 1.0, 0.6
+"""Decimal logarithms of travels in the recorded one: bounds, and half of how far apart two begin."""
 
 
 class _Ageing(Effect):
@@ -31,7 +37,7 @@ class _Ageing(Effect):
 
         start = np.array([0.1, -0.7])
         none, others = np.array([0.0, -0.7]), (np.array([0.1, -2.0]), np.array([0.1, 0.5]))
-        return Candidate(label, np.array([-5.0, -3.0]), np.array([5.0, 1.0]), start, build, none, others)
+        return Candidate(label, np.array([-5.0, LEAST]), np.array([5.0, MOST]), start, build, none, others)
 
 
 class LogarithmicAgeing(_Ageing):
@@ -68,13 +74,65 @@ class ExponentialAgeing(_Ageing):
 
     def gain(self, run: Run) -> Array:
         """The falling gain."""
-        worn = run.remembered(("worn", self.travel), lambda: np.asarray(np.expm1(-run.travelled / self.travel)))
-        return np.asarray(1.0 + self.loss * worn)
+        return np.asarray(1.0 + self.loss * _worn(run, self.travel))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """Loss and travel, the travel from a thousandth of the recorded one to ten."""
-        return [cls._candidate("ageing, exponential", about)]
+        return [cls._candidate(EXPONENTIAL, about)]
 
 
-SHAPES = (LogarithmicAgeing, ExponentialAgeing)
+class SeveralAgeing(_Ageing):
+    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at several distances, wear of different speeds.
+
+    Two of them follow laws between the exponential and the logarithmic one, which spread over decades of travel.
+    """
+
+    shape: Literal["exponentials"] = Field(description="losses that come to an end at several distances")
+    losses: Annotated[tuple[Number, ...], Field(min_length=1, max_length=16)] = Field(
+        description="shares lost in the end", examples=[[0.02, 0.03]]
+    )
+    travels: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=16)] = Field(
+        description="travels after which 63 % of each is lost, input units", examples=[[1.0e3, 1.0e4]]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        """One loss a travel."""
+        if len(self.losses) != len(self.travels):
+            count = f"{len(self.losses)} value{'' if len(self.losses) == 1 else 's'}"
+            yield ("losses",), f"has {count} for {len(self.travels)} in travels; give as many as travels"
+
+    def gain(self, run: Run) -> Array:
+        """The falling gain."""
+        total = np.ones(len(run.t))
+        for loss, travel in zip(self.losses, self.travels, strict=True):
+            total += loss * _worn(run, travel)
+        return total
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Two losses and travels, where one exponential takes something away."""
+        total = max(about.travel, 1e-12)
+
+        def build(x: Array) -> SeveralAgeing:
+            return cls(
+                name="ageing", shape="exponentials", losses=tuple((0.1 * x[:2]).tolist()),
+                travels=tuple((total * 10.0 ** x[2:]).tolist()),
+            )  # fmt: skip
+
+        def grown(one: Array) -> Array:
+            loss, travel = one
+            return np.array([0.5 * loss, 0.5 * loss, max(travel - APART, LEAST), min(travel + APART, MOST)])
+
+        low, high = np.array([-5.0, -5.0, LEAST, LEAST]), np.array([5.0, 5.0, MOST, MOST])
+        start = np.array([0.1, 0.1, -2.0, 0.0])
+        none = np.array([0.0, 0.0, -2.0, 0.0])
+        return [Candidate("ageing, two exponentials", low, high, start, build, none, (), EXPONENTIAL, grown)]
+
+
+def _worn(run: Run, travel: float) -> Array:
+    """`exp(-D/travel) - 1`; a search changes the loss more often than the travel."""
+    return run.remembered(("worn", travel), lambda: np.asarray(np.expm1(-run.travelled / travel)))
+
+
+SHAPES = (LogarithmicAgeing, ExponentialAgeing, SeveralAgeing)

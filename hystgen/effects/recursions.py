@@ -259,8 +259,7 @@ def relaxing_plays(
 def rubbed(way: float, reach: float) -> float:
     """What plays of thresholds up to `reach` lose to friction on a way on which more and more of them follow.
 
-    One of threshold r follows behind r and then loses r a unit of the way, dr r for all within dr; `min(way, reach)^2/2`
-    is lost a unit of it then.
+    One of threshold r follows behind r and then loses r a unit of the way, all that follow `min(way, reach)^2/2`.
     """
     rising = min(way, reach)
     return rising * rising * (rising / 6.0 + 0.5 * (way - rising))
