@@ -434,6 +434,9 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
     path = _model(tmp_path)
     with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"sweep: there is too little to fit.*--history"):
         hystgen.diagnose(path, sweep, holdout=sweep)
+    short = record(v[:-55], np.asarray(sweep.y)[:-55], "short")
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: \d samples at most .*--history"):
+        hystgen.diagnose(path, short, holdout=short)
     content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
     assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
 

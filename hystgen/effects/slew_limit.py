@@ -11,6 +11,9 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 from hystgen.effects.recursions import code
 from hystgen.param_models import Positive
 
+BELOW = (0.3, 0.5, 0.7, 1.0)
+"""Starts below the fastest recorded rate, in decades: a limit that is never met, or always, tells nothing of itself."""
+
 
 class SlewLimit(Effect):
     """Slew limit `-S_falling <= a' <= S` of the drive: from sample to sample `a` goes as far towards `v` as it may."""
@@ -48,7 +51,8 @@ class SlewLimit(Effect):
 
         def candidate(label: str, n: int, **more: Any) -> Candidate:
             none = np.full(n, fastest)
-            return Candidate(label, none - 2.0, none, none - 0.3, build, none, (none - 1.0,), **more)
+            start, *others = (none - below for below in BELOW)
+            return Candidate(label, none - 2.0, none, start, build, none, tuple(others), **more)
 
         return [
             candidate("slew limit", 1),
