@@ -89,9 +89,9 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
     return lists
 
 
-def dense(reach: float, samples: int) -> Candidate:
-    """One list that leaves little to wish for, to judge by what else there is in a record."""
-    return candidates(reach, samples, min(DENSE, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
+def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
+    """One list of `most` plays, which leaves little to wish for, to judge by what else there is in a record."""
+    return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
 
 def rounded(x: float, digits: int) -> float:
