@@ -323,13 +323,19 @@ def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Arra
     return min(now.errors(items, best.fitted), now.errors(items), key=fits.rms)
 
 
-def _step(now: Fitted, gap: float, records: _Records, worth: Callable[[Option], bool] | None = None) -> _Step | None:
+def _step(
+    now: Fitted,
+    gap: float,
+    records: _Records,
+    worth: Callable[[Option], bool] | None = None,
+    start: Fitted | None = None,
+) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
 
-    What explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is
+    `start`: the same hypothesis with other numbers, from which extensions are sought. What explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is
     the next one's turn.
     """
-    tried = records.extensions(now, worth)
+    tried = records.extensions(start or now, worth)
     if not tried:
         return None
     for best in _simplest_first(tried, records):
@@ -606,7 +612,8 @@ def _exchanged(
         left -= 1
         for k, old in enumerate(found):
             fitted = None if old.name == latest else _without(now, old.name, records)
-            step = None if fitted is None else _step(fitted, 0.0, records, lambda option: option.name in names)
+            start = _left_as_it_is(now, old.name, records)  # the others' numbers without any may be far from all others
+            step = None if fitted is None else _step(fitted, 0.0, records, lambda option: option.name in names, start)
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
@@ -663,6 +670,12 @@ def _without(now: Fitted, name: str, records: _Records) -> Fitted | None:
     """The hypothesis less one effect, fitted anew."""
     smaller = _less(now, name)
     return None if smaller is None else fits.fit(smaller[0], records.to_fit, smaller[1], now.weights)
+
+
+def _left_as_it_is(now: Fitted, name: str, records: _Records) -> Fitted | None:
+    """The hypothesis less one effect, the others' numbers unchanged."""
+    smaller = _less(now, name)
+    return None if smaller is None else fits.begun(smaller[0], records.to_fit, smaller[1], now.weights).found(now.weights)
 
 
 def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
