@@ -6,6 +6,7 @@ whatever the processes' order. Where processes cannot be copied safely it is a p
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -104,6 +105,7 @@ def _elsewhere(work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Call
 
 def _work(work: Callable[[Any], Any], items: Sequence[Any], queue: int, results: Connection, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.freeze()  # looking through what is the parent's would take long, and copy all of it
     while os.getppid() == parent and (number := os.read(queue, _NUMBER)):
         k = int.from_bytes(number, "little")
         try:
