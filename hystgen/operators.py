@@ -52,6 +52,15 @@ def _play_sum_into(v: Array, r: Array, states: Array, p: Array, out: Array) -> N
                 out[k] += p[i] * state
 
 
+def _weighted_into(p: Array, rows: Array, out: Array) -> None:
+    for k in range(len(out)):
+        out[k] = 0.0
+    for i in range(len(p)):
+        if p[i] != 0.0:
+            for k in range(len(out)):
+                out[k] += p[i] * rows[i, k]
+
+
 def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) -> None:
     for k in range(len(v)):
         state = state + (v[k] - previous)  # a repeated sample adds nothing
@@ -63,7 +72,7 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _play_sum_into, _stop_into]
+COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _play_sum_into, _weighted_into, _stop_into]
 
 
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
@@ -100,6 +109,13 @@ def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array
     signal = samples(v)
     out = np.empty_like(signal)
     compiled.operators()._play_sum_into(signal, thresholds, start, weights, out)
+    return out
+
+
+def weighted_sum(weights: Array, rows: Array) -> Array:
+    """`weights @ rows` (N,), without rows of weight 0, added one after the other: of plays it is their `play_sum`."""
+    out = np.empty(rows.shape[1])
+    compiled.operators()._weighted_into(weights, rows, out)
     return out
 
 

@@ -213,3 +213,13 @@ def test_memory_map_and_back() -> None:
     v = np.sin(np.linspace(0, 9, 200)) * 2
     s = operators.plays(v, r)[:, -1]
     np.testing.assert_allclose(memory.through(memory.through(s, p), q), s, atol=1e-14)
+
+
+@given(signals, radii, st.lists(st.floats(0, 3), min_size=4, max_size=4))
+def test_a_weighted_sum_of_plays_is_their_sum_to_the_last_digit(v: list[float], r: float, weights: list[float]) -> None:
+    signal, thresholds, p = np.array(v), r * np.arange(4.0), np.array(weights)
+    start = np.full(4, signal[0])
+    rows = operators.plays(signal, thresholds, start)
+    summed = operators.play_sum(signal, thresholds, start, p)
+    assert np.array_equal(operators.weighted_sum(p, rows), summed)
+    assert np.array_equal(operators.weighted_sum(p, rows[:, ::2]), summed[::2])

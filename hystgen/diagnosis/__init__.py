@@ -232,8 +232,10 @@ def _extended(
 
 
 def _offset(fitted: Fitted, item: Item) -> float:
-    rows, constant = fitted.actuator.columns(item, fitted.weights)
-    return float(np.nanmean(item.y - fitted.actuator.added(item) - rows[0] - constant))
+    actuator = fitted.actuator
+    rows, constant = actuator.columns(item, fitted.weights)
+    predicted = actuator.compared(rows[0] + constant, item) + actuator.added(item)
+    return float(np.mean(item.y[item.compared] - predicted))
 
 
 __all__ = ["Diagnosis", "IdentificationError", "diagnose"]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import operators
 from hystgen.effects import chain
 from hystgen.effects.base import Candidate, Effect, Place, Run
 from hystgen.identification import joint, reduction, weights
@@ -29,9 +30,14 @@ Sums = dict[object, Array]
 
 ALL = slice(None)
 
-REMEMBERED, MOST_BYTES = 5, 2**28
-"""Movements of the plays that are remembered for a record, and the size of them all."""
+_MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
+"""Parts of the chain behind which the compared samples are picked: plays, filters behind them, others, output maps."""
 
+MOVEMENTS = 5, 2**28
+"""Movements of the plays that are remembered for a record, and the bytes of them all."""
+
+DIFFERENCES = 12, 2**25
+"""The same of what hypotheses leave of a record: those followed up in a round are compared with each other."""
 
 FAR = 2.0
 """The start state may come from a drive so many times as wide as the recorded one."""
@@ -43,12 +49,35 @@ SETTLED = 3
 """Most steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
 
 
+class Recent:
+    """Arrays that were asked for lately, by what made them; no more than so many, and than so many bytes."""
+
+    def __init__(self, most: int, most_bytes: int) -> None:
+        self._most, self._most_bytes = most, most_bytes
+        self._arrays: dict[object, Array] = {}
+
+    def recalled(self, by: object) -> Array | None:
+        """What is remembered by this."""
+        if by not in self._arrays:
+            return None
+        self._arrays[by] = found = self._arrays.pop(by)  # the latest one comes last
+        return found
+
+    def remember(self, by: object, found: Array) -> None:
+        """Remember it in place of what was asked for least lately."""
+        arrays = self._arrays
+        while arrays and (len(arrays) >= self._most or found.nbytes * (len(arrays) + 1) > self._most_bytes):
+            del arrays[next(iter(arrays))]
+        if found.nbytes <= self._most_bytes:
+            arrays[by] = found
+
+
 @dataclass(frozen=True)
 class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
     `session`: all records on one time axis, where they are of one session, and `part` what of it is this record.
-    `moved`: how the plays moved lately, by what moved them, since most numbers of a search do not change it.
+    `moved`: how the plays moved lately, since most numbers of a search do not change it; `left`: what was left of it.
     """
 
     name: str
@@ -58,7 +87,8 @@ class Item:
     output_range: float
     session: Run | None = None
     part: slice = field(default_factory=lambda: slice(None))
-    moved: dict[object, Array] = field(default_factory=dict, repr=False, compare=False)
+    moved: Recent = field(default_factory=lambda: Recent(*MOVEMENTS), init=False, repr=False, compare=False)
+    left: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
@@ -81,20 +111,6 @@ class Item:
         y = np.full_like(self.y, np.nan)
         y[::every] = self.y[::every]
         return replace(self, y=y)
-
-    def recalled(self, by: object) -> Array | None:
-        """How the plays moved by this, if that is remembered."""
-        if by not in self.moved:
-            return None
-        self.moved[by] = plays = self.moved.pop(by)  # the latest one comes last
-        return plays
-
-    def remember(self, by: object, plays: Array) -> None:
-        """Remember how the plays moved, in place of what was asked for least lately."""
-        while (self.moved and plays.nbytes * (len(self.moved) + 1) > MOST_BYTES) or len(self.moved) >= REMEMBERED:
-            del self.moved[next(iter(self.moved))]
-        if plays.nbytes <= MOST_BYTES:
-            self.moved[by] = plays
 
 
 @dataclass(frozen=True)
@@ -198,42 +214,56 @@ class Actuator:
             found.setdefault(effect.place, []).append(effect)
         return found
 
-    def columns(
-        self, item: Item, p: Array | None = None, at: Samples = ALL, sums: Sums | None = None
-    ) -> tuple[Array, Array]:
+    def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and what is added to them without a weight.
 
-        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once. `at`: which samples;
-        `sums`: sums of the same weights, of actuators that have effects in common.
+        Of the samples that are compared, where nothing behind needs the others: `compared` picks them in any case.
+        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once. `sums`: sums of the
+        same weights, of actuators that have effects in common.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
         constant = np.zeros(rows.shape[1])
-        behind = [effect for effect in self.at(Place.LINEAR) if effect.order > 0]
-        now = ALL if behind else at  # without a filter behind it, a gain is needed at these samples alone
-        rows, constant = rows[:, now], constant[now]
+        now = item.compared if self._needed <= _FILTERED else ALL
         whole = item.session or run
         for effect in self.at(Place.GAIN):
             if (id(effect), id(whole)) not in self.gains:
                 self.gains[id(effect), id(whole)] = effect.gain(whole), effect.offset(whole)
             gain, offset = (values[item.part][now] for values in self.gains[id(effect), id(whole)])
             rows, constant = rows * gain, constant * gain + offset
-        for effect in behind:
-            rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
-        return (rows[:, at], constant[at]) if behind else (rows, constant)
+        for effect in self.at(Place.LINEAR):
+            if effect.order > 0:
+                rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
+        if self._needed == _RINGING:
+            rows, constant = rows[:, item.compared], constant[item.compared]
+        return rows, constant
+
+    def compared(self, values: Array, item: Item) -> Array:
+        """Of values at the samples of `columns`, (N,) or (k, N), those at samples that are compared."""
+        return values[..., item.compared] if self._needed == _MAPPED else values
+
+    @cached_property
+    def _needed(self) -> int:
+        """The last part of the chain that needs every sample; behind it the samples that are compared will do."""
+        if not all(effect.pointwise for effect in self.at(Place.OUTPUT)):
+            return _MAPPED
+        if len(self._filters) < len(self.at(Place.LINEAR)):
+            return _RINGING
+        return _FILTERED if self._filters or not all(effect.pointwise for effect in self._bending) else _MOVED
 
     def _slow(self, item: Item) -> Array:
         """(n + 1, N) plays behind the filters that follow them, if there are any; remembered like the plays."""
-        filters = self._filters
-        if not filters:
+        if self._needed == _MOVED:
             return self._plays(item)
-        by = (self._moving, self._bending, filters)
-        rows = item.recalled(by)
+        by = (self._moving, self._bending, self._filters, self._needed == _FILTERED)
+        rows = item.moved.recalled(by)
         if rows is None:
             rows = self._plays(item)
-            for effect in filters:
+            for effect in self._filters:
                 rows = effect.filtered(rows, item.run)
-            item.remember(by, rows)
+            if self._needed == _FILTERED:
+                rows = np.ascontiguousarray(rows[:, item.compared])
+            item.moved.remember(by, rows)
         return rows
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
@@ -247,7 +277,7 @@ class Actuator:
             if by not in sums:
                 sums[by] = effect.filtered(total, item.run)
             total = sums[by]
-        return total
+        return total[item.compared] if self._needed == _FILTERED else total
 
     @cached_property
     def _filters(self) -> tuple[Effect, ...]:
@@ -255,27 +285,40 @@ class Actuator:
         return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
 
     def _plays(self, item: Item) -> Array:
-        """(n + 1, N) plays along the record; those of the last few hypotheses are remembered."""
-        found = item.recalled((self._moving, self._bending))
-        if found is not None:
-            return found
-        plays = item.recalled((self._moving, ()))
-        if plays is None:
-            plays = chain.moved(self.at(Place.PLAYS), *self._input(item))
-            item.remember((self._moving, ()), plays)
-        if self._bending:
-            plays = chain.bent(self._bending, plays, self.thresholds)
-            item.remember((self._moving, self._bending), plays)
-        return plays
+        """(n + 1, N) plays behind what bends them; those of the last few hypotheses are remembered."""
+        if not self._bending:
+            return self._moved(item)
+        by = (self._moving, self._bending, self._needed == _MOVED)
+        rows = item.moved.recalled(by)
+        if rows is None:
+            rows = chain.bent(self._bending, self._moved(item), self.thresholds)
+            item.moved.remember(by, rows)
+        return rows
+
+    def _moved(self, item: Item) -> Array:
+        """(n + 1, N) the plays before they are bent, remembered too."""
+        by = (self._moving, (), self._needed == _MOVED)
+        rows = item.moved.recalled(by)
+        if rows is None:
+            rows = chain.moved(self.at(Place.PLAYS), *self._input(item))
+            if self._needed == _MOVED:
+                rows = np.ascontiguousarray(rows[:, item.compared])
+            item.moved.remember(by, rows)
+        return rows
 
     def _summed(self, item: Item, p: Array) -> Array:
-        """(N,) weighted sum of the plays; those without a weight need not move for it."""
-        if not self._bending and item.recalled((self._moving, ())) is None:
-            return chain.summed(self.at(Place.PLAYS), p, *self._input(item))
-        moved = item.recalled((self._moving, self._bending))
-        if moved is None and (moved := item.recalled((self._moving, ()))) is not None:
-            return chain.bent_sum(self._bending, p, moved, self.thresholds)  # of numbers that are tried once
-        return p @ (self._plays(item) if moved is None else moved)
+        """(N,) weighted sum of the plays; those without a weight need not move for it.
+
+        The sum is the same to the last digit whether they are remembered or not: what a process remembers depends on
+        what it has tried before.
+        """
+        if self._bending:
+            return chain.bent_sum(self._bending, p, self._moved(item), self.thresholds)
+        rows = item.moved.recalled((self._moving, (), self._needed == _MOVED))
+        if rows is not None:
+            return operators.weighted_sum(p, rows)
+        total = chain.summed(self.at(Place.PLAYS), p, *self._input(item))
+        return total[item.compared] if self._needed == _MOVED else total
 
     @cached_property
     def _bending(self) -> tuple[Effect, ...]:
@@ -316,22 +359,21 @@ class Actuator:
         A sensor sees the responses to an unknown start state too, so they are part of it, and what is added at the very
         end is none of it: a curve about the wrong offset would be another one. `largest`: limits of their factors.
         """
-        known = item.compared
-        y = item.y - self.added(item)
-        free = self.nuisances(item)
+        y = item.y[item.compared] - self.added(item)
+        free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
         limits = np.full(len(free), np.inf) if largest is None else largest
         factors = np.zeros(len(free))
-        level = np.full(len(h), float(np.mean((y - h)[known])))
+        level = np.full(len(h), float(np.mean(y - self.compared(h, item))))
         step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
         for _ in range(SETTLED):
             bent = self.mapped(h, level, item)
             moved = (self.mapped(h, level + step, item) - bent) / step
-            if not np.any(moved[known]):
+            left, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
+            if not np.any(slopes[0]):
                 break
-            slopes = (free * moved)[:, known]
-            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ (y - bent)[known], rcond=1e-12)
+            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ left, rcond=1e-12)
             if np.any(np.abs(factors + change) > limits):
-                change = _within(slopes.T, (y - bent)[known], -limits - factors, limits - factors)
+                change = _within(slopes.T, left, -limits - factors, limits - factors)
             factors += change
             shift = change @ free
             level = level + shift
@@ -340,11 +382,11 @@ class Actuator:
         return level, moved
 
     def added(self, item: Item) -> Array:
-        """What is added at the very end."""
+        """What is added at the very end, of the samples that are compared."""
         total = np.zeros(len(item.run.t))
         for effect in self.at(Place.ADDED):
             total = total + effect.added(item.run)
-        return total
+        return total[item.compared]
 
     @property
     def bends(self) -> bool:
@@ -352,14 +394,19 @@ class Actuator:
         return any(effect.place is Place.OUTPUT for effect in self.effects)
 
     def nuisances(self, item: Item, offset: Array | None = None) -> Array:
-        """(k, N) what is free in every record: its offset, and responses to an unknown start state.
+        """(k, N) what is free in every record, of the compared samples: its offset, responses to an unknown start.
 
         `offset`: what the offset does to the output, where a map lies between them.
         """
+        free = self._free(item)[:, item.compared]
+        return free if offset is None else free * offset
+
+    def _free(self, item: Item) -> Array:
+        """The same of all samples."""
         free = [np.ones((1, len(item.run.t)))]
         if item.history is None:
             free += [found for effect in self.effects if len(found := effect.transients(item.run))]
-        return np.concatenate(free) if offset is None else np.concatenate(free) * offset
+        return np.concatenate(free)
 
     def largest(self, item: Item, p: Array) -> Array:
         """(k,) how large the factors of `nuisances` may be: an effect of little weight has little left from a start."""
@@ -374,18 +421,31 @@ class Actuator:
 
         `like`: another model whose `nuisances` are free in place of its own, to compare the two on equal terms.
         """
-        rows, constant = self.columns(item, p)
-        h = rows[0] + constant
-        offset = None
-        if self.bends:
-            level, offset = self.level(h, item, self.largest(item, p))
-            h = self.mapped(h, level, item)
-        e = item.y - h - self.added(item)
-        known = np.isfinite(e)
+        left, offset = self._left(item, p)
+        known = np.isfinite(left)
         free = (self.nuisances(item, offset) if like is None else like.actuator.nuisances(item))[:, known].T
         largest = self.largest(item, p) if like is None else like.actuator.largest(item, like.weights)
-        e[known] -= free @ _within(free, e[known], -largest, largest)
-        return np.asarray(e)
+        e = np.full(len(left), np.nan)
+        e[known] = left[known] - free @ _within(free, left[known], -largest, largest)
+        whole = np.full(len(item.y), np.nan)
+        whole[item.compared] = e
+        return whole
+
+    def _left(self, item: Item, p: Array) -> Array:
+        """(2, N) of the compared samples: what is left before anything is fitted, and how the offset changes it."""
+        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
+        by = (self.thresholds.tobytes(), self.stages, effects, p.tobytes())
+        found = item.left.recalled(by)
+        if found is None:
+            rows, constant = self.columns(item, p)
+            h, moved = rows[0] + constant, np.ones(rows.shape[1])
+            if self.bends:
+                level, moved = self.level(h, item, self.largest(item, p))
+                h = self.mapped(h, level, item)
+            left = item.y[item.compared] - self.compared(h, item) - self.added(item)
+            found = np.stack([left, self.compared(moved, item)])
+            item.left.remember(by, found)
+        return found
 
 
 def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
@@ -411,24 +471,25 @@ class _Block:
     def __init__(self, here: Actuator, item: Item, p: Array) -> None:
         self._item, self._p = item, p
         self._level = np.zeros(1)
-        at, offset = item.compared, None
+        offset = None
+        rows, constant = here.columns(item)
+        h = operators.weighted_sum(p, rows) + constant
+        measured = item.y[item.compared]
         if here.bends:
-            rows, constant = here.columns(item)
-            h = p @ rows + constant
-            self._level, offset = here.level(h, item)
+            self._level, moved = here.level(h, item)
+            offset = here.compared(moved, item)
             bent = here.mapped(h, self._level, item)
             step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
-            rows = rows[:, at] * ((here.mapped(h + step, self._level, item) - bent) / step)[at]
-            h = bent[at]
-            target = item.y[at] - h + p @ rows
+            slope = (here.mapped(h + step, self._level, item) - bent) / step
+            rows = here.compared(rows * slope, item)
+            h = here.compared(bent, item)
+            target = measured - h + p @ rows
         else:
-            rows, constant = here.columns(item, at=at)
-            h = p @ rows + constant
-            target = item.y[at] - constant
-        added = here.added(item)[at]
+            target = measured - constant
+        added = here.added(item)
         self._sum = h + added
         self.samples = len(h)
-        free = here.nuisances(item, offset)[:, at]
+        free = here.nuisances(item, offset)
         self._free = len(free)
         table = np.empty((len(free) + len(rows) + 1, len(h))).T
         table[:, : len(free)] = free.T
@@ -455,14 +516,11 @@ class _Block:
 
     def _of(self, other: Actuator, sums: Sums) -> Array:
         """What other numbers predict, with the same weights and offset."""
-        item, at = self._item, self._item.compared
+        rows, constant = other.columns(self._item, self._p, sums)
+        moved = rows[0] + constant
         if other.bends:
-            rows, constant = other.columns(item, self._p, sums=sums)
-            moved = other.mapped(rows[0] + constant, self._level, item)[at]
-        else:
-            rows, constant = other.columns(item, self._p, at, sums)
-            moved = rows[0] + constant
-        return moved + other.added(item)[at]
+            moved = other.compared(other.mapped(moved, self._level, self._item), self._item)
+        return np.asarray(moved + other.added(self._item))
 
     def _without_free(self, triangles: Sequence[Array]) -> Array:
         whole = triangles[0] if len(triangles) == 1 else reduction.triangle(*triangles)

@@ -67,7 +67,16 @@ class Run:
 
     def factors(self, time_constant: float) -> Array:
         """`decays` of the steps and a time constant, (3, N - 1)."""
-        return self.remembered(time_constant, lambda: np.stack(decays(self.steps, time_constant)))
+        return self.remembered(time_constant, lambda: self.of_steps(lambda s: np.stack(decays(s, time_constant))))
+
+    def of_steps(self, make: Callable[[Array], Array]) -> Array:
+        """What is made of each step by itself, (k, N - 1); for steps that are equal it is made once."""
+        steps, place = self._different
+        return make(steps).take(place, axis=1) if len(steps) < len(place) // 2 else make(self.steps)
+
+    @cached_property
+    def _different(self) -> tuple[Array, NDArray[np.intp]]:
+        return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:
         """What is made of the steps and of some numbers; a search comes back to most of them."""
@@ -149,6 +158,8 @@ class Effect(BaseModel):
     """whether a model may have several of this name"""
     timed: ClassVar[bool] = True
     """whether the times of the samples matter"""
+    pointwise: ClassVar[bool] = False
+    """whether `bent` or `mapped` makes of a sample what depends on that sample alone, and needs nothing of the run"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
     hint: ClassVar[str] = ""

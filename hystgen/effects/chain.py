@@ -207,7 +207,7 @@ def summed(effects: Sequence[Effect], p: Array, w: Array, run: Run, thresholds: 
     if mover is None:
         return operators.play_sum(w, thresholds, start, p)
     if type(mover).summed is Effect.summed:
-        return np.asarray(p @ moved(effects, w, run, thresholds, start))
+        return operators.weighted_sum(p, moved(effects, w, run, thresholds, start))
     return mover.summed(p, w, run, thresholds, start)
 
 

@@ -29,6 +29,7 @@ class _Noncongruent(Effect):
     place: ClassVar[Place] = Place.PLAYS
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
+    pointwise: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "a monotone scalar equation, solved every sample"
 

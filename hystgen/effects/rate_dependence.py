@@ -42,9 +42,10 @@ class _RateDependence(Effect):
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """The sum of those that have a weight."""
         chosen = 1 + np.flatnonzero(p[1:])
-        rows = np.empty((len(chosen), len(w)))
-        self.follow(chosen, w, run, thresholds, start, rows)
-        return np.asarray(p[0] * w + p[chosen] @ rows)
+        rows = np.empty((1 + len(chosen), len(w)))
+        rows[0] = w
+        self.follow(chosen, w, run, thresholds, start, rows[1:])
+        return operators.weighted_sum(np.append(p[0], p[chosen]), rows)
 
 
 class ThresholdRate(_RateDependence):

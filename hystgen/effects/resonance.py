@@ -61,7 +61,7 @@ class Resonance(Effect):
         """The play sum as the mode passes it on."""
         rows = np.ascontiguousarray(np.atleast_2d(h))
         out = np.empty_like(rows)
-        factors = run.remembered((self.frequency, self.damping), lambda: self._forced(run.steps))
+        factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self._forced))
         for row, answer in zip(rows, out, strict=True):
             code().ring(row, *factors, self.damping, answer)
         return out.reshape(np.shape(h))

@@ -28,6 +28,7 @@ class SensorPolynomial(Effect):
     place: ClassVar[Place] = Place.OUTPUT
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
+    pointwise: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "none needed"
     compensation: ClassVar[str] = "corrected in the data, never inverted in the drive"
 

@@ -98,7 +98,7 @@ class _OwnHeat(_Thermal):
         return run.remembered((type(self), self.remembered_by()), lambda: self._rise(run))
 
     def _rise(self, run: Run) -> Array:
-        decay, kept, none = _kept(run.steps / self.time_constant)
+        decay, kept, none = run.of_steps(lambda steps: _kept(steps / self.time_constant))
         out = np.empty(len(run.t))
         code().follow(np.append(self.heat(run), 0.0), decay, kept, none, 0.0, out)
         return out
