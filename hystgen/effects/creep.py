@@ -19,6 +19,8 @@ FASTEST = 0.01
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.1
 """Largest shares that are tried: stages creep by 1 to 2 % a decade, and up to three times as much."""
 
+LOGARITHMIC = "creep, logarithmic"
+
 PER_DECADE = 2
 """States a decade of a logarithmic spectrum; their ripple on the straight line over log t is 0.1 % of its slope."""
 
@@ -81,7 +83,7 @@ class ExponentialCreep(_Creep):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One, two and three states; time constants from a few samples to beyond the session, weights to 10 %."""
+        """One state, two, and three where two help; time constants from a few samples to beyond the session."""
         low, high = span(max(4.0 * about.sample_time, FASTEST), 3.0 * about.session)
 
         def build(x: Array) -> ExponentialCreep:
@@ -92,7 +94,7 @@ class ExponentialCreep(_Creep):
                 weights=tuple((0.1 * x[half:]).tolist()),
             )
 
-        found = []
+        found: list[Candidate] = []
         for n in (1, 2, 3):
             places = low + (high - low) * (np.arange(n) + 0.5) / n
             found.append(
@@ -103,6 +105,7 @@ class ExponentialCreep(_Creep):
                     np.concatenate([places, np.full(n, 0.1)]),
                     build,
                     np.concatenate([places, np.zeros(n)]),
+                    beyond=found[1].label if n == 3 else "",
                 )
             )
         return found
@@ -155,7 +158,7 @@ class LogarithmicCreep(_Creep):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The share a decade over the whole recorded time, then with free ends of the spectrum."""
+        """The share a decade over the whole recorded time; where it helps, with free ends of the spectrum."""
         low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
         # A longer spectrum only changes the gain, which the weights of the plays take up
@@ -176,12 +179,13 @@ class LogarithmicCreep(_Creep):
         wide = high - low
         return [
             Candidate(
-                "creep, logarithmic", np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1)
+                LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1)
             ),
             Candidate(
                 "creep, logarithmic, free ends",
                 np.array([0.0, low, min(0.3, wide)]), np.array([MOST_A_DECADE / 0.1, high - 0.3, wide]),
                 np.array([0.1, low, wide]), ended, np.array([0.0, low, wide]),
+                beyond=LOGARITHMIC,
             ),
         ]  # fmt: skip
 

@@ -111,10 +111,10 @@ class PlayFunctions(_Noncongruent):
         return [
             candidate("noncongruent, parabola", 1, even),
             candidate(CUBIC, 2, even),
-            candidate("noncongruent, cubic over r", 2, 1.0 - share, share),
             candidate(
-                "noncongruent, quartic", 3, even, beyond=CUBIC, grown=lambda x: np.append(x, 0.0)
+                "noncongruent, cubic over r", 2, 1.0 - share, share, beyond=CUBIC, grown=lambda x: np.tile(x, 2)
             ),
+            candidate("noncongruent, quartic", 3, even, beyond=CUBIC, grown=lambda x: np.append(x, 0.0)),
         ]
 
 
