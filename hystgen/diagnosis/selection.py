@@ -22,8 +22,8 @@ from hystgen.identification.uncertainty import correlation_time
 
 Array = NDArray[np.float64]
 
-SCREENED = 12_000
-"""Samples compared while the many shapes are told apart."""
+SCREENED = 8_000
+"""Most samples compared while the many shapes are told apart, each so many-th of all; all run through the actuator."""
 
 FIRST_STEPS, SCREENING_STEPS = 2, 2
 """Steps of a search from each start, and then from the best one, while the shapes are told apart."""
@@ -52,6 +52,9 @@ The minimum of a light damping is so narrow that the first steps do not reach it
 
 KEPT, ALSO = 5, 2
 """Shapes that are followed up after the screening: the best on held-out records, and others that fit best."""
+
+PROMISING = 2.0
+"""A shape that leaves so many times what the best one leaves, fitted and held out, is not searched jointly."""
 
 JOINT_STEPS, HOPEFUL = 5, 1.3
 """Steps of a joint search after which those further behind the best on held-out records go on no more."""
@@ -224,7 +227,7 @@ def select(
 ) -> Outcome:
     """Add effects to the refitted model as long as one qualifies."""
     now = refitted
-    every = max(1, sum(int(np.count_nonzero(item.known)) for item in to_fit) // SCREENED)
+    every = -(-sum(int(np.count_nonzero(item.known)) for item in to_fit) // SCREENED)
     records = _Records(
         to_fit,
         held,
@@ -426,7 +429,7 @@ def _no_worse(left: float, least: float, noise: float) -> bool:
     return _apart(left, least) < ABOVE_NOISE * max(noise, least)
 
 
-def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[tuple[Option, Fitted]]:
+def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[_Screened]:
     """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
 
     What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
@@ -476,7 +479,7 @@ def _screened(now: Fitted, records: _Records, found: Sequence[Option]) -> list[t
                 kept.append(each)
     contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
     kept += [each for each in contained if each not in kept]  # whether more numbers are worth it shows when all fit
-    return [(each.option, each.fitted) for each in kept]
+    return kept
 
 
 def _each(
@@ -503,15 +506,18 @@ def _each(
     ]
 
 
-def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _Records) -> list[Tried]:
+def _followed_up(now: Fitted, kept: Sequence[_Screened], records: _Records) -> list[Tried]:
     """The options fitted to everything and run over the held-out records, the best one first."""
-    whole = [option.structure for option, _ in kept]
+    whole = [each.option.structure for each in kept]
+    by_held_out = PROMISING * min((each.left for each in kept), default=0.0)
+    by_fit = PROMISING * min((each.fitted.rms for each in kept), default=0.0)
 
     def begin(k: int) -> Fitted:
-        option, screened = kept[k]
-        shape = option.joined(now, screened.shape)
-        search = fits.begun(option.structure, records.to_fit, shape, screened.weights)
-        return search.further(JOINT_STEPS, COARSE).found(screened.weights)
+        option, screened = kept[k].option, kept[k].fitted
+        structure, shape, p = option.structure, option.joined(now, screened.shape), screened.weights
+        search = fits.begun(structure, records.to_fit, shape, p)
+        promising = kept[k].left <= by_held_out or screened.rms <= by_fit
+        return (search.further(JOINT_STEPS, COARSE) if promising else search).found(p)
 
     def go_on(k: int) -> Fitted:
         fitted = begun[k].fitted
@@ -519,7 +525,7 @@ def _followed_up(now: Fitted, kept: Sequence[tuple[Option, Fitted]], records: _R
             return fitted
         return fits.fit(fitted.structure, records.to_fit, fitted.shape, fitted.weights)
 
-    followed = [option for option, _ in kept]
+    followed = [each.option for each in kept]
     begun = _each(followed, whole, begin, records.held, records)
     hopeful = HOPEFUL * min((each.left for each in begun), default=0.0)
     tried = []
