@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import parallel
+from hystgen import effects, parallel
 from hystgen.diagnosis import periodic, ranks
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
@@ -102,6 +102,9 @@ SIMPLER = 0.05
 
 FAR_LESS = 0.5
 """An error over fitted records is far less than another from this share of it on."""
+
+EQUAL = 0.005
+"""Errors that differ by less than this share are equal."""
 
 EXCHANGE = 0.05
 """Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
@@ -248,7 +251,7 @@ def select(
         if records.left(now) <= AT_FLOOR * noise:
             break
         step = _step(now, gap, records)
-        if latest is not None and step is not None and step.merit is None:
+        if latest is not None and step is not None:
             pair = _with_rival(latest, step, gap, records)
             if pair is not None:
                 other, step = pair
@@ -335,8 +338,8 @@ def _step(
 ) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
 
-    `start`: the same hypothesis with other numbers, from which extensions are sought. What explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is
-    the next one's turn.
+    `start`: the same hypothesis with other numbers, from which extensions are sought. What explains most may owe it to
+    what it leaves free in a record, and be good for nothing on equal terms; then it is the next one's turn.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
@@ -348,21 +351,29 @@ def _step(
     return _Step(now, tried, tried[0], None)
 
 
-def _with_rival(latest: _Step, failed: _Step, gap: float, records: _Records) -> tuple[_Step, _Step] | None:
+def _with_rival(latest: _Step, step: _Step, gap: float, records: _Records) -> tuple[_Step, _Step] | None:
     """The latest step with another of those that cannot be told from its best, and the step that this makes possible.
 
-    Where nothing more qualifies behind the one that was taken, it may have been the wrong one of several.
+    Which one of several it was shows beside the next effect: where nothing more qualifies behind the one that was
+    taken, or less, or no more by more numbers, it was the wrong one.
     """
     others = {each.name: each for each in reversed(_rivals(latest, records))}  # of each name the best one
     left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
-    enough = (1.0 - EXCHANGE) * records.left(failed.now)
-    labels = {label for each in failed.tried for label in (each.option.label, each.option.beyond)}
+    names = {each.name for each in step.tried}
+    pairs = []
     for first in _simplest_first(left, records):
         merit = _merit(latest.now, first, records)
-        step = _step(first.fitted, gap, records, lambda option: option.label in labels) if merit is not None else None
-        if step is not None and step.merit is not None and step.best.held_out <= enough:
-            return replace(latest, best=first, merit=merit), step
-    return None
+        then = _step(first.fitted, gap, records, lambda option: option.name in names) if merit is not None else None
+        if then is not None and then.merit is not None:
+            pairs.append((replace(latest, best=first, merit=merit), then))
+    if step.merit is None:
+        enough = (1.0 - EXCHANGE) * records.left(step.now)
+        return next((pair for pair in pairs if pair[1].best.held_out <= enough), None)
+    every = [*pairs, (latest, step)]
+    enough = (1.0 + SIMPLER) * min(then.best.held_out for _, then in every)
+    good = [pair for pair in every if pair[1].best.held_out <= enough]
+    chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))
+    return None if chosen[1] is step else chosen
 
 
 def _together(failed: _Step, gap: float, records: _Records) -> tuple[Found, _Step] | None:
@@ -548,7 +559,8 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
     About as good: where all leave the same free in every record, held-out records find them no worse, whatever more the
     best explains of those it was fitted to; or they find them alike within a few per cent, and fitted ones no worse, or
     by chance, or by less than an effect is where the best has come to the end of what one of its numbers may be.
-    Between equal numbers of numbers all records decide. What leaves far more of the fitted records than another is not
+    Between equal numbers of numbers all records decide, or the catalogue's order where they find hardly any difference:
+    a lag, which every amplifier has, before a delay. What leaves far more of the fitted records than another is not
     the best for a small lead on held-out ones, which may hold little more than what yet another effect leaves there.
     """
     if not tried:
@@ -578,7 +590,18 @@ def _simplest_first(tried: Sequence[Tried], records: _Records) -> list[Tried]:
             near.append((each.numbers(held), _everywhere(each, best, records), each))
         else:
             others.append(each)
-    return [*(each for *_, each in sorted(near, key=lambda one: one[:2])), *others]
+    least = {n: min(everywhere for number, everywhere, _ in near if number == n) for n, *_ in near}
+
+    def order(one: tuple[int, float, Tried]) -> tuple[int, float, int]:
+        number, everywhere, each = one
+        return number, max(everywhere, (1.0 + EQUAL) * least[number]), _place(each.name)
+
+    return [*(each for *_, each in sorted(near, key=order)), *others]
+
+
+def _place(name: str) -> int:
+    """Place in the catalogue, user's own effects behind it."""
+    return effects.CATALOGUE.index(name) if name in effects.CATALOGUE else len(effects.CATALOGUE)
 
 
 def _at_an_end(fitted: Fitted) -> bool:
@@ -623,7 +646,7 @@ def _exchanged(
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
-            if not _gives_way(now, step.best, records):
+            if not _gives_way(now, old.name, step.best, records):
                 if step.best.held_out <= (1.0 + UNSURE) * records.left(now):  # else it was not found again
                     alike = dict.fromkeys([other.name, *other.rivals])
                     found[k] = replace(old, rivals=tuple(name for name in alike if name != old.name))
@@ -638,12 +661,17 @@ def _exchanged(
     return now, found
 
 
-def _gives_way(now: Fitted, best: Tried, records: _Records) -> bool:
-    """Whether a hypothesis leaves so much more than another one, or no less on equal terms with more numbers."""
-    held, left = records.held, records.left(now)
+def _gives_way(now: Fitted, name: str, best: Tried, records: _Records) -> bool:
+    """Whether a hypothesis leaves so much more than another one, or no less on equal terms with more numbers.
+
+    Or as much with as many, where the catalogue has the other effect before that of this name.
+    """
+    held, left, fewer = records.held, records.left(now), _numbers(now, records.held) - best.numbers(records.held)
     if best.held_out <= (1.0 - EXCHANGE) * left:
         return True
-    return best.numbers(held) < _numbers(now, held) and fits.rms(best.fitted.errors(held, now)) <= left
+    if fewer == 0:
+        return best.held_out <= (1.0 + EQUAL) * left and _place(best.name) < _place(name)
+    return fewer > 0 and fits.rms(best.fitted.errors(held, now)) <= left
 
 
 def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: _Records) -> list[Found]:
@@ -681,7 +709,9 @@ def _without(now: Fitted, name: str, records: _Records) -> Fitted | None:
 def _left_as_it_is(now: Fitted, name: str, records: _Records) -> Fitted | None:
     """The hypothesis less one effect, the others' numbers unchanged."""
     smaller = _less(now, name)
-    return None if smaller is None else fits.begun(smaller[0], records.to_fit, smaller[1], now.weights).found(now.weights)
+    if smaller is None:
+        return None
+    return fits.begun(smaller[0], records.to_fit, smaller[1], now.weights).found(now.weights)
 
 
 def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:

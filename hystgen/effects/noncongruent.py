@@ -140,7 +140,7 @@ class LoopCentre(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Amplitude, centre in the middle half of the drive and beyond, width; where a cubic takes something away.
+        """Amplitude, centre within the drive, width; where a cubic takes something away.
 
         How a bump begins is read off the density that the cubic has: from far away no search finds its place.
         """
@@ -168,7 +168,7 @@ class LoopCentre(_Noncongruent):
 
         return [
             Candidate(
-                "noncongruent, loop centre", np.array([-0.9, -0.5, ends[0]]), np.array([3.0, 1.5, ends[1]]),
+                "noncongruent, loop centre", np.array([-0.9, 0.0, ends[0]]), np.array([3.0, 1.0, ends[1]]),
                 np.array([0.05, 0.5, start]), build, np.array([0.0, 0.5, start]), (), CUBIC, grown,
             )
         ]  # fmt: skip

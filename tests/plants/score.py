@@ -105,7 +105,8 @@ class Outcome:
     @property
     def refused(self) -> bool:
         """A record was refused as bad input, by its name; a wrong command line also exits 2."""
-        return self.run.get("exit") == 2 and re.search(r"\.csv\b.*: error: |error: .*\.csv: ", self.run.get("stderr", "")) is not None
+        said = re.search(r"\.csv\b.*: error: |error: .*\.csv: ", self.run.get("stderr", ""))
+        return self.run.get("exit") == 2 and said is not None
 
     @property
     def flagged(self) -> bool:
