@@ -354,8 +354,17 @@ class _Builder:
         own = error_bounds(self.cascade, "float64", "corners")
         return Fraction(own.forward), Fraction(own.inverse) if math.isfinite(own.inverse) else Fraction(0)
 
+    def _drive_short(self) -> Fraction:
+        """How far the first and last drive codes can be inside the ends of the range, in drive units."""
+        (first, last), (low, high) = self.drive, self.cascade.input_range
+        return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
+
     def _forward_error(self) -> float:
-        return _upward(self._sum_error() + Fraction(1, 2) + self._own_error()[0] / self.output_lsb)
+        # a code beyond the range is limited to the last code inside, where the exact model goes to the range's end
+        limited = Fraction(self.cascade.pi.slopes[-1]) * Fraction(self.cascade.front_slopes[1]) * self._drive_short()
+        return _upward(
+            self._sum_error() + Fraction(1, 2) + (limited + self._own_error()[0]) / self.output_lsb
+        )
 
     def _inverse_rounding(self) -> float | None:
         if not self.invertible:
@@ -371,17 +380,13 @@ class _Builder:
         elif self.fine == 0:
             code = Fraction(0)
         outer = Fraction(pi.slopes[-1])
-        drive_short = max(
-            Fraction(c.input_range[1]) - self.drive[1] * self.drive_lsb,
-            self.drive[0] * self.drive_lsb - Fraction(c.input_range[0]),
-        )
         output_short = max(
             Fraction(c.output_range[1]) - self.output[1] * self.output_lsb,
             self.output[0] * self.output_lsb - Fraction(c.output_range[0]),
         )
         residual = (
             self._sum_error() * self.output_lsb
-            + outer * (solved + steepest * (code * self.drive_lsb + drive_short))
+            + outer * (solved + steepest * (code * self.drive_lsb + self._drive_short()))
             + output_short
         )
         gain = (2 / Fraction(pi.weights[0]) - 1 / outer) / flattest
