@@ -13,9 +13,10 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen import reference, tables
+from hystgen import fixed, reference, tables
 from hystgen.api import Model
 from hystgen.emission import module
+from hystgen.fixed import FixedTables
 from hystgen.params import parse_parameters
 from hystgen.verification import compilers, signals
 
@@ -70,6 +71,30 @@ def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., N
     report = hystgen.verify(model("plain"), operator="both", engine="loop", compiler=["gcc"], length=3000)
     assert not report.ok
     assert any(row.different for row in report.rows)
+
+
+@pytest.mark.parametrize("curve", ["front", "back"])
+def test_a_changed_entry_that_a_single_code_reads_is_found(curve: str, changed_c: Callable[..., None]) -> None:
+    """Beside a break of a dead zone a piece of a curve is one code long, which no random record comes to."""
+    bent = model("bent")
+    numbers = bent.tables("q31", "corners")
+    assert isinstance(numbers, FixedTables)
+    which = fixed.FORWARD if curve == "front" else fixed.INVERSE
+    pieces = slice(int(numbers.first[which]), int(numbers.first[which] + numbers.pieces[which]))
+    single = [int(c[0]) for c in numbers.coefficient[pieces][np.diff(numbers.knot[pieces], append=2**31) == 1]]
+    assert len(single) == 4
+
+    def change(text: str) -> str:
+        found = re.search(rf"bent_{curve}_coefficient.*?;", text, flags=re.DOTALL)
+        if found is None:  # the self-test
+            return text
+        return text.replace(found[0], re.sub(rf"(?<!\d){single[1]}(?!\d)", str(single[1] + 2**20), found[0]))
+
+    changed_c(change)
+    report = hystgen.verify(bent, arithmetic="q31", operator="both", engine="corners", compiler=["gcc"], length=20_000)
+    assert {row.operator for row in report.rows if row.different} == {
+        "inverse", *(["forward"] if curve == "front" else [])
+    }  # fmt: skip
 
 
 def test_the_reports_say_what_failed(changed_c: Callable[..., None]) -> None:

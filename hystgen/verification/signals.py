@@ -71,6 +71,38 @@ def _coincidences(
     return op, np.where(op == reference.OP_COMMIT, rng.choice(drive, length), asked)
 
 
+def _bends(tables: reference.Tables | FixedTables) -> NDArray[np.float64]:
+    """Drives at which another piece of the memoryless part begins."""
+    if not isinstance(tables, FixedTables):
+        bent = len(tables.stage_kind) > 0 and tables.stage_kind[0] == reference.DEAD_ZONE
+        return np.array(tables.stage_data[: tables.stage_size[0] if bent else 0], dtype=float)
+    back = compiled.reference(tables).front_inverse
+    found: list[float] = []
+    for which, (first, count) in enumerate(zip(tables.first, tables.pieces, strict=True)):
+        knots = tables.knot[first : first + count]
+        branch = fixed.INVERSE + 1 - which
+        found += knots.tolist() if which < fixed.INVERSE else [back(tables, w, branch)[0] for w in knots]
+    return np.array(found, dtype=float)
+
+
+def _onto_the_bends(
+    bends: NDArray[np.float64], least: Any, tables: reference.Tables | FixedTables, inverse: bool, length: int,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:  # fmt: skip
+    """Drives at bends of the memoryless part, or references that lead there, give or take last bits.
+
+    A piece between two bends can be as short as one code.
+    """
+    low, high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
+    drive: NDArray[np.float64] = rng.choice(bends, length)
+    drive = np.clip(drive + least(drive) * rng.integers(-1, 2, length), low, high)
+    if not inverse:
+        return drive
+    outputs: NDArray[np.float64] = compiled.answers(tables, False, _steps(drive), drive)[0].astype(float)
+    outputs += least(outputs) * rng.integers(-8, 9, length)
+    return outputs
+
+
 def suite(
     tables: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
 ) -> Iterator[Calls]:
@@ -122,10 +154,15 @@ def _suite(
     levels = (tables.start_level if inverse else tables.threshold)[1:].astype(float)
     if isinstance(tables, FixedTables):
         levels = levels / 2.0 ** int(tables.limits[fixed.FRACTION] if inverse else tables.limits[fixed.FINE])
+    bit = (lambda _: 1.0) if whole else (lambda at: np.spacing(np.abs(at).astype(real)))
     if len(levels) > 0:
-        bit = (lambda _: 1.0) if whole else (lambda at: np.spacing(real(abs(at))))
         yield record("onto the plays", _onto_the_plays(levels, bit, low, high, length, rng))
         yield "coincidences", *_coincidences(tables, inverse, low, high, length, np.random.default_rng(20220917))
+
+    bends = _bends(tables)
+    if len(bends) > 0:
+        generator = np.random.default_rng(20220918)
+        yield record("onto the bends", _onto_the_bends(bends, bit, tables, inverse, length, generator))
 
     if whole:
         most = float(np.iinfo(real_type).max)
