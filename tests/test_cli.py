@@ -101,6 +101,14 @@ def everything(folder: str | Path = ".") -> dict[str, bytes]:
     return {str(p.relative_to(root)): b"" if p.is_dir() else p.read_bytes() for p in sorted(root.rglob("*"))}
 
 
+def test_the_package_is_a_command_too() -> None:
+    for arguments, code, said in ((["--version"], 0, "hystgen, version"), (["emit"], 2, "Usage: hystgen emit")):
+        words = [sys.executable, "-m", "hystgen", *arguments]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        assert done.returncode == code
+        assert said in done.stdout + done.stderr
+
+
 # emit ----------------------------------------------------------------------------------------------------
 
 
