@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import functools
 import os
 import re
 import subprocess
@@ -142,6 +143,32 @@ def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_pat
                     symbols = subprocess.run(["nm", output], capture_output=True, text=True, check=True).stdout
                     kinds = {line.split()[-2] for line in symbols.splitlines()}
                     assert not kinds & {"U", "D", "d", "B", "b"}, symbols
+
+
+@pytest.mark.parametrize("layout", ["self-contained", "shared-runtime"])
+@pytest.mark.parametrize("flags", [
+    "-Ofast", "-ffast-math", "-ffinite-math-only", "-funsafe-math-optimizations",
+    "-fassociative-math -fno-signed-zeros -fno-trapping-math",
+])  # fmt: skip
+def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path: Path) -> None:
+    """At compile time, but that clang keeps reordering to itself; whole numbers do not mind."""
+    for arithmetic in ("float32", "float64", "q31"):
+        folder = tmp_path / arithmetic
+        hystgen.emit(model("curved"), folder, operator="both", layout=layout, arithmetic=arithmetic, engine="corners")
+        for compiler in required_compilers():
+            if compiler.name == "zig":  # clang, for which -Ofast is another name of -O3
+                continue
+            told = compiler.name == "gcc" or not flags.startswith(("-funsafe", "-fassociative"))
+            for source in folder.glob("*.c"):
+                run = functools.partial(compiler.run, ["-c", *flags.split(), "-o", tmp_path / "one.o", source])
+                if arithmetic == "q31" or not told:
+                    run()
+                    continue
+                with pytest.raises(compilers.CompileError, match="build without -f"):
+                    run()
+    header = hystgen.api.emitted_files(model("curved"), arithmetic="float32")["curved.h"]
+    for words in ("flush denormal", "to nearest", "-fassociative-math", "-ffp-contract=fast"):
+        assert words in header
 
 
 @pytest.mark.parametrize("name", FILES)

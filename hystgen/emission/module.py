@@ -258,14 +258,15 @@ def _details(parameters: Parameters, cascade: Cascade, options: Options, values:
     model = f"{cascade.pi.n} plays" + (f" behind {', '.join(kinds)}" if kinds else "")
     estimate = cost.estimate(cascade, options, values.numbers, render("step.c.j2", values, tables=_tables(values)))
     rounding = "" if values.fixed else (
-        " Not for targets that flush denormal numbers to zero\n"
-        "or round other than to nearest: there the answers can differ from the reference in the last bits."
+        " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "
+        "reorder sums (-fassociative-math) or contract products whatever the source says (clang's "
+        "-ffp-contract=fast): there the answers can differ from the reference in the last bits."
     )
     single = f" Define {values.NAME}_IMPLEMENTATION in one C file before including this header."
     use = (
         "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
         f"the parameter file; reset starts again from plays at 0.{single if values.single_header else ''}{rounding}"
-    ).replace("\n", " ")
+    )
     return [
         "",
         *([about] if about else []),

@@ -15,7 +15,9 @@
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero
- * or round other than to nearest: there the answers can differ from the reference in the last bits.
+ * or round other than to nearest, nor for flags that reorder sums (-fassociative-math) or contract products
+ * whatever the source says (clang's -ffp-contract=fast): there the answers can differ from the reference in
+ * the last bits.
  */
 #ifndef PLAIN_H
 #define PLAIN_H
@@ -26,6 +28,9 @@
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "plain: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#endif
+#ifdef __ASSOCIATIVE_MATH__
+#error "plain: build without -fassociative-math, the order of additions is part of the answer"
 #endif
 #if FLT_MANT_DIG != 24
 #error "plain: float is not IEEE binary32 here"

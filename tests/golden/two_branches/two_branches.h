@@ -16,7 +16,8 @@
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Define TWO_BRANCHES_IMPLEMENTATION in one C file
  * before including this header. Not for targets that flush denormal numbers to zero or round other than to
- * nearest: there the answers can differ from the reference in the last bits.
+ * nearest, nor for flags that reorder sums (-fassociative-math) or contract products whatever the source says
+ * (clang's -ffp-contract=fast): there the answers can differ from the reference in the last bits.
  */
 #ifndef TWO_BRANCHES_H
 #define TWO_BRANCHES_H
@@ -28,6 +29,9 @@
 
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "two_branches: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#endif
+#ifdef __ASSOCIATIVE_MATH__
+#error "two_branches: build without -fassociative-math, the order of additions is part of the answer"
 #endif
 #if FLT_MANT_DIG != 24
 #error "two_branches: float is not IEEE binary32 here"
