@@ -37,7 +37,7 @@ class _Failed(click.ClickException):
 def _shown(path: str, action: Callable[[], Any]) -> Any:
     """Run `action` and turn what it may raise into a message and an exit code."""
     from hystgen.models import NotInvertibleError
-    from hystgen.params import ParameterError
+    from hystgen.params import ParameterError, located
     from hystgen.problems import PlanError, RecordError, UnsupportedEffectsError
     from hystgen.tables import FormatError
 
@@ -55,7 +55,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     except UnsupportedEffectsError as error:
         raise _Failed(f"{path}: error: {error}", 1) from None
     except FormatError as error:
-        raise _Failed(f"{path}: error: {error}", 2) from None
+        raise _Failed(str(located(path, error.problems)), 2) from None
     except (ValueError, OSError) as error:
         raise _Failed(f"error: {error}", 2) from None
 

@@ -29,6 +29,7 @@ from hystgen import fixed, reference
 from hystgen.bounds import error_bounds
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade, DeadZone, TanhEnvelope
+from hystgen.problems import Path
 from hystgen.tables import FormatError
 
 CODE_BITS = {"q31": 31, "q15": 15}
@@ -84,27 +85,29 @@ def lsbs(
     Raises FormatError for one that is too small.
     """
     code_max = 2 ** CODE_BITS[arithmetic] - 1
-    return (
-        _lsb(drive_lsb, cascade.input_range, code_max, "input_range", "drive_lsb"),
-        _lsb(output_lsb, cascade.output_range, code_max, "the output range", "output_lsb"),
-    )
+    found, refused = [], []
+    for given, ends, what, key in (
+        (drive_lsb, cascade.input_range, "input_range", "drive_lsb"),
+        (output_lsb, cascade.output_range, "the output range", "output_lsb"),
+    ):
+        largest = max(abs(decimal(end)) for end in ends)
+        finest = largest / code_max
+        lsb = finest if given is None else decimal(given)
+        if lsb < finest:
+            refused.append((
+                ("emit", key),
+                f"{given:g} is too small: {what} reaches {float(largest):.6g}, which takes at least "
+                f"{float(finest):.6g}; raise it or leave it out",
+            ))
+        found.append(lsb)
+    if refused:
+        raise FormatError(*refused)
+    return found[0], found[1]
 
 
 def decimal(x: float) -> Fraction:
     """The number as it is written: 0.001 is a thousandth, which no double is."""
     return Fraction(repr(float(x)))
-
-
-def _lsb(given: float | None, ends: Sequence[float], code_max: int, what: str, key: str) -> Fraction:
-    largest = max(abs(decimal(end)) for end in ends)
-    if given is None:
-        return largest / code_max
-    if largest > decimal(given) * code_max:
-        raise FormatError(
-            f"emit.{key} {given:g} is too small: {what} reaches {float(largest):.6g}, which takes at least "
-            f"{float(largest / code_max):.6g}; raise it or leave it out"
-        )
-    return decimal(given)
 
 
 class _Builder:
@@ -117,6 +120,7 @@ class _Builder:
         self.code_max = 2 ** CODE_BITS[arithmetic] - 1
         self.drive_lsb, self.output_lsb = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
         self.invertible = not cascade.inverse_problems()
+        self.refused: list[tuple[Path, str]] = []
 
     def build(self) -> tuple[FixedTables, Format]:
         self._codes()
@@ -131,9 +135,12 @@ class _Builder:
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (Fraction(end) / self.output_lsb for end in self.cascade.output_range)
         self.output = (math.ceil(low), math.floor(high))
-        for ends, what in ((self.drive, "emit.drive_lsb"), (self.output, "emit.output_lsb")):
-            if ends[1] - ends[0] < 2:
-                raise FormatError(f"{what} leaves {ends[1] - ends[0] + 1} codes in range; make it smaller")
+        for (first, last), key in ((self.drive, "drive_lsb"), (self.output, "output_lsb")):
+            if last - first < 2:
+                left = max(last - first + 1, 0)
+                self.refused.append((("emit", key), f"leaves {left} codes in range; make it smaller"))
+        if self.refused:
+            raise FormatError(*self.refused)
 
     # ------------------------------------------------------------ the input of the plays
 
@@ -156,18 +163,20 @@ class _Builder:
         cap = math.floor(span / self.step) + 8  # no play moves that far: one this wide never does
         self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
         if cap > TABLE_MAX:
-            needed = next((r for r, t in zip(pi.thresholds, self.threshold, strict=True) if t > TABLE_MAX), None)
+            needed = next((i for i, t in enumerate(self.threshold) if t > TABLE_MAX), None)
             if needed is not None:
-                raise FormatError(f"threshold {needed:g} does not fit {self.arithmetic}; use a larger emit.drive_lsb")
+                message = f"{pi.thresholds[needed]:g} does not fit {self.arithmetic}; use a larger emit.drive_lsb"
+                raise FormatError((("model", "pi", "thresholds", needed), message))
         narrow = self.drive_lsb * Fraction(c.front_slopes[0]) if c.stages and self.invertible else self.drive_lsb
         for i, (a, b) in enumerate(itertools.pairwise(self.threshold), 1):
             if b < cap and (a == b or Fraction(pi.thresholds[i]) < (narrow if not c.stages else self.step)):
-                raise FormatError(
-                    f"thresholds[{i}] {pi.thresholds[i]:g} is "
+                self.refused.append((
+                    ("model", "pi", "thresholds", i),
+                    f"{pi.thresholds[i]:g} is "
                     + (f"not above thresholds[{i - 1}]" if i > 1 and a == b else "narrower than one code")
                     + f" in {self.arithmetic} with {float(self.drive_lsb):.6g} a drive code; "
-                    "use a smaller emit.drive_lsb, a finer arithmetic, or leave this play out"
-                )
+                    "use a smaller emit.drive_lsb, a finer arithmetic, or leave this play out",
+                ))
         states = [nearest(Fraction(s) / self.step) for s in pi.start]
         for i in range(2, len(states)):
             room = self.threshold[i] - self.threshold[i - 1]
@@ -175,7 +184,11 @@ class _Builder:
         if len(states) > 1:
             states[0] = states[1]
         if max(map(abs, states)) > TABLE_MAX:
-            raise FormatError(f"initial_state reaches {max(map(abs, pi.start)):g}, beyond {self.arithmetic}")
+            message = (
+                f"reaches {max(map(abs, pi.start)):g}, beyond {self.arithmetic}; start nearer to the range, use a "
+                "larger emit.drive_lsb or float32"
+            )
+            raise FormatError((("model", "pi", "initial_state"), message))
         self.start = states
         self._curves()
 
@@ -234,11 +247,13 @@ class _Builder:
         travel = self.play[1] - self.play[0]
         for i, g in enumerate(gain):
             if g > 0 and g * travel < Fraction(1, 2):
-                raise FormatError(
-                    f"weights[{i}] {pi.weights[i]:g} moves the output by less than half a code of "
-                    f"{float(self.output_lsb):.6g}; leave the play out, use a smaller emit.output_lsb or a finer "
-                    "arithmetic"
-                )
+                self.refused.append((
+                    ("model", "pi", "weights", i),
+                    f"{pi.weights[i]:g} moves the output by less than half a code of {float(self.output_lsb):.6g}; "
+                    "leave the play out, use a smaller emit.output_lsb or a finer arithmetic",
+                ))
+        if self.refused:
+            raise FormatError(*self.refused)
         for bits in range(56, 0, -1):
             slope = [nearest(s * 2**bits) for s in sums]
             weight = [b - a for a, b in itertools.pairwise(slope)]
@@ -248,14 +263,13 @@ class _Builder:
             if slope[-1] <= TABLE_MAX and bound < 2**SUM_BITS:
                 break
         else:
-            raise FormatError(f"the sums of the model do not fit {self.arithmetic}; use a larger emit.output_lsb")
+            message = f"the sums of the model do not fit {self.arithmetic}; use a larger one"
+            raise FormatError((("emit", "output_lsb"), message))
         self.bits, self.slope, self.weight, self.lift, self.bound = bits, slope, weight, lift, bound
         self.offset = nearest(offset * 2**bits)
         if min(weight) < 0 or (self.invertible and slope[1] < 16):
-            raise FormatError(
-                f"weights[0] {pi.weights[0]:g} rounds to nothing beside the others in {self.arithmetic}; "
-                "use a finer arithmetic"
-            )
+            message = f"{pi.weights[0]:g} rounds to nothing beside the others in {self.arithmetic}"
+            raise FormatError((("model", "pi", "weights", 0), message + "; use a finer arithmetic"))
         self.slope_errors = [abs(Fraction(k, 2**bits) - s) for k, s in zip(slope, sums, strict=True)]
         self.offset_error = abs(Fraction(self.offset, 2**bits) - offset)
         self.reciprocal, self.shift = [0], [1]
@@ -513,10 +527,8 @@ class _Curve:
             piece, miss = self._fit(a, b)
             if b - a > 1 and (miss > allowed or max(map(abs, piece.coefficients)) > TABLE_MAX):
                 if len(self.pieces) + len(todo) > MOST_PIECES:
-                    raise FormatError(
-                        "the memoryless part bends too sharply for fixed point over input_range; narrow the range "
-                        "or use float32"
-                    )
+                    message = "bends too sharply for fixed point over input_range; narrow the range or use float32"
+                    raise FormatError((("model", "memoryless"), message))
                 middle = (a + b) // 2
                 todo += [(middle, b), (a, middle)]
                 continue

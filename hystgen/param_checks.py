@@ -116,11 +116,7 @@ class _Checker:
 
     def add(self, path: Path, message: str, at_key: bool = False) -> None:
         """Note a problem of the value (or key) at `path`; where there is none, at what should hold it."""
-        line = column = None
-        if self.document:
-            places = self.document.keys if at_key else self.document.values
-            held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
-            line, column = places.get(held) or self.document.values[held]
+        line, column = self.document.position(path, at_key) if self.document else (None, None)
         self.problems.append(Problem(path_text(path), message, line, column))
 
     def _mark(self, path: Path) -> None:

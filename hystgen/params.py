@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from hystgen.param_models import (
     Units,
     schema,
 )
-from hystgen.problems import ParameterError, Problem
+from hystgen.problems import ParameterError, Path, Problem, path_text
 from hystgen.yaml_positions import MAX_BYTES, read, resolve
 
 if TYPE_CHECKING:
@@ -54,6 +54,7 @@ __all__ = [
     "comment_text",
     "dump_parameters",
     "load_parameters",
+    "located",
     "make_parameters",
     "name_problem",
     "parameters_sha256",
@@ -70,6 +71,22 @@ def load_parameters(path: str | os.PathLike[str], user_effects: Sequence[type[Ef
     Raises ParameterError with every problem and its position; also when the file cannot be read.
     """
     file = os.fspath(path)
+    return parse_parameters(_text(file), file, user_effects)
+
+
+def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) -> ParameterError:
+    """What turned out to be wrong with values of a file that was read before, at their positions in it."""
+    file = os.fspath(path)
+    try:
+        document = read(_text(file).removeprefix("\ufeff"))
+    except ParameterError:  # gone since
+        return ParameterError(file, [Problem(path_text(place), message) for place, message in problems])
+    found = [Problem(path_text(at), message, *(document.position(at) if at else ())) for at, message in problems]
+    return ParameterError(file, found)
+
+
+def _text(file: str) -> str:
+    """The text of a parameter file. Raises ParameterError."""
     try:
         with open(file, "rb") as stream:
             content = stream.read(MAX_BYTES + 1)
@@ -80,13 +97,12 @@ def load_parameters(path: str | os.PathLike[str], user_effects: Sequence[type[Ef
     if len(content) > MAX_BYTES:
         raise _too_large(size if size > MAX_BYTES else None, file)
     try:
-        text = content.decode("utf-8")
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
         before = content[: error.start].decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
         message = f"byte 0x{content[error.start]:02X} is not UTF-8; save the file as UTF-8"
         raise ParameterError(file, [Problem("", message, line, column)]) from None
-    return parse_parameters(text, file, user_effects)
 
 
 def parse_parameters(text: str, file: str = "<string>", user_effects: Sequence[type[Effect]] = ()) -> Parameters:

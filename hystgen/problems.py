@@ -25,10 +25,15 @@ class Problem:
     line: int | None = None
     column: int | None = None
 
+    @property
+    def named(self) -> str:
+        """`PATH: MESSAGE`."""
+        return f"{self.path}{': ' if self.path else ''}{self.message}"
+
     def text(self, file: str) -> str:
         """The line printed for this problem: `FILE:LINE:COL: error: PATH: MESSAGE`."""
         place = file if self.line is None else f"{file}:{self.line}:{self.column}"
-        return f"{place}: error: {self.path}{': ' if self.path else ''}{self.message}"
+        return f"{place}: error: {self.named}"
 
 
 class ParameterError(ValueError):

@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from hystgen import kernels, reference
 from hystgen.bounds import error_bounds
 from hystgen.models import UNBOUNDED, Cascade, DeadZone, TanhEnvelope
+from hystgen.problems import Path, Problem, path_text
 from hystgen.reference import Tables
 
 if TYPE_CHECKING:
@@ -31,7 +32,14 @@ FLOAT_ARITHMETICS = ("float32", "float64")
 
 
 class FormatError(ValueError):
-    """A model whose numbers do not fit the arithmetic."""
+    """A model whose numbers do not fit the arithmetic.
+
+    `problems`: where the value stands in a parameter file, `()` for none, and what is wrong; `str()` gives a line each.
+    """
+
+    def __init__(self, *problems: str | tuple[Path, str]) -> None:
+        self.problems = [((), problem) if isinstance(problem, str) else problem for problem in problems]
+        super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))
 
 
 def choose_engine(engine: str, cascade: Cascade, operator: str, arithmetic: str) -> str:
@@ -59,7 +67,7 @@ def choose_engine(engine: str, cascade: Cascade, operator: str, arithmetic: str)
 def _engine_costs() -> dict[tuple[str, str, str], dict[int, tuple[int, int]]]:
     """Instructions of a sample, loop and corners, by number of plays; for each operator, arithmetic and kind."""
     found: dict[tuple[str, str, str], dict[int, tuple[int, int]]] = {}
-    with (Path(__file__).parent / "engine_costs.csv").open(encoding="ascii", newline="") as file:
+    with (FilePath(__file__).parent / "engine_costs.csv").open(encoding="ascii", newline="") as file:
         for row in csv.DictReader(file):
             about = (row["operator"], row["arithmetic"], row["kind"])
             found.setdefault(about, {})[int(row["n"])] = (int(row["loop"]), int(row["corners"]))

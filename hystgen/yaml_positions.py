@@ -64,6 +64,12 @@ class Document:
     poisoned: set[Path] = field(default_factory=set)
     complete: bool = False
 
+    def position(self, path: Path, at_key: bool = False) -> Position:
+        """Where the value (or key) at `path` stands; where there is none, what should hold it."""
+        places = self.keys if at_key else self.values
+        held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
+        return places.get(held) or self.values[held]
+
     def refuse(self, path: Path, position: Position, message: str) -> None:
         self.problems.append(Problem(path_text(path), message, *position))
 

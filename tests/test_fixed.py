@@ -204,11 +204,11 @@ def test_converter_formats_are_honoured() -> None:
 @pytest.mark.parametrize(
     ("arithmetic", "pi", "ends", "lsb", "message"),
     [
-        ("q15", ([0, 1], [1, 1]), (0, 100), (0.001, None), "emit.drive_lsb 0.001 is too small: input_range reaches"),
-        ("q15", ([0, 1], [1, 1]), (0, 100), (None, 1e-5), "emit.output_lsb 1e-05 is too small: the output range"),
-        ("q15", ([0, 0.001], [1, 1]), (0, 100), (None, None), "thresholds[1] 0.001 is narrower than one code in q15"),
-        ("q15", ([0, 1, 2], [1, 1e-7, 1]), (0, 100), (None, None), "weights[1] 1e-07 moves the output by less than"),
-        ("q15", ([0], [1]), (0, 100), (80, None), "emit.drive_lsb leaves 2 codes in range; make it smaller"),
+        ("q15", ([0, 1], [1, 1]), (0, 100), (0.001, None), "emit.drive_lsb: 0.001 is too small: input_range reaches"),
+        ("q15", ([0, 1], [1, 1]), (0, 100), (None, 1e-5), "emit.output_lsb: 1e-05 is too small: the output range"),
+        ("q15", ([0, 1e-3], [1, 1]), (0, 100), (None, None), "model.pi.thresholds[1]: 0.001 is narrower than one code"),
+        ("q15", ([0, 1, 2], [1, 1e-7, 1]), (0, 100), (None, None), "model.pi.weights[1]: 1e-07 moves the output by"),
+        ("q15", ([0], [1]), (0, 100), (80, None), "emit.drive_lsb: leaves 2 codes in range; make it smaller"),
     ],
 )
 def test_formats_that_cannot_be_are_refused(
@@ -219,6 +219,57 @@ def test_formats_that_cannot_be_are_refused(
     with pytest.raises(FormatError) as caught:
         fixed_tables.build(model, arithmetic, "corners", *lsb)
     assert str(caught.value).startswith(message)
+
+
+NARROW = """hystgen: 1
+name: narrow
+input_range: [0, 100]
+model:
+  pi:
+    thresholds: [0, 0.001, 0.002, 1]
+    weights: [1, 1, 1, 1e-7]
+emit: {arithmetic: q15}
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("", ""), [
+            "6:21: error: model.pi.thresholds[1]: 0.001 is narrower than one code in q15",
+            "6:28: error: model.pi.thresholds[2]: 0.002 is narrower than one code in q15",
+            "7:24: error: model.pi.weights[3]: 1e-07 moves the output by less than half a code",
+        ]),
+        (("q15", "q15, drive_lsb: 1e-5, output_lsb: 1e-6"), [
+            "8:36: error: emit.drive_lsb: 1e-05 is too small: input_range reaches 100",
+            "8:54: error: emit.output_lsb: 1e-06 is too small: the output range reaches 299.997",
+        ]),
+        (("q15", "q15, drive_lsb: 80, output_lsb: 300"), [
+            "8:36: error: emit.drive_lsb: leaves 2 codes in range",
+            "8:52: error: emit.output_lsb: leaves 1 codes in range",
+        ]),
+        (("thresholds: [0, 0.001, 0.002, 1]", "density: {formula: '1', p0: 1, r_max: 0.002, n: 2}"), [
+            "6:5: error: model.pi.thresholds[1]: 0.00", "6:5: error: model.pi.thresholds[2]: 0.00",
+        ]),
+    ],
+)  # fmt: skip
+def test_a_refused_format_says_where(tmp_path: Path, change: tuple[str, str], said: list[str]) -> None:
+    """Everything that can be found in one go, at its place in the file, and nothing written."""
+    text = NARROW.replace(*change)
+    if "density" in text:
+        text = text.replace("    weights: [1, 1, 1, 1e-7]\n", "")
+    file = tmp_path / "narrow.yaml"
+    file.write_text(text)
+    done = CliRunner().invoke(main, ["emit", str(file), "-o", str(tmp_path / "out")])
+    assert done.exit_code == 2, done.output
+    lines = done.stderr.splitlines()
+    assert len(lines) == len(said), done.stderr
+    for line, expected in zip(lines, said, strict=True):
+        assert line.startswith(f"{file}:{expected}"), line
+        assert "; " in line
+    assert not (tmp_path / "out").exists()
+    shown = CliRunner().invoke(main, ["show", str(file)])
+    assert all(expected.partition(" error: ")[2] in shown.stdout for expected in said), shown.stdout
 
 
 def test_simulating_takes_codes() -> None:

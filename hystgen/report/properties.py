@@ -99,7 +99,7 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
             engine = model.engine(arithmetic=arithmetic)
             form = fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]
         except FormatError as error:
-            lines.append(f"{arithmetic}                not available: {error}")
+            lines.append(f"{arithmetic}                not available: " + str(error).replace("\n", "\n" + 34 * " "))
             continue
         a, b = float(form.drive_lsb), float(form.output_lsb)
         back = "" if form.inverse_rounding is None else f", inverse {_most(form.inverse_rounding * a)}{drive}"
