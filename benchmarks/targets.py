@@ -92,6 +92,11 @@ class Case:
     arithmetic: str
     middle: float = 0.0  # of the range of the drive
 
+    @property
+    def model(self) -> Model:
+        """What is built."""
+        return model(self.n, self.middle)
+
 
 @functools.cache
 def model(n: int, middle: float = 0.0) -> Model:
@@ -133,7 +138,7 @@ def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
     drive = case.middle + drive
     if case.operator == "forward":
         return drive
-    cascade = model(case.n, case.middle).cascade
+    cascade = case.model.cascade
     session = simulation.Session(cascade, "forward")
     x = session.run(drive)[0] if call is None else session.operate(call, drive)[0]
     return np.asarray(x + cascade.pi.weights[0] * (drive - np.clip(drive, *cascade.input_range)) * bool(case.middle))
@@ -272,7 +277,7 @@ def lsbs(case: Case) -> tuple[float, float]:
     """Drive and output of a code; 1 in floating point."""
     if case.arithmetic in REALS:
         return 1.0, 1.0
-    form = fixed_tables.build(model(case.n, case.middle).cascade, case.arithmetic, "corners", None, None)[1]
+    form = fixed_tables.build(case.model.cascade, case.arithmetic, "corners", None, None)[1]
     return float(form.drive_lsb), float(form.output_lsb)
 
 
@@ -363,16 +368,16 @@ class Bench:
     def _module(self, case: Case, engine: str) -> sources.Sources:
         about = (case.n, engine, case.arithmetic, case.middle)
         if about not in self._emitted:
-            options = emit_options(model(case.n, case.middle), "both", case.arithmetic, engine)
+            options = emit_options(case.model, "both", case.arithmetic, engine)
             folder = self._folder / f"{engine}-{case.arithmetic}-{case.n}-{case.middle:g}"
-            self._emitted[about] = sources.write(folder, model(case.n, case.middle), options)
+            self._emitted[about] = sources.write(folder, case.model, options)
         return self._emitted[about]
 
     def _textbook(self, case: Case) -> sources.Sources:
         """The loop with its tables; in fixed point with codes of half the finest, so that sums of two fit."""
         folder = self._folder / f"textbook-{next(self._number)}"
         folder.mkdir()
-        cascade = model(case.n, case.middle).cascade
+        cascade = case.model.cascade
         forward = case.operator == "forward"
         pi = cascade.pi if forward else cascade.pi.inverse()
         real, total = TYPES[case.arithmetic]
@@ -413,7 +418,7 @@ class Bench:
         core = emulator.Core(case.target, image)
         x = given(case, drive, 2)
         answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
-        cascade = model(case.n, case.middle).cascade
+        cascade = case.model.cascade
         forward = case.operator == "forward"
         into, out = (2 * lsb for lsb in (lsbs(case) if forward else lsbs(case)[::-1]))
         if case.arithmetic in REALS:
@@ -468,7 +473,7 @@ class Bench:
         counted: str = "step",
     ) -> emulator.Core:
         """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
-        numbers = model(case.n, case.middle).tables(case.arithmetic, engine)
+        numbers = case.model.tables(case.arithmetic, engine)
         calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8) if call is None else call, x)
         real = comparison.REALS[case.arithmetic]
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
