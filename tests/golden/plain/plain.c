@@ -660,6 +660,13 @@ static const plain_tables_t plain_tables = {
     plain_threshold, NULL, plain_slope, NULL, plain_start_level, plain_reciprocal, 1.9224f, 6
 };
 
+/* What `fast` of an inverse says of the next sample. */
+#define PLAIN_FAST_NOTHING 0
+#define PLAIN_FAST_MOVE 1  /* between the edges it goes on with the present move */
+#define PLAIN_FAST_PLACE 2 /* where `pending` leads is known, and nothing of the move */
+#define PLAIN_FAST_LIMIT 3 /* `pending` is a limit of the drive */
+#define PLAIN_FAST_REST 4  /* `pending` is where rounding has left the drive */
+
 PLAIN_COPIES bool plain_finite(plain_real_t x)
 {
     return x >= -FLT_MAX && x <= FLT_MAX; /* false for NaN */
@@ -692,7 +699,7 @@ static void plain_inverse_begin(plain_inverse_t *self, plain_real_t applied)
     self->edge[1] = 0;
     self->before = 0;
     self->gain = 0;
-    self->fast = 0;
+    self->fast = PLAIN_FAST_NOTHING;
     self->falling = false;
     self->status = 0;
 }
@@ -710,14 +717,14 @@ static plain_real_t plain_inverse_answer(plain_inverse_t *self, plain_real_t v)
 /* What the fast steps have left undone, all but taking the drives to memory. */
 static void plain_inverse_leave_fast(plain_inverse_t *self)
 {
-    if (self->fast == 1) {
+    if (self->fast == PLAIN_FAST_MOVE) {
         self->reference = self->edge[self->falling ? 1 : 0];
         self->answer = self->pending;
         self->has_pending = true;
         self->repeat = true;
         self->stepped = true;
     }
-    self->fast = 0;
+    self->fast = PLAIN_FAST_NOTHING;
     self->edge[0] = self->edge[1];
 }
 
@@ -759,7 +766,7 @@ static void plain_inverse_expect(plain_inverse_t *self, plain_real_t v)
     self->edge[0] = self->falling ? FLT_MAX : -FLT_MAX; /* no sample is the usual one */
     self->edge[1] = self->edge[0];
     self->gain = plain_reciprocal[p->k];
-    self->fast = 2;
+    self->fast = PLAIN_FAST_PLACE;
     self->pending = v;
 }
 
@@ -797,7 +804,7 @@ static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
     edge = self->falling ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
     self->edge[0] = edge;
     self->edge[1] = edge;
-    self->fast = 3;
+    self->fast = PLAIN_FAST_LIMIT;
     self->repeat = true;
     self->bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
     self->status |= PLAIN_STATUS_OUTPUT_CLAMPED;
@@ -815,7 +822,7 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
         return plain_inverse_limit(self, inside);
     }
     self->repeat = true;
-    self->fast = 0;
+    self->fast = PLAIN_FAST_NOTHING;
     self->edge[0] = self->edge[1];
     return plain_inverse_send(self, inside);
 }
@@ -828,7 +835,7 @@ static plain_real_t plain_inverse_rest(plain_inverse_t *self)
     plain_memory_t *m = &self->memory;
     m->there.k = m->here.k;
     plain_inverse_expect(self, m->w);
-    self->fast = 4;
+    self->fast = PLAIN_FAST_REST;
     self->repeat = true;
     return plain_inverse_answer(self, m->w);
 }
@@ -854,7 +861,7 @@ PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_
     self->edge[rising] = rising ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
     self->gain = plain_reciprocal[p->k];
     self->falling = !rising;
-    self->fast = 1;
+    self->fast = PLAIN_FAST_MOVE;
     self->pending = v;
     return v;
 }/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
@@ -917,7 +924,7 @@ static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked
     } else {
         v = plain_inverse_along(self, v, rising);
     }
-    if (self->fast == 1 && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
+    if (self->fast == PLAIN_FAST_MOVE && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
         plain_inverse_leave_fast(self);
     }
     return v;
@@ -930,7 +937,7 @@ __attribute__((noinline))
 static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
 {
     const plain_real_t asked = u;
-    if (self->fast != 0) {
+    if (self->fast != PLAIN_FAST_NOTHING) {
         plain_inverse_leave_fast(self);
         plain_inverse_take(self, self->pending);
     } else {
@@ -1190,14 +1197,14 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         self->pending = v;
         return v;
     }
-    if (self->fast != 1) {
-        if (self->fast == 0) {
+    if (self->fast != PLAIN_FAST_MOVE) {
+        if (self->fast == PLAIN_FAST_NOTHING) {
             return plain_inverse_look(self, u);
         }
-        if (self->fast == 3) {
+        if (self->fast == PLAIN_FAST_LIMIT) {
             return plain_inverse_at_limit(self, u);
         }
-        if (self->fast == 4 && u >= self->reference && u <= self->reference) {
+        if (self->fast == PLAIN_FAST_REST && u >= self->reference && u <= self->reference) {
             self->status |= self->bits;
             return self->pending;
         }
@@ -1215,7 +1222,7 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
         self->status |= PLAIN_STATUS_HELD;
         return;
     }
-    if (self->fast == 1) {
+    if (self->fast == PLAIN_FAST_MOVE) {
         const bool more = self->edge[self->falling] < self->reference || self->edge[self->falling] > self->reference;
         plain_inverse_leave_fast(self);
         if (more) { /* than the step that looked */
@@ -1224,7 +1231,7 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
             self->memory.there.k = 0; /* it found nothing new */
         }
     }
-    if (self->fast > 2) {
+    if (self->fast > PLAIN_FAST_PLACE) {
         self->memory.there.k = 0; /* where a limit leads, or no move, says nothing of another drive */
     }
     v = plain_clamp_drive(applied);

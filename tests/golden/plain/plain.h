@@ -103,7 +103,7 @@ typedef struct {
     plain_real_t applied;   /* drive seen last */
     plain_real_t reference; /* input of the last step */
     plain_real_t answer;    /* drive returned last */
-    uint_least8_t fast;          /* 1: edges hold; 2: a place is known, that of `pending`; 3: a limit; 4: no move */
+    uint_least8_t fast;          /* what is known of the next sample */
     bool falling;
     bool has_pending;
     bool repeat;                 /* the last answer still stands for `reference` */
