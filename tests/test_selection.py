@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import wilcoxon
 
-from hystgen.diagnosis import ranks, selection
+from hystgen.diagnosis import selection
 
 Array = NDArray[np.float64]
 
@@ -255,24 +254,3 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     best = selection.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
     assert (selection._merit(now, best, records) is not None) is accepted  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("samples", [6, 13, 50, 51, 400])
-@pytest.mark.parametrize("shift", [-0.3, 0.0, 0.4])
-def test_the_signed_rank_test_is_that_of_scipy(samples: int, shift: float) -> None:
-    values = np.random.default_rng(samples).standard_normal(samples) + shift
-    expected = wilcoxon(values, alternative="greater").pvalue
-    assert ranks.signed_rank(values) == pytest.approx(expected, rel=1e-10, abs=1e-14)
-    assert ranks.signed_rank(np.append(values, np.zeros(3))) == ranks.signed_rank(values)
-
-
-def test_equal_sizes_share_their_ranks() -> None:
-    """Of random signs of 1, 1 and 2 the two ways with the 2 and a 1 positive, and the one of all, weigh as much."""
-    assert ranks.signed_rank(np.array([1.0, -1.0, 2.0])) == 3 / 8
-    assert ranks.signed_rank(np.zeros(8)) == 1.0
-
-
-def test_the_signed_rank_test_of_many_equal_sizes() -> None:
-    values = np.round(np.random.default_rng(1).standard_normal(400) + 0.1, 1)
-    expected = wilcoxon(values, alternative="greater").pvalue
-    assert ranks.signed_rank(values) == pytest.approx(expected, rel=1e-10)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from hystgen import operators
 from hystgen.diagnosis.periodic import repetition
 from hystgen.diagnosis.structure import Item
-from hystgen.effects.recursions import code
 
 Array = NDArray[np.float64]
 
@@ -203,10 +202,10 @@ def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, flo
 
 
 def _averaged(v: Array, decay: float) -> Array:
-    out = np.empty_like(v)
-    kept, none, new = (np.full(len(v) - 1, share) for share in (decay, 0.0, 1.0 - decay))
-    code().follow(v, kept, none, new, float(v[0]), out)
-    return out
+    from scipy.signal import lfilter
+
+    found, _ = lfilter([1.0 - decay], [1.0, -decay], v, zi=[decay * v[0]])
+    return np.asarray(found)
 
 
 def _regressed(x: Array, e: Array) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import effects, parallel
-from hystgen.diagnosis import periodic, ranks
+from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Search, Structure
@@ -731,6 +731,8 @@ def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
 
     Wilcoxon's signed-rank test: what an effect explains may sit in a few events, so that the mean alone is no measure.
     """
+    from scipy.stats import wilcoxon
+
     gains = []
     for a, b in zip(before, after, strict=True):
         known = np.isfinite(a) & np.isfinite(b)
@@ -743,4 +745,4 @@ def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
     blocks = np.concatenate(gains) if gains else np.empty(0)
     if len(blocks) < 6 or not np.any(blocks):
         return 1.0
-    return ranks.signed_rank(blocks)
+    return float(wilcoxon(blocks, alternative="greater").pvalue)

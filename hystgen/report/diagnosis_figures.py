@@ -236,21 +236,10 @@ def time(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def _density(e: Array, step: float, count: int) -> tuple[Array, Array]:
-    """Spectral density over the frequencies above 0, by Welch's method: Hann windows of `count` samples, half over each
-    other."""
-    window = np.hanning(count + 1)[:-1]
-    starts = range(0, len(e) - count + 1, count - count // 2)
-    parts = [e[start : start + count] for start in starts]
-    power = np.mean([np.abs(np.fft.rfft((part - part.mean()) * window)) ** 2 for part in parts], axis=0)
-    density = 2.0 * step / float(np.sum(window**2)) * power
-    if count % 2 == 0:
-        density[-1] *= 0.5  # the highest frequency has no mirror image
-    return np.asarray(np.fft.rfftfreq(count, step)[1:]), density[1:]
-
-
 def frequency(found: Diagnosis, width: float) -> Any:
     """Spectral density of the error of the worst held-out record."""
+    from scipy.signal import welch
+
     each, unit = worst(found)[0], found.content["unit"]
     step = float(np.median(np.diff(each.t)))
     drawn = drawing.figure(width, 3.6)
@@ -262,8 +251,8 @@ def frequency(found: Diagnosis, width: float) -> Any:
         if len(known) < 64:
             continue
         e = np.interp(np.arange(known[0], known[-1] + 1), known, e[known])
-        places, density = _density(e, step, min(len(e), max(256, len(e) // 4)))
-        axes.plot(places, np.sqrt(density), color=colour, linewidth=1.0, label=what)
+        places, density = welch(e, 1.0 / step, nperseg=min(len(e), max(256, len(e) // 4)))
+        axes.plot(places[1:], np.sqrt(density[1:]), color=colour, linewidth=1.0, label=what)
     floor = float(found.content["noise_floor"]) * np.sqrt(2.0 * step)
     axes.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise, if white")
     for line in (entry for entry in found.content["unexplained"] if entry["kind"] == "line"):
