@@ -23,7 +23,7 @@ from hystgen.identification.uncertainty import correlation_time
 Array = NDArray[np.float64]
 
 SCREENED = 8_000
-"""Most samples compared while the many shapes are told apart, each so many-th of all; all run through the actuator."""
+"""Most samples compared, to fit and held out, while the many shapes are told apart."""
 
 FIRST_STEPS, SCREENING_STEPS = 2, 2
 """Steps of a search from each start, and then from the best one, while the shapes are told apart."""
@@ -230,12 +230,11 @@ def select(
 ) -> Outcome:
     """Add effects to the refitted model as long as one qualifies."""
     now = refitted
-    every = -(-sum(int(np.count_nonzero(item.known)) for item in to_fit) // SCREENED)
     records = _Records(
         to_fit,
         held,
-        [item.thinned(every) for item in to_fit],
-        [item.thinned(every) for item in held],
+        fits.thinned(to_fit, SCREENED),
+        fits.thinned(held, SCREENED),
         about(to_fit, refitted.structure.thresholds),
         user,
         noise,
@@ -417,7 +416,7 @@ def _found(step: _Step, records: _Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    return fits.linear(base, to_fit, start, np.ones(len(base.thresholds))).best
+    return fits.begun(base, to_fit, start, np.ones(len(base.thresholds))).now.best
 
 
 def _alike(other: Tried, best: Tried, noise: float) -> bool:
