@@ -33,7 +33,7 @@ ALL = slice(None)
 _MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
 """Parts of the chain behind which the compared samples are picked: plays, filters behind them, others, output maps."""
 
-MOVEMENTS = 5, 2**26
+MOVEMENTS = 5, 2**25
 """Movements of the plays that are remembered for a record, and the bytes of them all."""
 
 DIFFERENCES = 12, 2**25
