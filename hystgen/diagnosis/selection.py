@@ -197,12 +197,25 @@ class _Records:
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """One effect more, the best shapes of all, the best one first; `worth`: of the options that are worth it."""
         known = replace(self.known, ringing=periodic.ringing(self.to_fit, now.errors(self.to_fit), RINGING))
-        found = [option for option in options(now, known, self.user) if worth is None or worth(option)]
-        return _followed_up(now, _screened(now, self, found), self)
+        rough = _rough(now, self.thin)
+        roughly = replace(known, thresholds=tuple(rough.structure.thresholds.tolist()))
+        both = zip(options(now, known, self.user), options(rough, roughly, self.user), strict=True)
+        found = [(option, alike) for option, alike in both if worth is None or worth(option)]
+        wanted = {alike.label: option for option, alike in found}
+        kept = _screened(rough, self, [alike for _, alike in found])
+        return _followed_up(now, [replace(each, option=wanted[each.option.label]) for each in kept], self)
 
     def left(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
         return fits.rms(fitted.errors(self.held))
+
+
+def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
+    """The hypothesis with every other threshold, the least and the largest among them: enough to tell shapes apart."""
+    structure = replace(now.structure, thresholds=np.ascontiguousarray(now.structure.thresholds[::-2][::-1]))
+    if structure.thresholds[0] > 0.0:
+        structure = replace(structure, thresholds=np.append(0.0, structure.thresholds))
+    return fits.begun(structure, thin, now.shape, np.ones(len(structure.thresholds))).found(now.weights)
 
 
 def _jobs(to_fit: Sequence[Item]) -> int:
@@ -524,7 +537,7 @@ def _followed_up(now: Fitted, kept: Sequence[_Screened], records: _Records) -> l
 
     def begin(k: int) -> Fitted:
         option, screened = kept[k].option, kept[k].fitted
-        structure, shape, p = option.structure, option.joined(now, screened.shape), screened.weights
+        structure, shape, p = option.structure, option.joined(now, screened.shape), now.weights
         search = fits.begun(structure, records.to_fit, shape, p)
         promising = kept[k].left <= by_held_out or screened.rms <= by_fit
         return (search.further(JOINT_STEPS, COARSE) if promising else search).found(p)
