@@ -212,10 +212,12 @@ class _Records:
 
 def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
     """The hypothesis with every other threshold, the least and the largest among them: enough to tell shapes apart."""
-    structure = replace(now.structure, thresholds=np.ascontiguousarray(now.structure.thresholds[::-2][::-1]))
-    if structure.thresholds[0] > 0.0:
-        structure = replace(structure, thresholds=np.append(0.0, structure.thresholds))
-    return fits.begun(structure, thin, now.shape, np.ones(len(structure.thresholds))).found(now.weights)
+    all_of_them = now.structure.thresholds
+    places = np.unique([0, *range(len(all_of_them) - 1, -1, -2)])
+    p = np.zeros(len(places))
+    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # behind a map near ones are needed
+    structure = replace(now.structure, thresholds=np.ascontiguousarray(all_of_them[places]))
+    return fits.begun(structure, thin, now.shape, p).found(p)
 
 
 def _jobs(to_fit: Sequence[Item]) -> int:
