@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -370,6 +371,28 @@ def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: floa
 
 def _only(actuator: structure.Actuator) -> structure.Structure:
     return structure.Structure(actuator.thresholds, Kept(), tuple(map(structure.kept, actuator.effects)))
+
+
+@pytest.mark.parametrize("curve", [None, 0.3])
+@pytest.mark.parametrize("plays", [1, 2, 7, 8])
+def test_every_other_threshold_leaves_hardly_more(plays: int, curve: float | None) -> None:
+    """Behind a curved sensor too, where the weights are not linear in the output."""
+    places = np.linspace(0.0, 30.0, plays + 1)
+    weights = np.append(1.0, np.full(plays, 0.6 / plays))
+    v = wander(5, turns=40)
+    bent = SensorPolynomial(name="sensor_nonlinearity", coefficients=(curve or 0.0,), scale=100.0)
+    actuator = structure.Actuator(places, (), () if curve is None else (bent,))
+    item = Item("made", Run(np.arange(len(v)) * 1e-3, v), v, (0.0,), 100.0)
+    h = brute_output(v, tuple(places.tolist()), tuple(weights.tolist()), 0.0)
+    item = dataclasses.replace(item, y=np.asarray(h + (curve or 0.0) * h**2 / 100.0))
+    whole = structure.Fitted(_only(actuator), np.empty(0), weights, 0.0)
+    rough = selection._rough(whole, [item])
+    kept = rough.structure.thresholds
+    assert (kept[0], kept[-1]) == (0.0, 30.0)
+    assert len(kept) == 1 + (plays + 1) // 2
+    assert set(kept) <= set(places)
+    assert structure.rms(whole.errors([item])) < 1e-9 * np.ptp(item.y)
+    assert structure.rms(rough.errors([item])) < (0.02 if plays > 1 else 1e-9) * np.ptp(item.y)
 
 
 def test_stops_that_are_not_centred_and_give(tmp_path: Path) -> None:
