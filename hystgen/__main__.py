@@ -2,4 +2,5 @@
 
 from hystgen.cli import main
 
-main(prog_name="hystgen")
+if __name__ == "__main__":
+    main(prog_name="hystgen")
