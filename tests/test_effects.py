@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, get_args
@@ -623,15 +624,35 @@ def test_rate_dependence_and_noncongruency_act_together() -> None:
 
 
 def test_ageing_against_the_distance_travelled() -> None:
+    """Against 50 digits: a distance of k moves and its quotient are k + 2 roundings off, of which `exp(-x)` passes on
+    at most 1/e and `log10(1 + x)` 1/ln 10; a function of the library is within 4 units in the last place, and each
+    product and sum rounds once."""
     t, v = uneven()
-    distance = np.array([sum(abs(v[j] - v[j - 1]) for j in range(1, k + 1)) for k in range(len(v))])
-    logarithmic = make("ageing", loss=0.05, travel=3.0).gain(Run(t, v))
-    assert np.allclose(logarithmic, 1 - 0.05 * np.log10(1 + distance / 3.0), rtol=1e-12)
-    exponential = make("ageing", shape="exponential", loss=0.05, travel=3.0).gain(Run(t, v))
-    assert np.allclose(exponential, 1 - 0.05 * (1 - np.exp(-distance / 3.0)), rtol=1e-12)
-    both = make("ageing", shape="exponentials", losses=(0.05, -0.02), travels=(3.0, 7.0)).gain(Run(t, v))
-    two = 1 - 0.05 * (1 - np.exp(-distance / 3.0)) + 0.02 * (1 - np.exp(-distance / 7.0))
-    assert np.allclose(both, two, rtol=1e-12)
+    u, k, loss = 2.0**-53, len(v), 0.05
+    moves = [abs(Fraction(b) - Fraction(a)) for a, b in itertools.pairwise(v.tolist())]
+
+    def off(numbers: dict[str, Any], law: Callable[[Decimal], Decimal]) -> float:
+        got = make("ageing", **numbers).gain(Run(t, v)).tolist()
+        return max(abs(float(Decimal(g) - law(d))) for g, d in zip(got, exact, strict=True))
+
+    def allowed(losses: list[float], most: float) -> float:
+        passed = 0.5 * (k + 2) * u + (8 * most + 2) * u
+        return 1.01 * (sum(map(abs, losses)) * (passed + most * u) + 2 * len(losses) * u)
+
+    def worn(loss: float, travel: int, d: Decimal) -> Decimal:
+        return Decimal(loss) * (1 - (-d / travel).exp())
+
+    with localcontext(Context(prec=50)):
+        distances = itertools.accumulate(moves, initial=Fraction(0))
+        exact = [Decimal(d.numerator) / Decimal(d.denominator) for d in distances]
+        decades = float((1 + exact[-1] / 3).log10())
+        straight = {"loss": loss, "travel": 3.0}
+        assert off(straight, lambda d: 1 - Decimal(loss) * (1 + d / 3).log10()) < allowed([loss], decades)
+        one = {"shape": "exponential", "loss": 0.05, "travel": 3.0}
+        assert off(one, lambda d: 1 - worn(0.05, 3, d)) < allowed([0.05], 1.0)
+        two = {"shape": "exponentials", "losses": (0.05, -0.02), "travels": (3.0, 7.0)}
+        assert off(two, lambda d: 1 - worn(0.05, 3, d) - worn(-0.02, 7, d)) < allowed([0.05, -0.02], 1.0)
+        assert allowed([0.05, -0.02], max(decades, 1.0)) < 1e-14
     still = make("ageing", loss=0.05, travel=3.0).gain(Run(t, np.ones(len(t))))
     assert np.array_equal(still, np.ones(len(t)))
 
@@ -690,19 +711,30 @@ def test_heat_of_hysteresis_is_what_many_plays_lose() -> None:
     v[100:103] = v[100]  # a rest
     t = np.arange(len(v)) * 0.1
     plays, tau, heating, reach = 4000, 5.0, 0.3, 1.7
-    z, lost = np.full(plays, v[0]), np.empty(len(v) - 1)
+    z, lost, unsure = np.full(plays, v[0]), np.empty(len(v) - 1), np.empty(len(v) - 1)
     r = (np.arange(plays) + 0.5) * (reach / plays)
     for k, x in enumerate(v[1:].tolist()):
         moved = np.minimum(np.maximum(z, x - r), x + r)
-        lost[k] = np.sum(r * np.abs(moved - z)) * (reach / plays)
+        slip = np.abs(moved - z)
+        lost[k] = np.sum(r * slip) * (reach / plays)
+        # Slip is straight over r between kinks, with slopes up to 2: the midpoint rule misses h^3/24 of a second
+        # derivative of 4 in each cell, and h^2/8 of a jump by 4 r at a kink, which shows in second differences
+        kinks = np.count_nonzero(np.abs(np.diff(slip, 2)) > 1e-9) + 1
+        unsure[k] = (reach / plays) ** 2 * reach * (4.0 / 24.0 + kinks * 4.0 / 8.0)
         z = moved
-    rise = [0.0]
-    for q in lost / 0.1:
-        rise.append(rise[-1] * math.exp(-0.1 / tau) + heating * q * -math.expm1(-0.1 / tau))
+
+    def warmed(heat: Array) -> Array:
+        rise = [0.0]
+        for q in heat / 0.1:
+            rise.append(rise[-1] * math.exp(-0.1 / tau) + heating * q * -math.expm1(-0.1 / tau))
+        return np.array(rise)
+
     effect = make(
         "thermal", source="hysteresis", gain_per_degree=1.0, time_constant=tau, heating=heating, reach=reach
     )
-    assert np.max(np.abs(effect.gain(Run(t, v)) - 1.0 - rise)) < 1e-6 * max(rise)
+    off, allowed = np.abs(effect.gain(Run(t, v)) - 1.0 - warmed(lost)), warmed(unsure)
+    assert np.all(off[1:] < allowed[1:])
+    assert np.max(allowed) < 1e-6 * np.max(warmed(lost))
 
 
 def test_heat_of_small_loops_grows_with_the_cube_of_the_amplitude() -> None:
@@ -713,7 +745,9 @@ def test_heat_of_small_loops_grows_with_the_cube_of_the_amplitude() -> None:
         "thermal", source="hysteresis", gain_per_degree=1.0, time_constant=1.0, heating=heating, reach=10.0
     )
     rise = effect.gain(Run(t, v)) - 1.0
-    assert np.mean(rise[-2000:]) == pytest.approx(heating * frequency * 2 / 3 * amplitude**3, rel=2e-3)
+    # samples meet the turning points, and a mean over whole periods is that of the heat, but for the approach to it
+    left = 2.0 * math.exp(-t[-2000])
+    assert np.mean(rise[-2000:]) == pytest.approx(heating * frequency * 2 / 3 * amplitude**3, rel=left)
 
 
 def test_sensor_polynomial_and_saturation_and_their_order() -> None:
