@@ -15,15 +15,17 @@ from hystgen.diagnosis import periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Search, Structure
+from hystgen.diagnosis.thinning import Mask, needed, thinned
 from hystgen.effects import recursions
 from hystgen.effects.base import About, Effect
+from hystgen.identification import joint
 from hystgen.identification.fronts import Kept
 from hystgen.identification.uncertainty import correlation_time
 
 Array = NDArray[np.float64]
 
-SCREENED = 8_000
-"""Most samples compared, to fit and held out, while the many shapes are told apart."""
+SCREENED, SEARCHED = 6_000, 12_000
+"""Most samples compared, to fit and held out, while the many shapes are told apart; and to fit in other searches."""
 
 FIRST_STEPS, SCREENING_STEPS = 2, 2
 """Steps of a search from each start, and then from the best one, while the shapes are told apart."""
@@ -180,10 +182,12 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Records:
-    """What the search is over: the records, thinned ones to tell shapes apart, and what they are like."""
+    """What the search is over, and what it is like: the records, those to fit thinned for searches, and all of them
+    thinned further to tell shapes apart."""
 
     to_fit: Sequence[Item]
     held: Sequence[Item]
+    quick: Sequence[Item]
     thin: Sequence[Item]
     thin_held: Sequence[Item]
     known: About
@@ -232,7 +236,12 @@ def _jobs(to_fit: Sequence[Item]) -> int:
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
     """The believed structure with its weights and the shape of its front, sought from `start`, fitted anew."""
-    return fits.fit(base, to_fit, start, _first_weights(base, to_fit, start))
+    (quick,) = thinned([to_fit], joint.COMPARED, _all_of([to_fit]))
+    return fits.fit(base, quick, start, _first_weights(base, quick, start))
+
+
+def _all_of(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
+    return [[np.ones(len(item.run.t), dtype=bool) for item in group] for group in groups]
 
 
 def select(
@@ -244,12 +253,19 @@ def select(
     tick: Callable[[], None] = lambda: None,
 ) -> Outcome:
     """Add effects to the refitted model as long as one qualifies."""
-    now = refitted
+    groups = to_fit, held
+    masks = _all_of(groups)
+    if not user and not any(part.name.startswith("user:") for part in refitted.structure.parts):
+        masks = [needed(group, refitted.errors(group), noise) for group in groups]
+    quick, _ = thinned(groups, SEARCHED, masks)
+    now = fits.begun(refitted.structure, quick, refitted.shape, refitted.weights).found(refitted.weights)
+    thin, thin_held = thinned(groups, SCREENED, masks)
     records = _Records(
         to_fit,
         held,
-        fits.thinned(to_fit, SCREENED),
-        fits.thinned(held, SCREENED),
+        quick,
+        thin,
+        thin_held,
         about(to_fit, refitted.structure.thresholds),
         user,
         noise,
@@ -287,6 +303,10 @@ def select(
         now, found = _exchanged(now, found, {each.option.name for tried in rankings for each in tried}, records)
         if now is not step.best.fitted:
             latest = None
+    if found:
+        most, _ = thinned(groups, joint.COMPARED, masks)
+        now = fits.fit(now.structure, most, now.shape, now.weights)
+        found[-1] = replace(found[-1], after=records.left(now))
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
@@ -540,7 +560,7 @@ def _followed_up(now: Fitted, kept: Sequence[_Screened], records: _Records) -> l
     def begin(k: int) -> Fitted:
         option, screened = kept[k].option, kept[k].fitted
         structure, shape, p = option.structure, option.joined(now, screened.shape), now.weights
-        search = fits.begun(structure, records.to_fit, shape, p)
+        search = fits.begun(structure, records.quick, shape, p)
         promising = kept[k].left <= by_held_out or screened.rms <= by_fit
         return (search.further(JOINT_STEPS, COARSE) if promising else search).found(p)
 
@@ -548,7 +568,7 @@ def _followed_up(now: Fitted, kept: Sequence[_Screened], records: _Records) -> l
         fitted = begun[k].fitted
         if begun[k].left > hopeful:
             return fitted
-        return fits.fit(fitted.structure, records.to_fit, fitted.shape, fitted.weights)
+        return fits.fit(fitted.structure, records.quick, fitted.shape, fitted.weights)
 
     followed = [each.option for each in kept]
     begun = _each(followed, whole, begin, records.held, records)
@@ -717,7 +737,7 @@ def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
 def _without(now: Fitted, name: str, records: _Records) -> Fitted | None:
     """The hypothesis less one effect, fitted anew."""
     smaller = _less(now, name)
-    return None if smaller is None else fits.fit(smaller[0], records.to_fit, smaller[1], now.weights)
+    return None if smaller is None else fits.fit(smaller[0], records.quick, smaller[1], now.weights)
 
 
 def _left_as_it_is(now: Fitted, name: str, records: _Records) -> Fitted | None:
@@ -725,7 +745,7 @@ def _left_as_it_is(now: Fitted, name: str, records: _Records) -> Fitted | None:
     smaller = _less(now, name)
     if smaller is None:
         return None
-    return fits.begun(smaller[0], records.to_fit, smaller[1], now.weights).found(now.weights)
+    return fits.begun(smaller[0], records.quick, smaller[1], now.weights).found(now.weights)
 
 
 def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:

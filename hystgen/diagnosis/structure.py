@@ -104,20 +104,6 @@ class Item:
             return found
         return slice(int(found[0]), int(found[-1]) + 1, int(steps[0]))
 
-    def thinned(self, every: int) -> Item:
-        """The same with one in so many samples compared; one item for all who ask, as it remembers what it did."""
-        if every <= 1:
-            return self
-        if every not in self._thinned:
-            y = np.full_like(self.y, np.nan)
-            y[::every] = self.y[::every]
-            self._thinned[every] = replace(self, y=y)
-        return self._thinned[every]
-
-    @cached_property
-    def _thinned(self) -> dict[int, Item]:
-        return {}
-
 
 @dataclass(frozen=True)
 class Part:
@@ -601,16 +587,9 @@ class Search:
         return Fitted(self.structure, self.now.shape, best, self.now.rms)
 
 
-def thinned(items: Sequence[Item], most: int) -> list[Item]:
-    """The records with no more than so many samples compared, each so many-th; all still run through the actuator."""
-    every = -(-sum(int(np.count_nonzero(item.known)) for item in items) // most)
-    return [item.thinned(every) for item in items]
-
-
 def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Search:
-    """A search at its start; `p`: weights near which to begin. Of long records some samples alone are compared."""
-    few = thinned(items, joint.COMPARED)
-    return Search(structure, few, linear(structure, few, np.clip(start, *structure.bounds), p))
+    """A search at its start; `p`: weights near which to begin."""
+    return Search(structure, items, linear(structure, items, np.clip(start, *structure.bounds), p))
 
 
 def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:

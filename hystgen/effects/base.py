@@ -49,6 +49,13 @@ class Run:
     v: Array
     extra: Mapping[str, Array] = field(default_factory=dict)
     rest: float = 0.0
+    within: tuple[Run, NDArray[np.intp]] | None = field(default=None, repr=False, compare=False)
+    """a run of more samples, of which these are the ones at some places, the first and the last among them"""
+
+    def picked(self, places: NDArray[np.intp]) -> Run:
+        """Fewer samples of it; what adds up from sample to sample adds up over all of them."""
+        extra = {name: column[places] for name, column in self.extra.items()}
+        return Run(self.t[places], self.v[places], extra, self.rest, (self, places))
 
     @cached_property
     def steps(self) -> Array:
@@ -58,11 +65,17 @@ class Run:
     @cached_property
     def travelled(self) -> Array:
         """Distance `sum |dv|` that the drive has moved up to each sample, input units."""
+        if self.within is not None:
+            whole, places = self.within
+            return whole.travelled[places]
         return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.v)))])
 
     @cached_property
     def heat(self) -> Array:
         """Mean of `|v v'|/2` from each sample to the next, N - 1 of them."""
+        if self.within is not None:
+            whole, places = self.within
+            return np.add.reduceat(whole.heat * whole.steps, places[:-1]) / self.steps
         return 0.5 * np.abs(np.diff(0.5 * self.v * np.abs(self.v))) / self.steps
 
     def factors(self, time_constant: float) -> Array:
