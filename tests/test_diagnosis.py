@@ -20,7 +20,7 @@ from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import believed, floor, options, selection, structure
+from hystgen.diagnosis import believed, decisions, floor, options, structure, trials
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import Run
 from hystgen.effects.creep import ExponentialCreep
@@ -124,7 +124,7 @@ class TestSeveralProcesses:
         return case
 
     def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(selection, "LARGE", 0)
+        monkeypatch.setattr(trials, "LARGE", 0)
         found = []
         for cores in (1, 3):
             monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
@@ -134,8 +134,8 @@ class TestSeveralProcesses:
     @pytest.mark.parametrize("forks", [2, 4])
     def test_an_interrupt_leaves_nothing(self, case: Path, forks: int) -> None:
         program = (
-            "import os, sys; from hystgen import cli, parallel; from hystgen.diagnosis import selection; "
-            "selection.LARGE = 0; parallel.cores = lambda: 2; "
+            "import os, sys; from hystgen import cli, parallel; from hystgen.diagnosis import trials; "
+            "trials.LARGE = 0; parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
         )
         with subprocess.Popen(
@@ -188,9 +188,9 @@ class TestNoise:
         before = [rng.normal(size=2000) for _ in range(3)]
         same = [rng.normal(size=2000) for _ in range(3)]
         less = [0.8 * e for e in before]
-        assert selection.difference(before, less) < 1e-6
-        assert selection.difference(before, same) > 1e-3
-        assert selection.difference(less, before) > 0.9
+        assert decisions.difference(before, less) < 1e-6
+        assert decisions.difference(before, same) > 1e-3
+        assert decisions.difference(less, before) > 0.9
 
 
     def test_a_hold_that_rings_tells_nothing(self) -> None:
@@ -386,7 +386,7 @@ def test_every_other_threshold_leaves_hardly_more(plays: int, curve: float | Non
     h = brute_output(v, tuple(places.tolist()), tuple(weights.tolist()), 0.0)
     item = dataclasses.replace(item, y=np.asarray(h + (curve or 0.0) * h**2 / 100.0))
     whole = structure.Fitted(_only(actuator), np.empty(0), weights, 0.0)
-    rough = selection._rough(whole, [item])
+    rough = trials._rough(whole, [item])
     kept = rough.structure.thresholds
     assert (kept[0], kept[-1]) == (0.0, 30.0)
     assert len(kept) == 1 + (plays + 1) // 2

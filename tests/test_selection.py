@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import selection
+from hystgen.diagnosis import decisions, selection, trials
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class World:
         extended = Hypothesis(self, now.names | {name})
         errors = extended.errors(list(self.held))
         option: Any = SimpleNamespace(label=name, name=name)
-        return selection.Tried(option, extended, (name,), self.rms(errors), errors)
+        return trials.Tried(option, extended, (name,), self.rms(errors), errors)
 
     def extensions(self, now: Hypothesis, worth: Any = None) -> list[Any]:
         found = [self.tried(now, name) for name in self.all if name not in now.names]
@@ -214,26 +214,26 @@ class Made:
 
 def first_of(best: Made, other: Made) -> str:
     tried: list[Any] = [
-        selection.Tried(SimpleNamespace(name=made.name), made, (made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
+        trials.Tried(SimpleNamespace(name=made.name), made, (made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
         for made in (best, other)
     ]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
-    return str(selection._simplest_first(tried, records)[0].name)
+    return str(decisions.simplest_first(tried, records)[0].name)
 
 
 def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
     """Held-out records ruled by what another effect makes of their edges, of which fitted ones have hardly any."""
     records: Any = SimpleNamespace(gap=1.0)
-    assert selection._Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
-    assert selection._Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
-    assert not selection._Merit(0.06, 0.06, 0.9, 1e-9).worth(1.0, records)
+    assert decisions.Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
+    assert decisions.Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
+    assert not decisions.Merit(0.06, 0.06, 0.9, 1e-9).worth(1.0, records)
 
 
 def test_nearly_all_that_is_left_is_worth_a_name() -> None:
     """Beside a resonance of some hundred times the noise, say, of which another effect is a few per cent."""
     records: Any = SimpleNamespace(gap=1.0)
-    assert selection._Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
-    assert not selection._Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
+    assert decisions.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
+    assert not decisions.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])
@@ -241,9 +241,9 @@ def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> Non
     """The numbers of an effect come from records in which it makes no difference."""
     now, better = Made("now", 1, (1.0, 1.0)), Made("better", 1, (fitted, 0.5))
     option: Any = SimpleNamespace(name="better")
-    best = selection.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
+    best = trials.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
-    assert (selection._merit(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (decisions.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("own", "accepted"), [(1.0, True), (0.5, False)])
@@ -251,6 +251,6 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     """The hypothesis leaves more with the effect's small start states than with its own; the effect is to beat both."""
     now, better = Made("now", 5, (own, own), (1.0, 1.0)), Made("better", 5, (0.6, 0.6))
     option: Any = SimpleNamespace(name="better")
-    best = selection.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
+    best = trials.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
-    assert (selection._merit(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (decisions.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]

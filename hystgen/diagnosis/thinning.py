@@ -76,6 +76,11 @@ def _needed(item: Item, left: Array, noise: float) -> Mask:
     return found
 
 
+def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
+    """The same where no sample may be left out."""
+    return [[np.ones(len(item.run.t), dtype=bool) for item in group] for group in groups]
+
+
 def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
     """Groups of records with at most so many samples compared in each, every so many-th, beside the samples needed.
 

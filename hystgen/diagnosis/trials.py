@@ -1,0 +1,303 @@
+"""Every shape of every effect beside a hypothesis: told apart on thinned records, the hopeful ones fitted jointly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import parallel
+from hystgen.diagnosis import periodic
+from hystgen.diagnosis import structure as fits
+from hystgen.diagnosis.options import Option, about, front_names, options
+from hystgen.diagnosis.structure import Fitted, Item, Search, Structure
+from hystgen.diagnosis.thinning import everything, needed, thinned
+from hystgen.effects import recursions
+from hystgen.effects.base import About, Effect
+from hystgen.identification import joint
+
+Array = NDArray[np.float64]
+
+SCREENED, SEARCHED = 6_000, 12_000
+"""Most samples compared, to fit and held out, while the many shapes are told apart; and to fit in other searches."""
+
+FIRST_STEPS, SCREENING_STEPS = 2, 2
+"""Steps of a search from each start, and then from the best one, while the shapes are told apart."""
+
+TOO_FAR = 5.0
+"""A start with so many times the error of the best one is too far away to search from.
+
+The best end has been reached from starts with up to 3.5 times the error of another on tuning cases: a limit of the
+output does nothing where it lies beyond all that was measured.
+"""
+
+IDLE = 0.01
+"""Where the error is that without the effect within this share, the effect does nothing yet, and others go first.
+
+Behind a large effect that is found, every start of the next may be worse than none before its first steps.
+"""
+
+COARSE = 1e-3
+"""Until it is known which shapes are hopeful, a search ends when a step lowers the error by less than this share."""
+
+FALLING, LONGER = 0.8, 4
+"""The error of a search that goes on falls below this share within SCREENING_STEPS; and at most so many times those.
+
+The minimum of a light damping is so narrow that the first steps do not reach it.
+"""
+
+KEPT, ALSO = 5, 2
+"""Shapes that are followed up after the screening: the best on held-out records, and others that fit best."""
+
+PROMISING = 2.0
+"""A shape that leaves so many times what the best one leaves, fitted and held out, is not searched jointly."""
+
+JOINT_STEPS, HOPEFUL = 5, 1.3
+"""Steps of a joint search after which those further behind the best on held-out records go on no more."""
+
+SHAPES = 2
+"""Of one effect no more than so many."""
+
+RINGING = 3
+"""Frequencies at which the error rings, from which a search for a resonance starts too."""
+
+HELPS = 0.05
+"""A shape has to lower the error by this share while they are told apart, or those that contain it are not tried.
+
+And these have to lower the error that it leaves by as much again.
+"""
+
+LARGE = 20_000
+"""Samples to fit from which on the options are tried in several processes; of fewer it takes a few seconds at most."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """An option followed up: what it gives on held-out records."""
+
+    option: Option
+    fitted: Fitted
+    names: tuple[str, ...]
+    """the name, and others that the same numbers would bear as well"""
+    held_out: float
+    errors: list[Array]
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.names[0]
+
+    def numbers(self, held: Sequence[Item]) -> int:
+        """How many numbers it takes, with what it leaves free in a record.
+
+        Free responses to a start state alone may explain a drift.
+        """
+        return free_numbers(self.fitted, held)
+
+
+def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
+    """How many numbers a hypothesis has, with what it leaves free in a record."""
+    return len(fitted.shape) + max(len(fitted.actuator.nuisances(item)) for item in held)
+
+
+@dataclass(frozen=True)
+class Records:
+    """What a search is over, and what it is like: the records, thinned for searches, and further to tell shapes apart.
+
+    `most`: those to fit, with as many samples compared as any search compares.
+    """
+
+    to_fit: Sequence[Item]
+    held: Sequence[Item]
+    most: Sequence[Item]
+    quick: Sequence[Item]
+    thin: Sequence[Item]
+    thin_held: Sequence[Item]
+    known: About
+    user: Sequence[type[Effect]]
+    noise: float
+    gap: float
+    """what the refitted model leaves of the records to fit"""
+    tick: Callable[[], None]
+    jobs: int
+
+    @classmethod
+    def of(
+        cls,
+        to_fit: Sequence[Item],
+        held: Sequence[Item],
+        refitted: Fitted,
+        noise: float,
+        user: Sequence[type[Effect]] = (),
+        tick: Callable[[], None] = lambda: None,
+    ) -> Records:
+        """Records thinned by what the refitted model leaves of them; a user's own effect sees all samples."""
+        groups, structure = (to_fit, held), refitted.structure
+        masks = everything(groups)
+        if not user and not any(part.name.startswith("user:") for part in structure.parts):
+            masks = [needed(group, refitted.errors(group), noise) for group in groups]
+        most, quick = (thinned(groups, number, masks)[0] for number in (joint.COMPARED, SEARCHED))
+        thin, thin_held = thinned(groups, SCREENED, masks)
+        gap = fits.rms(refitted.errors(to_fit))
+        known = about(to_fit, structure.thresholds)
+        return cls(to_fit, held, most, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit))
+
+    def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
+        """One effect more, the best shapes of all, the best one first; `worth`: of the options that are worth it."""
+        known = replace(self.known, ringing=periodic.ringing(self.to_fit, now.errors(self.to_fit), RINGING))
+        rough = _rough(now, self.thin)
+        roughly = replace(known, thresholds=tuple(rough.structure.thresholds.tolist()))
+        both = zip(options(now, known, self.user), options(rough, roughly, self.user), strict=True)
+        found = [(option, alike) for option, alike in both if worth is None or worth(option)]
+        wanted = {alike.label: option for option, alike in found}
+        kept = _screened(rough, self, [alike for _, alike in found])
+        return _followed_up(now, [replace(each, option=wanted[each.option.label]) for each in kept], self)
+
+    def left(self, fitted: Fitted) -> float:
+        """rms error on held-out records."""
+        return fits.rms(fitted.errors(self.held))
+
+
+def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
+    """The hypothesis with every other threshold, the least and the largest among them: enough to tell shapes apart."""
+    all_of_them = now.structure.thresholds
+    places = np.unique([0, *range(len(all_of_them) - 1, -1, -2)])
+    p = np.zeros(len(places))
+    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # behind a map near ones are needed
+    structure = replace(now.structure, thresholds=np.ascontiguousarray(all_of_them[places]))
+    return fits.begun(structure, thin, now.shape, p).found(p)
+
+
+def _jobs(to_fit: Sequence[Item]) -> int:
+    """Processes that are worth it; what each would compile or read from a cache is there before they begin."""
+    if sum(len(item.run.t) for item in to_fit) < LARGE:
+        return 1
+    jobs = parallel.cores()
+    if jobs > 1:
+        recursions.load()
+    return jobs
+
+
+@dataclass(frozen=True, eq=False)
+class _Screened:
+    """An option after the first steps, and its held-out rms."""
+
+    option: Option
+    fitted: Fitted
+    left: float
+
+
+def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_Screened]:
+    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
+
+    What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
+    a simpler one is tried where that takes something away, and goes on where it takes more.
+    """
+    without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
+    simpler: dict[str, _Screened] = {}
+
+    def acting(searches: Sequence[Search]) -> Sequence[Search]:
+        return [each for each in searches if abs(each.now.rms - without[0]) > IDLE * without[0]] or searches
+
+    def begin(option: Option) -> Fitted:
+        starts = list(option.starts)
+        if option.grown is not None:
+            starts.append(option.grown(simpler[option.beyond].fitted.shape))
+        begun = [fits.begun(option.alone, records.thin, start, now.weights) for start in starts]
+        near = TOO_FAR * min(each.now.rms for each in acting(begun))
+        searches = [each.further(FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
+        best = min(acting(searches), key=lambda each: each.now.rms)
+        search = best.further(SCREENING_STEPS, COARSE)
+        for _ in range(LONGER - 1):
+            if search.now.rms >= FALLING * best.now.rms:
+                break
+            best, search = search, search.further(SCREENING_STEPS, COARSE)
+        return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
+
+    def begun(some: Sequence[Option]) -> list[_Screened]:
+        return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
+
+    def helps(each: _Screened, rms: float, left: float) -> bool:
+        return each.fitted.rms < (1.0 - HELPS) * rms or each.left < (1.0 - HELPS) * left
+
+    tried = begun([option for option in found if not option.beyond])
+    simpler = {each.option.label: each for each in tried if helps(each, *without)}
+    for each in begun([option for option in found if option.beyond in simpler]):
+        less = simpler[each.option.beyond]
+        if helps(each, less.fitted.rms, less.left):
+            tried.append(each)
+    tried = [each for each in tried if math.isfinite(each.left)]
+    kept: list[_Screened] = []
+    by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)
+    for order, most in ((by_held_out, KEPT), (by_fit, KEPT + ALSO)):
+        for each in order:
+            if len(kept) == most:
+                break
+            if sum(other.option.name == each.option.name for other in kept) < SHAPES and each not in kept:
+                kept.append(each)
+    contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
+    kept += [each for each in contained if each not in kept]  # whether more numbers are worth it shows when all fit
+    return kept
+
+
+def _each(
+    found: Sequence[Option],
+    structures: Sequence[Structure],
+    search: Callable[[int], Fitted],
+    held: Sequence[Item],
+    records: Records,
+) -> list[_Screened]:
+    """What a search finds for each option, counted by its number, and its rms error on some records.
+
+    In several processes, from which only numbers come: what builds an effect of them cannot be sent.
+    """
+
+    def numbers(k: int) -> tuple[Array, Array, float, float]:
+        fitted = search(k)
+        left = fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
+        return fitted.shape, fitted.weights, fitted.rms, left
+
+    done = parallel.each(numbers, range(len(found)), records.jobs, records.tick)
+    return [
+        _Screened(option, Fitted(structure, shape, p, rms), left)
+        for option, structure, (shape, p, rms, left) in zip(found, structures, done, strict=True)
+    ]
+
+
+def _followed_up(now: Fitted, kept: Sequence[_Screened], records: Records) -> list[Tried]:
+    """The options fitted to everything and run over the held-out records, the best one first."""
+    whole = [each.option.structure for each in kept]
+    by_held_out = PROMISING * min((each.left for each in kept), default=0.0)
+    by_fit = PROMISING * min((each.fitted.rms for each in kept), default=0.0)
+
+    def begin(k: int) -> Fitted:
+        option, screened = kept[k].option, kept[k].fitted
+        structure, shape, p = option.structure, option.joined(now, screened.shape), now.weights
+        search = fits.begun(structure, records.quick, shape, p)
+        promising = kept[k].left <= by_held_out or screened.rms <= by_fit
+        return (search.further(JOINT_STEPS, COARSE) if promising else search).found(p)
+
+    def go_on(k: int) -> Fitted:
+        fitted = begun[k].fitted
+        if begun[k].left > hopeful:
+            return fitted
+        return fits.fit(fitted.structure, records.quick, fitted.shape, fitted.weights)
+
+    followed = [each.option for each in kept]
+    begun = _each(followed, whole, begin, records.held, records)
+    hopeful = HOPEFUL * min((each.left for each in begun), default=0.0)
+    tried = []
+    for each in _each(followed, whole, go_on, records.held, records):
+        option, fitted = each.option, each.fitted
+        if fitted.rms >= now.rms:
+            continue
+        errors = fitted.errors(records.held)
+        names: tuple[str, ...] = (option.name,)
+        if option.front:
+            shape, _ = fitted.structure.pieces(fitted.shape)
+            names = front_names(fitted.structure.front, shape, records.known.drive)
+        tried.append(Tried(option, fitted, names, fits.rms(errors), errors))
+    return sorted(tried, key=lambda each: each.held_out)
