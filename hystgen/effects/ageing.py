@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many
 from hystgen.param_models import Number, Positive
 
 EXPONENTIAL = "ageing, exponential"
@@ -96,11 +96,9 @@ class SeveralAgeing(_Ageing):
         description="travels after which 63 % of each is lost, input units", examples=[[1.0e3, 1.0e4]]
     )
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """One loss a travel."""
-        if len(self.losses) != len(self.travels):
-            count = f"{len(self.losses)} value{'' if len(self.losses) == 1 else 's'}"
-            yield ("losses",), f"has {count} for {len(self.travels)} in travels; give as many as travels"
+        yield from not_as_many("losses", self.losses, "travels", self.travels)
 
     def gain(self, run: Run) -> Array:
         """The falling gain."""

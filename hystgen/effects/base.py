@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -149,6 +149,35 @@ class Candidate:
     grown: Callable[[Array], Array] | None = None
 
 
+Problem = tuple[tuple[str | int, ...], str]
+"""What does not fit together in an effect: keys, and a message."""
+
+
+def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+    """The problem of an effect on plays with a threshold in a model that has none."""
+    if thresholds is not None and len(thresholds) < 2:
+        yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
+
+
+def not_one_a_play(
+    key: str, values: Sequence[object], thresholds: tuple[float, ...] | None, what: str = "value"
+) -> Iterator[Problem]:
+    """The problem of a key that does not have one of `what` for each play with a threshold."""
+    if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
+        counts = f"{_count(len(values), what)} for {_count(len(thresholds) - 1, 'play')}"
+        yield (key,), f"has {counts}; give one for each threshold but r_0"
+
+
+def not_as_many(key: str, values: Sequence[object], other: str, others: Sequence[object]) -> Iterator[Problem]:
+    """The problem of a key that does not have as many values as another."""
+    if len(values) != len(others):
+        yield (key,), f"has {_count(len(values), 'value')} for {len(others)} in {other}; give as many as {other}"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
 Compensated = Literal[
     "exact", "approximate", "needs a sensor", "none needed", "none without preview", "none", "not known"
 ]
@@ -182,7 +211,7 @@ class Effect(BaseModel):
     compensation: ClassVar[str] = ""
     """how, one clause"""
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""
         yield from ()
 

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, span
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative, Positive
 
@@ -62,12 +62,9 @@ class ExponentialCreep(_Creep):
         description="c_i, as many as time_constants, shares of the play sum", examples=[[0.02, 0.01]]
     )
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """One weight a time constant."""
-        if len(self.weights) != len(self.time_constants):
-            count = f"{len(self.weights)} value{'' if len(self.weights) == 1 else 's'}"
-            what = f"has {count} for {len(self.time_constants)} in time_constants"
-            yield ("weights",), f"{what}; give as many as time_constants"
+        yield from not_as_many("weights", self.weights, "time_constants", self.time_constants)
 
     def filtered(self, h: Array, run: Run) -> Array:
         """The play sum with its creep."""
@@ -126,7 +123,7 @@ class LogarithmicCreep(_Creep):
     t_min: Positive = Field(default=1e-3, description="shortest time constant, s")
     t_max: Positive = Field(default=1e3, description="longest time constant, s")
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """t_min < t_max, and not more decades than states can be spent on."""
         if not self.t_min < self.t_max:
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"

@@ -9,7 +9,18 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, span
+from hystgen.effects.base import (
+    About,
+    Array,
+    Candidate,
+    Compensated,
+    Effect,
+    Place,
+    Problem,
+    not_one_a_play,
+    span,
+    without_plays,
+)
 from hystgen.effects.recursions import code
 from hystgen.param_models import MAX_PLAYS, Number, Positive
 
@@ -33,10 +44,9 @@ class _Noncongruent(Effect):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "a monotone scalar equation, solved every sample"
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """There are plays to bend."""
-        if thresholds is not None and len(thresholds) < 2:
-            yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
+        yield from without_plays(thresholds)
 
     @abstractmethod
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
@@ -74,13 +84,10 @@ class PlayFunctions(_Noncongruent):
         examples=[[[0.05], [0.02, 0.01]]],
     )
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """One list a play."""
         yield from super().problems(thresholds)
-        if thresholds is not None and len(thresholds) > 1 and len(self.coefficients) != len(thresholds) - 1:
-            count = f"{len(self.coefficients)} list{'' if len(self.coefficients) == 1 else 's'}"
-            plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
-            yield ("coefficients",), f"has {count} for {plays}; give one for each threshold but r_0"
+        yield from not_one_a_play("coefficients", self.coefficients, thresholds, "list")
 
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """What its polynomial adds to a play."""

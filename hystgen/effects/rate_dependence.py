@@ -11,7 +11,19 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen import operators
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
+from hystgen.effects.base import (
+    About,
+    Array,
+    Candidate,
+    Compensated,
+    Effect,
+    Place,
+    Problem,
+    Run,
+    from_zero,
+    not_one_a_play,
+    without_plays,
+)
 from hystgen.effects.recursions import code
 from hystgen.param_models import MAX_PLAYS, NotNegative, Positive
 
@@ -23,10 +35,9 @@ class _RateDependence(Effect):
 
     place: ClassVar[Place] = Place.PLAYS
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """There are plays to depend on the rate."""
-        if thresholds is not None and len(thresholds) < 2:
-            yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
+        yield from without_plays(thresholds)
 
     @abstractmethod
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
@@ -64,13 +75,10 @@ class ThresholdRate(_RateDependence):
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact while the thresholds stay ordered, else one implicit step a sample"
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """One beta a play."""
         yield from super().problems(thresholds)
-        if thresholds is not None and len(thresholds) > 1 and len(self.betas) != len(thresholds) - 1:
-            count = f"{len(self.betas)} value{'' if len(self.betas) == 1 else 's'}"
-            plays = f"{len(thresholds) - 1} play{'' if len(thresholds) == 2 else 's'}"
-            yield ("betas",), f"has {count} for {plays}; give one for each threshold but r_0"
+        yield from not_one_a_play("betas", self.betas, thresholds)
 
     def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
         """The rate from which the thresholds are no longer in order, where beta falls along them."""

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run
 from hystgen.param_models import NotNegative, Number, Positive
 
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
@@ -92,7 +92,7 @@ class Stops(_Saturation):
         default=0.0, description="slope beyond them over that between, 0 is hard", examples=[0.1]
     )
 
-    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """lower < upper."""
         if not self.lower < self.upper:
             yield ("upper",), f"{self.upper!r} is not above lower = {self.lower!r}; give lower < upper"

@@ -89,13 +89,10 @@ class _OwnHeat(_Thermal):
     def heat(self, run: Run) -> Array:
         """Final rise at the heat of each step (N - 1,), K."""
 
-    @abstractmethod
-    def remembered_by(self) -> tuple[object, ...]:
-        """All that the temperature depends on."""
-
     def above(self, run: Run) -> Array:
         """Temperature rise, K; a search comes back to it with other gains and offsets."""
-        return run.remembered((type(self), self.remembered_by()), lambda: self._rise(run))
+        numbers = self.model_dump(exclude={"gain_per_degree", "offset_per_degree"})
+        return run.remembered((type(self), *numbers.values()), lambda: self._rise(run))
 
     def _rise(self, run: Run) -> Array:
         decay, kept, none = run.of_steps(lambda steps: _kept(steps / self.time_constant))
@@ -117,10 +114,6 @@ class SelfHeating(_OwnHeat):
     def heat(self, run: Run) -> Array:
         """`heating |v v'|/2`."""
         return self.heating * run.heat
-
-    def remembered_by(self) -> tuple[object, ...]:
-        """Time constant and heating."""
-        return self.time_constant, self.heating
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -156,13 +149,12 @@ class HysteresisHeating(_OwnHeat):
 
     def heat(self, run: Run) -> Array:
         """`heating q`, the loss of each step spread evenly over it."""
-        lost = np.empty(len(run.steps))
-        code().lost(run.v, self.reach, np.empty(len(run.v)), lost)
-        return self.heating * lost / run.steps
+        return self.heating * run.remembered((type(self), self.reach), lambda: self._lost(run)) / run.steps
 
-    def remembered_by(self) -> tuple[object, ...]:
-        """Time constant, heating and reach."""
-        return self.time_constant, self.heating, self.reach
+    def _lost(self, run: Run) -> Array:
+        out = np.empty(len(run.steps))
+        code().lost(run.v, self.reach, np.empty(len(run.v)), out)
+        return out
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
