@@ -857,6 +857,30 @@ def test_show_warns_of_a_hard_inverse(p0: float, warned: bool) -> None:
     assert f"{(p0 + sum(P[1:])) / p0:.6g}" in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("p0", "arithmetic", "advice"),
+    [
+        (3e-4, "q15", "take q31, raise p_0"),
+        (3e-4, "q31", ""),
+        (3e-2, "q15", ""),
+        (1e-5, "float32", "take float64, raise p_0"),
+    ],
+)
+def test_show_warns_of_a_wide_error_of_the_inverse(p0: float, arithmetic: str, advice: str) -> None:
+    """Wide is a twentieth of the drive's range, by the figure that is shown: rounding is divided by p_0 at worst."""
+    Path("wide.yaml").write_text(
+        "hystgen: 1\nname: wide\ninput_range: [0, 150]\nunits: {input: V, output: um}\nmodel:\n  pi:\n"
+        f"    thresholds: [0, 10, 20, 40, 60]\n    weights: [{p0!r}, 0.3, 0.2, 0.1, 0.1]\n"
+        f"emit: {{arithmetic: {arithmetic}}}\n"
+    )
+    result = hyst("show", "wide.yaml")
+    (line,) = (line for line in result.lines if line.startswith(f"error, {arithmetic}"))
+    shown = float(re.findall(r"inverse ([\d.e+-]+)", line)[0])
+    assert (shown > 0.05 * 150.0) == bool(advice)
+    off = f"the inverse in {arithmetic} may be off by {shown:g} V, {100 * shown / 150:.0f} % of the drive's range"
+    assert result.stderr == (f"warning: {off}: {advice} or narrow input_range\n" if advice else "")
+
+
 @pytest.mark.parametrize("name", ["stage", "p0"])
 def test_show_draws_png_and_svg(name: str) -> None:
     Path("p0.yaml").write_text(NO_INVERSE)

@@ -211,6 +211,16 @@ def test_an_avr_without_its_tools_is_a_failure(tmp_path: Path) -> None:
     assert row.error == "no-such-gcc and no-such-simulator not installed"
 
 
+def test_what_is_named_twice_is_done_once() -> None:
+    twice: dict[str, Any] = {"targets": ["rv32imac", "host", "rv32imac"], "compiler": ["zig", "zig"]}
+    once: dict[str, Any] = {"targets": ["rv32imac", "host"], "compiler": ["zig"]}
+    found, alone = (hystgen.verify(model("plain"), length=500, target_length=100, **each) for each in (twice, once))
+    assert [(row.target, row.compiler, row.build) for row in found.rows] == [
+        (row.target, row.compiler, row.build) for row in alone.rows
+    ]
+    assert {row.target for row in alone.rows} == {"rv32imac", "host"}
+
+
 def test_c_that_does_not_compile_for_a_core_is_a_failure(changed_c: Callable[..., None]) -> None:
     changed_c("plain.c", lambda text: text + "\nint unused_argument(int x) { return 0; }\n")
     report = hystgen.verify(model("plain"), targets=["rv32imac"], compiler=["zig"], target_length=100)

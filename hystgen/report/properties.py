@@ -12,6 +12,10 @@ from hystgen.models import DeadZone
 from hystgen.tables import FormatError
 
 HARD_RATIO = 1e6
+
+WIDE = 0.05
+"""An error of the inverse of this share of the drive's range is worth a word."""
+
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
 
@@ -112,12 +116,34 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
 
 def warnings(model: Model) -> list[str]:
     """What the user should know before relying on the model."""
-    if model.effects:
+    c = model.cascade
+    if model.effects or c.inverse_problems():
         return []
-    ratio = model.cascade.slope_ratio
-    if ratio > HARD_RATIO and not model.cascade.inverse_problems():
+    if c.slope_ratio > HARD_RATIO:
         return [
-            f"the slope ratio is {ratio:.3g}: the inverse amplifies rounding and model errors by as much; "
+            f"the slope ratio is {c.slope_ratio:.3g}: the inverse amplifies rounding and model errors by as much; "
             "raise p_0 or narrow input_range"
         ]
-    return []
+    arithmetic = model.parameters.emit.arithmetic
+    try:
+        error = _inverse_error(model, arithmetic)
+    except FormatError:
+        return []
+    share = error / (c.input_range[1] - c.input_range[0])
+    if share < WIDE:
+        return []
+    unit, finer = model.parameters.units.input, "q31" if arithmetic == "q15" else "float64"
+    return [
+        f"the inverse in {arithmetic} may be off by {_most(error)}{f' {unit}' if unit else ''}, {100 * share:.0f} % of "
+        f"the drive's range: {'' if arithmetic == finer else f'take {finer}, '}raise p_0 or narrow input_range"
+    ]
+
+
+def _inverse_error(model: Model, arithmetic: str) -> float:
+    """Most that the emitted inverse differs from the exact one, input units. Raises FormatError."""
+    engine = model.engine(arithmetic=arithmetic)
+    if arithmetic in ("float32", "float64"):
+        return error_bounds(model.cascade, arithmetic, engine).rounding
+    emit = model.parameters.emit
+    form = fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]
+    return 0.0 if form.inverse_rounding is None else form.inverse_rounding * float(form.drive_lsb)

@@ -32,15 +32,16 @@ def verify_model(
     the strict flags and under its own default dialect, over records of `length` calls. On the cores of
     `verification.targets` with zig and, where installed, Debian's cross gcc, emulated, over records of `target_length`
     calls (default: as many as that core is fast enough for), with the instructions of every sample counted. On the AVR
-    the emitted self-test alone. A compiler or target that is asked for and missing is a failed row. Raises what `emit`
-    raises, and ValueError for a target that does not exist.
+    the emitted self-test alone. What is named twice is done once. A compiler or target that is asked for and missing is
+    a failed row. Raises what `emit` raises, and ValueError for a target that does not exist.
     """
     options = emit_options(model, operator, arithmetic, engine, layout)
     numbers = model.tables(options.arithmetic, options.engine)
     real = REALS[options.arithmetic]
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
-    chosen = [known[name] if name in known else find(name) for name in targets]
+    chosen = [known[name] if name in known else find(name) for name in dict.fromkeys(targets)]
+    compiler = tuple(dict.fromkeys(compiler))
 
     @functools.cache
     def records(length: int, op: str) -> list[Expected]:
