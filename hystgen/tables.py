@@ -141,9 +141,10 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     pi = cascade.pi
     n = pi.n
 
-    def reals(values: Sequence[float], what: str) -> NDArray[Any]:
+    def reals(values: Sequence[float], what: str, *at: str) -> NDArray[Any]:
         if any(abs(x) > largest / 16 for x in values):
-            raise FormatError(f"{what} reach {max(abs(x) for x in values):.3g}, too large for {arithmetic}")
+            message = f"{what} reach {max(abs(x) for x in values):.3g}, too large for {arithmetic}"
+            raise FormatError((("model", *at), message))
         return np.array(values, dtype=dtype)
 
     products = [p * r for p, r in zip(pi.weights, pi.thresholds, strict=True)]
@@ -178,7 +179,8 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         drive = inward(*cascade.input_range, dtype)
         outputs = inward(*cascade.output_range, dtype)
         if not (drive[0] < drive[1] and outputs[0] < outputs[1]):
-            raise FormatError(f"input_range or the output range is narrower than {arithmetic} can tell apart")
+            message = f"this range of the drive, or that of the output, is narrower than {arithmetic} can tell apart"
+            raise FormatError((("input_range",), message))
         limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [float(x) for x in (*drive, *outputs)]
     else:
         limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
@@ -192,21 +194,24 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     limits[reference.REAL_MAX] = largest
     if max(map(abs, limits)) > largest:
         reached = max(map(abs, limits))
-        raise FormatError(f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}")
+        message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
+        raise FormatError((("model",), message))
 
     tables = Tables(
-        threshold=reals(pi.thresholds, "thresholds"),
-        weight=reals(pi.weights, "weights"),
-        slope=reals(slope, "sums of weights"),
-        lift=reals(lift, "sums of weight times threshold"),
-        start_level=reals(start_level, "outputs at which plays start to follow"),
-        inverse_slope=reals([1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights"),
-        start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states"),
+        threshold=reals(pi.thresholds, "thresholds", "pi", "thresholds"),
+        weight=reals(pi.weights, "weights", "pi", "weights"),
+        slope=reals(slope, "sums of weights", "pi", "weights"),
+        lift=reals(lift, "sums of weight times threshold", "pi"),
+        start_level=reals(start_level, "outputs at which plays start to follow", "pi"),
+        inverse_slope=reals(
+            [1.0 / c if c > 0 else 0.0 for c in slope], "reciprocals of the sums of weights", "pi", "weights"
+        ),
+        start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states", "pi"),
         limits=np.array(limits, dtype=dtype),
         stage_kind=np.array(kinds, dtype=np.int64),
         stage_first=np.array(firsts, dtype=np.int64),
         stage_size=np.array(sizes, dtype=np.int64),
-        stage_data=reals(numbers, "numbers of the memoryless stages"),
+        stage_data=reals(numbers, "numbers of the memoryless stages", "memoryless"),
         engine=reference.CORNERS if engine == "corners" else reference.LOOP,
         branches=int(cascade.branches_differ),
         tanh=kernels.tanh_tables(dtype),

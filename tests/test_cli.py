@@ -881,6 +881,23 @@ def test_show_warns_of_a_wide_error_of_the_inverse(p0: float, arithmetic: str, a
     assert result.stderr == (f"warning: {off}: {advice} or narrow input_range\n" if advice else "")
 
 
+@pytest.mark.parametrize(
+    ("drive", "pi", "said"),
+    [
+        ("[1.0, 1.00000001]", "{thresholds: [0, 1.0e-9], weights: [0.5, 0.1]}", "3:14: error: input_range: this range"),
+        ("[0, 1.0e+30]", "{thresholds: [0, 1.0e+29], weights: [1.0e-9, 1.0e+20]}", "5:7: error: model.pi: sums of"),
+    ],
+)
+def test_numbers_that_float32_cannot_hold_are_refused_where_they_stand(drive: str, pi: str, said: str) -> None:
+    Path("far.yaml").write_text(f"hystgen: 1\nname: far\ninput_range: {drive}\nmodel:\n  pi: {pi}\n")
+    before = sorted(os.listdir())
+    result = hyst("emit", "far.yaml", "--arithmetic", "float32", code=2)
+    assert result.stderr.startswith(f"far.yaml:{said}"), result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert sorted(os.listdir()) == before
+    hyst("emit", "far.yaml", "--arithmetic", "float64")
+
+
 @pytest.mark.parametrize("name", ["stage", "p0"])
 def test_show_draws_png_and_svg(name: str) -> None:
     Path("p0.yaml").write_text(NO_INVERSE)
