@@ -44,7 +44,8 @@ class Neighbour(Effect):
         def build(x: np.ndarray) -> Neighbour:
             return cls(name="user:neighbour", amplitude=unit * float(x[0]), period=float(10.0 ** x[1]))
 
-        low, high, start = np.array([-20.0, last - 1.0]), np.array([20.0, last + 1.0]), np.array([0.1, last])
+        low, high, start = np.array([-20.0, last - 1.0]), np.array([20.0, last + 1.0]), np.array([1.0, last])
         # A search finds the period only from near by: one start every 12 %
-        others = tuple(np.array([0.1, last + shift]) for shift in np.arange(-1.0, 0.0, 0.05))
-        return [Candidate("user:neighbour", low, high, start, build, np.array([0.0, last]), others)]
+        others = tuple(np.array([1.0, last + shift]) for shift in np.arange(-1.0, 1.0, 0.05))
+        none = np.array([0.0, last])
+        return [Candidate("user:neighbour", low, high, start, build, none, others, amounts=(0,))]

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ import hystgen
 from hystgen import parallel
 from hystgen.diagnosis import believed, decisions, floor, options, structure, trials
 from hystgen.diagnosis.structure import Item
-from hystgen.effects.base import Run
+from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep import ExponentialCreep
 from hystgen.effects.drift import LinearDrift
 from hystgen.effects.sensor_nonlinearity import SensorPolynomial
@@ -467,6 +467,94 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
 def test_no_records_to_judge_by(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="record"):
         hystgen.diagnose(hystgen.load(_model(tmp_path)), [])
+
+
+class TestOwnEffects:
+    """A user's own effect takes part like those of the catalogue."""
+
+    def records(self, amplitude: float, period: float) -> list[Record]:
+        """Five records of one session: plays, a duty cycle beside them, noise."""
+        made = []
+        for number in range(5):
+            v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 - 0.1 * number) * (wander(number, 40) - 40.0)])
+            t = np.arange(len(v)) * 1e-3 + 4.0 * number
+            y = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0)
+            y = y + 0.5 * amplitude * (1.0 - np.cos(2.0 * np.pi * t / period))
+            made.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
+        return made
+
+    @pytest.mark.parametrize(("amplitude", "period"), [(2.0, 3.3), (-6.0, 11.0)])
+    def test_it_is_found_named_and_added(self, tmp_path: Path, run: Call, amplitude: float, period: float) -> None:
+        """With an amount of either sign, larger than where a search starts."""
+        records = self.records(amplitude, period)
+        for each in records:
+            table = np.column_stack([each.t, each.v, each.y])
+            np.savetxt(tmp_path / f"{each.name}.csv", table, delimiter=",", header="t,v,y", comments="")
+        own = Path(__file__).parents[1] / "examples" / "my_effect.py"
+        files = [tmp_path / f"{each.name}.csv" for each in records]
+        words = [*files[:3], "--holdout", files[3], "--holdout", files[4], "--history", "0", "--effects", own]
+        code, _, err = run("diagnose", _model(tmp_path), *words, "-o", tmp_path / "out")
+        assert code == 0, err
+        (effect,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["effects"]
+        assert effect["name"] == "user:neighbour"
+        # how well the records tell amplitude and period beside offsets and weights: four deviations
+        columns = []
+        for k, each in enumerate(records[:3]):
+            angle = 2.0 * np.pi * np.asarray(each.t) / period
+            plays = [brute_output(each.v, (r,), (1.0,), 0.0) for r in (0.0, 10.0)]
+            columns.append(
+                np.column_stack(
+                    [0.5 * (1.0 - np.cos(angle)), -0.5 * amplitude * np.sin(angle) * angle / period, *plays]
+                    + [np.full(len(angle), float(k == other)) for other in range(3)]
+                )
+            )
+        table = np.concatenate(columns)
+        sure = 0.02 * np.sqrt(np.diag(np.linalg.inv(table.T @ table)))
+        found = effect["parameters"]
+        assert abs(found["amplitude"] - amplitude) <= 4.0 * sure[0]
+        assert abs(found["period"] - period) <= 4.0 * sure[1]
+        again = hystgen.load(tmp_path / "out" / "params.yaml", effects=[own])
+        assert [each.name for each in again.effects] == ["user:neighbour"]
+
+    def test_it_sees_all_samples(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Others do with fewer while they are tried; its code may count on even steps."""
+        monkeypatch.setattr(trials, "SCREENED", 500)
+        monkeypatch.setattr(trials, "SEARCHED", 800)
+        seen = []
+
+        class Even(Effect):
+            name: Literal["user:even"] = "user:even"
+            height: float
+            place: ClassVar[Place] = Place.ADDED
+
+            def added(self, run: Run) -> Array:
+                seen.append(float(np.ptp(np.diff(run.t))))
+                return np.full(len(run.t), self.height) * run.t
+
+            @classmethod
+            def candidates(cls, about: About) -> list[Candidate]:  # noqa: ARG003
+                def build(x: Array) -> Even:
+                    return cls(height=float(x[0]))
+
+                return [Candidate("even", np.array([-9.0]), np.array([9.0]), np.array([0.1]), build, np.zeros(1))]
+
+        records = self.records(2.0, 11.0)
+        given: dict[str, Any] = {"holdout": records[3:], "history": [0.0]}
+        steps = []
+        look = trials.thinned
+
+        def looked(groups: Any, most: int, masks: Any) -> Any:
+            found = look(groups, most, masks)
+            steps.extend(float(np.ptp(np.diff(item.run.t))) for group in found for item in group)
+            return found
+
+        monkeypatch.setattr(trials, "thinned", looked)
+        hystgen.diagnose(_model(tmp_path), records[:3], effects=[Even], **given)
+        assert seen
+        assert max(seen) < 1e-9
+        assert max(steps) < 1e-9
+        hystgen.diagnose(_model(tmp_path), records[:3], **given)
+        assert max(steps) > 1e-3
 
 
 def _model(folder: Path) -> Path:

@@ -202,11 +202,21 @@ def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_S
     def acting(searches: Sequence[Search]) -> Sequence[Search]:
         return [each for each in searches if abs(each.now.rms - without[0]) > IDLE * without[0]] or searches
 
+    def enough_of_it(option: Option, start: Array) -> Array:
+        if option.front or not option.alone.parts[-1].candidate.amounts:
+            return start
+        *others, last = option.alone.parts
+        amounts = replace(last, candidate=last.candidate.at(start))
+        structure = replace(option.alone, parts=(*others, amounts))
+        return fits.begun(structure, records.thin, start, now.weights).further(1, COARSE).now.shape
+
     def begin(option: Option) -> Fitted:
         starts = list(option.starts)
         if option.grown is not None:
             starts.append(option.grown(simpler[option.beyond].fitted.shape))
-        begun = [fits.begun(option.alone, records.thin, start, now.weights) for start in starts]
+        begun = [
+            fits.begun(option.alone, records.thin, enough_of_it(option, start), now.weights) for start in starts
+        ]
         near = TOO_FAR * min(each.now.rms for each in acting(begun))
         searches = [each.further(FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
         best = min(acting(searches), key=lambda each: each.now.rms)

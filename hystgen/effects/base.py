@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -135,7 +135,9 @@ class Candidate:
 
     `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens;
     `others`: further starts, where the error may have several minima; `beyond`: label of a shape of fewer numbers that
-    this one contains, and without which it is not worth trying; `grown`: a start made of the numbers of that one.
+    this one contains, and without which it is not worth trying; `grown`: a start made of the numbers of that one;
+    `amounts`: places of numbers that say how much of it there is, which are sought first from every start, since at a
+    small or wrong amount the other numbers say little.
     """
 
     label: str
@@ -147,6 +149,12 @@ class Candidate:
     others: tuple[Array, ...] = ()
     beyond: str = ""
     grown: Callable[[Array], Array] | None = None
+    amounts: tuple[int, ...] = ()
+
+    def at(self, numbers: Array) -> Candidate:
+        """The same with all numbers but the amounts as they are here."""
+        free = np.isin(np.arange(len(numbers)), self.amounts)
+        return replace(self, low=np.where(free, self.low, numbers), high=np.where(free, self.high, numbers))
 
 
 Problem = tuple[tuple[str | int, ...], str]
