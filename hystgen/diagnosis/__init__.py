@@ -22,6 +22,7 @@ from hystgen.diagnosis import bad_samples, believed, channels, floor, intervals,
 from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
+from hystgen.diagnosis.trials import Records
 from hystgen.identification import stage_content, threads
 from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
@@ -156,7 +157,8 @@ def diagnose(
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
         refitted = selection.refit(base, ready.to_fit, start)
-        found = selection.select(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
+        searched = Records.of(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
+        found = selection.select(searched, refitted)
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]

@@ -16,7 +16,6 @@ from hystgen.diagnosis.options import Option
 from hystgen.diagnosis.structure import Fitted, Item, Structure
 from hystgen.diagnosis.thinning import everything, thinned
 from hystgen.diagnosis.trials import Records, Tried, free_numbers
-from hystgen.effects.base import Effect
 from hystgen.identification import joint
 from hystgen.identification.fronts import Kept
 
@@ -60,23 +59,15 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
     return fits.fit(base, quick, start, _first_weights(base, quick, start))
 
 
-def select(
-    to_fit: Sequence[Item],
-    held: Sequence[Item],
-    refitted: Fitted,
-    noise: float,
-    user: Sequence[type[Effect]] = (),
-    tick: Callable[[], None] = lambda: None,
-) -> Outcome:
+def select(records: Records, refitted: Fitted) -> Outcome:
     """Add effects to the refitted model as long as one qualifies."""
-    records = Records.of(to_fit, held, refitted, noise, user, tick)
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
     gap = records.left(now)
     latest: _Step | None = None
     for _ in range(ROUNDS):
-        if records.left(now) <= decisions.AT_FLOOR * noise:
+        if records.left(now) <= decisions.AT_FLOOR * records.noise:
             break
         step = _step(now, gap, records)
         if latest is not None and step is not None:
