@@ -29,6 +29,7 @@ class Hypothesis:
         self.world, self.names = world, names
         self.left = world.left.get(names, 1.0) if left is None else left
         self.shape = np.zeros(len(names))
+        self.bare = not names
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
 
     @property
@@ -204,6 +205,7 @@ class Made:
         self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
         self.rms = left[0]
         self.structure = SimpleNamespace(bounds=(np.full(2, -1.0), np.full(2, 1.0)))
+        self.bare = True
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
 
     def errors(self, items: Sequence[int], like: Any = None) -> list[Array]:
@@ -234,6 +236,18 @@ def test_nearly_all_that_is_left_is_worth_a_name() -> None:
     records: Any = SimpleNamespace(gap=1.0)
     assert decisions.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
     assert not decisions.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
+
+
+@pytest.mark.parametrize(("left", "first", "further"), [(0.6, True, True), (0.8, True, False), (0.9, False, False)])
+def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, further: bool) -> None:
+    """Of 1 it removes 0.8, 0.6 and 0.44, which are 1.33, 0.75 and 0.48 times what it leaves."""
+    better = Made("better", 1, (left, left))
+    best = trials.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    for bare, accepted in ((True, first), (False, further)):
+        now: Any = Made("now", 1, (1.0, 1.0))
+        now.bare = bare
+        assert (decisions.merit_of(now, best, records) is not None) is accepted
 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])

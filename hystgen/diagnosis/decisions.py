@@ -30,8 +30,9 @@ What a right name in a wrong shape leaves to a second one, and no better shape t
 NEARLY_ALL = 0.25
 """Or it leaves at most so much of the error before it: beside a far larger effect that share may be out of reach."""
 
-ABOVE_NOISE = 0.6
-"""The part that it removes has an rms of at least so many times what is left, or the noise if that is more."""
+ABOVE_NOISE, FURTHER = 0.6, 1.0
+"""The part that it removes has an rms of at least so many times what is left, or the noise if that is more; of a model
+that has a front or effects already the second: what a right name in a wrong shape leaves to another is less."""
 
 SURE, REPEATED = 1e-3, 0.05
 """Largest p-value of the difference in held-out error; or of that where the fitted records show it with the first."""
@@ -78,7 +79,7 @@ def merit_of(now: Fitted, best: Tried, records: Records) -> Merit | None:
     errors = _without_merit(now, best, records.held)
     equal = fits.rms(errors)
     removed = apart(equal, best.held_out)
-    if removed < ABOVE_NOISE * max(records.noise, best.held_out):
+    if removed < (ABOVE_NOISE if now.bare else FURTHER) * max(records.noise, best.held_out):
         return None
     p_value = difference(errors, best.errors)
     if p_value > REPEATED:

@@ -554,6 +554,11 @@ class Fitted:
         """What was found."""
         return self.structure.actuator(self.shape)
 
+    @property
+    def bare(self) -> bool:
+        """Whether there is neither a front nor an effect."""
+        return not self.structure.parts and not self.actuator.stages
+
     def errors(self, items: Sequence[Item], like: Fitted | None = None) -> list[Array]:
         """Error signals over records; `like`: with what another model leaves free in them."""
         actuator = self.actuator
