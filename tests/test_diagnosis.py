@@ -20,11 +20,13 @@ from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import believed, decisions, floor, options, structure, trials
+from hystgen.diagnosis import _extended, believed, decisions, floor, options, structure, trials
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep import ExponentialCreep
 from hystgen.effects.drift import LinearDrift
+from hystgen.effects.noncongruent import PlayFunctions
+from hystgen.effects.rate_dependence import RelaxingPlays
 from hystgen.effects.sensor_nonlinearity import SensorPolynomial
 from hystgen.identification.fronts import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record
@@ -467,6 +469,34 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
 def test_no_records_to_judge_by(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="record"):
         hystgen.diagnose(hystgen.load(_model(tmp_path)), [])
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        RelaxingPlays(name="rate_dependence", shape="relaxation", time_constant=1e-4, exponent=3.0),
+        PlayFunctions(name="noncongruent", coefficients=((0.3,), (0.2,), (0.1,))),
+        LinearDrift(name="drift", rate=0.5),
+    ],
+    ids=lambda effect: effect.name,
+)
+def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: Effect) -> None:
+    """Though the play of the largest threshold has no weight: stretches are measured in it."""
+    places, weights = np.array([0.0, 10.0, 20.0, 30.0]), np.array([1.0, 0.5, 0.25, 0.0])
+    form = structure.Structure(places, Kept(), (structure.kept(effect),))
+    v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (wander(3, 40) - 40.0)])
+    run = Run(np.arange(len(v)) * 1e-3, v)
+    item = Item("made", run, v, (0.0,), 100.0)
+    actuator = structure.Actuator(places, (), (effect,))
+    (rows,), _ = actuator.columns(item, weights)
+    predicted = rows + actuator.added(item)
+    item = dataclasses.replace(item, y=predicted)
+    fitted = structure.Fitted(form, np.empty(0), weights, 0.0)
+    ready = believed.Prepared([item], [item], [], [], (0.0, 100.0), places)
+    extended = hystgen.Model(_extended(hystgen.load(_model(tmp_path)).parameters, fitted, ready, ()))
+    (found,) = extended.chain.simulate([run], [0.0])
+    # weights are written with ten digits; each multiplies up to 100, and the offset is the mean of what that leaves
+    assert np.max(np.abs(found - predicted)) <= 2.0 * 0.5e-9 * np.sum(weights) * 100.0
 
 
 class TestOwnEffects:

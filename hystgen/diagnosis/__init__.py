@@ -23,6 +23,7 @@ from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
+from hystgen.effects.base import Place
 from hystgen.identification import stage_content, threads
 from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
@@ -216,6 +217,8 @@ def _extended(
     r = fitted.structure.thresholds
     kept = (p > 0.0) | (r == 0.0)
     actuator = fitted.actuator
+    if actuator.at(Place.PLAYS):  # what acts on plays may be measured in the largest threshold
+        kept[-1] = True
     fewer = tuple(r[kept].tolist())
     if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # numbers of its own for every play
         kept[:] = True
