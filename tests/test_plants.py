@@ -617,3 +617,37 @@ class TestCommands:
         with pytest.raises(SystemExit):
             main(["generate", "--block", "tune", "--kind", "none", "--seeds", "9999:10002", "-o", "x"])
         assert "tune" in capsys.readouterr().err
+
+
+class TestActivatedFriction:
+    """A slider that needs `y (1 + s asinh(slip/c))` to slip: y = 10, s = 0.04, c = 50 in input units and seconds."""
+
+    WIDTH, STRENGTH, RATE = 10.0, 0.04, 50.0
+
+    def stretch(self, v: Array, dt: float) -> Array:
+        """What the spring is stretched by."""
+        y, one = np.array([self.WIDTH]), np.ones(1)
+        return np.asarray(v - base._activated(v, np.full(len(v), dt), y, one, self.STRENGTH, self.RATE))
+
+    @pytest.mark.parametrize("speed", [0.5, 50.0, 5e4])
+    def test_at_constant_speed_all_of_it_slips(self, speed: float) -> None:
+        dt = 0.05 / speed
+        there = np.arange(2000) * 0.05
+        v = np.concatenate([there, there[-2::-1]])
+        expected = self.WIDTH * (1.0 + self.STRENGTH * math.asinh(speed / self.RATE))
+        stretch = self.stretch(v, dt)
+        assert stretch[1999] == pytest.approx(expected, rel=1e-6)
+        assert stretch[-1] == pytest.approx(-expected, rel=1e-6)
+        sticks = np.abs(stretch) < self.WIDTH * (1.0 - 1e-9)
+        assert abs(np.count_nonzero(sticks) - 2.0 * self.WIDTH / 0.05) <= 2  # behind the turn, from one limit to the other
+        assert np.diff(stretch)[sticks[1:]] == pytest.approx(np.diff(v)[sticks[1:]], abs=1e-12)
+
+    def test_finer_steps_change_little(self) -> None:
+        """Implicit Euler is of first order: half the step, half the error, on a drive that slows down and turns."""
+        outs = []
+        for finer in (1, 2, 4):
+            t = np.arange(2000 * finer + 1) * (1e-3 / finer)
+            outs.append(self.stretch(60.0 * np.sin(2 * np.pi * 1.5 * t), 1e-3 / finer)[::finer])
+        coarse, fine = (np.max(np.abs(a - b)) for a, b in pairwise(outs))
+        assert coarse < 0.1 * self.WIDTH * self.STRENGTH
+        assert fine < 0.65 * coarse

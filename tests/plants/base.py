@@ -111,7 +111,8 @@ def spread(base: Base, rows: int) -> tuple[Array, Array]:
 @dataclass(frozen=True)
 class Viscosity:
     """Sliders that slip with a delay. `law` power: excess decays as x' = -(x/unit)^exponent unit/tau_i with
-    tau_i = tau (r_i/mean r)^slant; `law` activated: yield points grow by r_i strength asinh(|v'|/rate)."""
+    tau_i = tau (r_i/mean r)^slant; `law` activated: yield points grow by r_i strength asinh(slip rate/rate), thermally
+    activated friction (Prandtl, Eyring), each time step solved for its end."""
 
     law: str
     tau: float = 0.0
@@ -316,12 +317,20 @@ def _activated(v: Array, dt: Array, yields: Array, stiffnesses: Array, strength:
     out = np.empty(len(v))
     for k in range(len(v)):
         move = v[k] - v[k - 1] if k else 0.0
-        step = dt[k] if k else 1.0
-        growth = 1.0 + strength * math.asinh(abs(move) / step / rate)
+        slipped = max(dt[k], 1e-12) * rate if k else rate
         total = 0.0
         for i in range(len(yields)):
-            limit = yields[i] * growth
-            e = min(max(stretch[i] + move, -limit), limit)
+            e = stretch[i] + move
+            if abs(e) > yields[i]:
+                # y (1 + strength u) + slipped sinh(u) = |e|, which bends upwards: Newton's way down from above
+                u = math.asinh((abs(e) - yields[i]) / slipped)
+                for _ in range(50):
+                    grows = yields[i] * strength + slipped * math.cosh(u)
+                    step = (yields[i] * (1.0 + strength * u) + slipped * math.sinh(u) - abs(e)) / grows
+                    u -= step
+                    if abs(step) < 1e-9:
+                        break
+                e = math.copysign(yields[i] * (1.0 + strength * u), e)
             stretch[i] = e
             total += stiffnesses[i] * (v[k] - e)
         out[k] = total
