@@ -639,7 +639,8 @@ class TestActivatedFriction:
         assert stretch[1999] == pytest.approx(expected, rel=1e-6)
         assert stretch[-1] == pytest.approx(-expected, rel=1e-6)
         sticks = np.abs(stretch) < self.WIDTH * (1.0 - 1e-9)
-        assert abs(np.count_nonzero(sticks) - 2.0 * self.WIDTH / 0.05) <= 2  # behind the turn, from one limit to the other
+        # behind the turn, from one limit to the other
+        assert abs(np.count_nonzero(sticks) - 2.0 * self.WIDTH / 0.05) <= 2
         assert np.diff(stretch)[sticks[1:]] == pytest.approx(np.diff(v)[sticks[1:]], abs=1e-12)
 
     def test_finer_steps_change_little(self) -> None:
