@@ -73,13 +73,18 @@ class Merit:
         return self.removed >= SHARE * gap or self.fitted >= SHARE * records.gap or self.left <= NEARLY_ALL
 
 
-def merit_of(now: Fitted, best: Tried, records: Records) -> Merit | None:
+def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
     """None where chance explains the difference, or what is removed is too little to be told from the noise, or all but
-    nothing of it is in the records that its numbers are from."""
+    nothing of it is in the records that its numbers are from.
+
+    `least`: how many times what is left, or the noise, has to be removed; by default as `ABOVE_NOISE` says.
+    """
     errors = _without_merit(now, best, records.held)
     equal = fits.rms(errors)
     removed = apart(equal, best.held_out)
-    if removed < (ABOVE_NOISE if now.bare else FURTHER) * max(records.noise, best.held_out):
+    if least is None:
+        least = ABOVE_NOISE if now.bare else FURTHER
+    if removed < least * max(records.noise, best.held_out):
         return None
     p_value = difference(errors, best.errors)
     if p_value > REPEATED:

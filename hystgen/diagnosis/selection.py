@@ -114,17 +114,19 @@ def _step(
     records: Records,
     worth: Callable[[Option], bool] | None = None,
     start: Fitted | None = None,
+    least: float | None = None,
 ) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
 
-    `start`: the same hypothesis with other numbers, from which extensions are sought. What explains most may owe it to
-    what it leaves free in a record, and be good for nothing on equal terms; then it is the next one's turn.
+    `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. What
+    explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is the
+    next one's turn.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
         return None
     for best in decisions.simplest_first(tried, records):
-        merit = decisions.merit_of(now, best, records)
+        merit = decisions.merit_of(now, best, records, least)
         if merit is not None and merit.worth(gap, records):
             return _Step(now, tried, best, merit)
     return _Step(now, tried, tried[0], None)
@@ -171,12 +173,12 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
             and decisions.difference(fitted, first.fitted.errors(records.to_fit)) > decisions.SURE
         ):
             continue
-        second = _step(first.fitted, gap, records)
+        second = _step(first.fitted, gap, records, least=decisions.ABOVE_NOISE)
         if second is not None and second.merit is not None and second.best.name != first.name:
             seconds.append((first, second))
     for first, second in sorted(seconds, key=lambda pair: pair[1].best.held_out):
         alone = _without(second.best.fitted, first.name, records)
-        back = None if alone is None else _step(alone, gap, records)
+        back = None if alone is None else _step(alone, gap, records, least=decisions.ABOVE_NOISE)
         if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
             continue
         merit = decisions.merit_of(failed.now, back.best, records)
@@ -226,8 +228,10 @@ def _exchanged(now: Fitted, found: list[Found], names: Collection[str], records:
         left -= 1
         for k, old in enumerate(found):
             fitted = None if old.name == latest else _without(now, old.name, records)
+            if fitted is None:
+                continue
             start = _left_as_it_is(now, old.name, records)  # the others' numbers without any may be far from all others
-            step = None if fitted is None else _step(fitted, 0.0, records, lambda option: option.name in names, start)
+            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, decisions.ABOVE_NOISE)
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
