@@ -114,6 +114,17 @@ def test_effects_that_hide_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     assert together(World({**BOTH, frozenset("c"): 0.9}, "abc"), monkeypatch) == ["a", "b"]
 
 
+def test_neither_of_two_is_a_further_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each removes 0.8 times what both leave, beside the other: enough for a first name, and not for a further one."""
+    both = {frozenset("a"): 0.95, frozenset("ab"): 0.74}
+    assert together(World(both, "ab"), monkeypatch) == ["a", "b"]
+    world = World(both, "ab")
+    now: Any = Hypothesis(world, frozenset("a"))
+    step = selection._step(now, world.gap(now), world.records)
+    assert step is not None
+    assert step.merit is None
+
+
 def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sought from where both are, one does as well alone: the search had merely not found it."""
     assert together(World(BOTH, "ab"), monkeypatch, {"a": 0.021, "b": 0.021}) == []
