@@ -22,7 +22,7 @@ from scipy import integrate, interpolate, signal, special
 
 import hystgen
 from hystgen import effects
-from hystgen.effects import About, Chain, Effect, Place, Run
+from hystgen.effects import About, Chain, Effect, Place, Run, recursions
 from hystgen.effects.base import Compensated
 from hystgen.effects.chain import VISIT, in_order, join
 from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
@@ -542,6 +542,22 @@ def test_any_relaxation_against_an_ode_solver(part: int) -> None:
         effect = make("rate_dependence", shape="relaxation", time_constant=tau, exponent=m)
         found = effect.plays(w, Run(t, w), np.array([0.0, 1.0]), np.zeros(2))[1]
         assert np.max(np.abs(found - expected)) < 1e-5, (tau, m, w)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 3.0])
+def test_a_relaxation_over_moves_of_some_roundings(exponent: float) -> None:
+    """A play that lets go of a hair's stretch may catch up where hardly anything is left of the move: nothing moves
+    then, and no state is further away than its threshold and what it was before."""
+    r, tau = 0.375662, 0.0006880369858470095
+    moves = [(-8.45397949219, -8.453979492189998, -8.078317492189814)]
+    rng = np.random.default_rng(4)
+    for side in rng.choice([-1.0, 1.0], 2000):
+        x = rng.uniform(-10.0, 10.0)
+        state = x - side * (r + rng.integers(-3, 1000) * 1.8e-15)
+        moves.append((x, x + rng.integers(-3, 4) * 1.8e-15, state))
+    for x, target, state in moves:
+        left = float(recursions.code().relaxed(x, target, 0.01, r, tau, exponent, 2.0, state))
+        assert abs(target - left) <= max(r, abs(x - state)) + 2e-14
 
 
 def test_fast_relaxation_is_the_play() -> None:

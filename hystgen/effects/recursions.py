@@ -230,7 +230,7 @@ def relaxed(
             side = 0.0
         else:
             state = target - side * (r + e)
-    if side == 0.0 and left > 0.0:
+    if side == 0.0 and left > 0.0 and target != x:
         way = 1.0 if target > x else -1.0
         beyond = way * (target - state) - r
         if beyond > 0.0:

@@ -131,8 +131,11 @@ def search(
     for _ in range(most if len(shape) else 0):
         if damping > 1e6 or now.rms == 0.0 or not math.isfinite(now.rms):
             break
+        system = now.system.whole
+        if not np.isfinite(system).all():  # numbers next to these make none
+            break
         try:
-            change, p = solve_linear(now.system.whole, now.weights, now.shape, limits, damping)
+            change, p = solve_linear(system, now.weights, now.shape, limits, damping)
         except constrained.InfeasibleError:
             break
         moved = np.clip(now.shape + change, low, high)
