@@ -546,6 +546,29 @@ class TestOwnEffects:
         again = hystgen.load(tmp_path / "out" / "params.yaml", effects=[own])
         assert [each.name for each in again.effects] == ["user:neighbour"]
 
+    def test_numbers_that_make_nothing_end_its_search(self, tmp_path: Path) -> None:
+        """Right beside the start the output is no number."""
+
+        class Cliff(Effect):
+            name: Literal["user:cliff"] = "user:cliff"
+            height: float
+            place: ClassVar[Place] = Place.ADDED
+
+            def added(self, run: Run) -> Array:
+                return self.height * run.t if self.height <= 0.1 else np.full(len(run.t), np.inf)
+
+            @classmethod
+            def candidates(cls, about: About) -> list[Candidate]:  # noqa: ARG003
+                def build(x: Array) -> Cliff:
+                    return cls(height=float(x[0]))
+
+                return [Candidate("cliff", np.array([-9.0]), np.array([9.0]), np.array([0.1]), build, np.zeros(1))]
+
+        records = self.records(2.0, 11.0)
+        given: dict[str, Any] = {"holdout": records[3:], "history": [0.0]}
+        content = hystgen.diagnose(_model(tmp_path), records[:3], effects=[Cliff], **given).content
+        assert "user:cliff" not in [effect["name"] for effect in content["effects"]]
+
     def test_it_sees_all_samples(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """Others do with fewer while they are tried; its code may count on even steps."""
         monkeypatch.setattr(trials, "SCREENED", 500)
