@@ -364,9 +364,9 @@ class _Builder:
         return plays + weights + self.offset_error
 
     def _own_error(self) -> tuple[Fraction, Fraction]:
-        """Rounding of the double model itself: forward in output, inverse in drive units."""
+        """Rounding of the double model itself, each on one branch: forward in output, inverse in drive units."""
         own = error_bounds(self.cascade, "float64", "corners")
-        return Fraction(own.forward), Fraction(own.inverse) if math.isfinite(own.inverse) else Fraction(0)
+        return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
 
     def _drive_short(self) -> Fraction:
         """How far the first and last drive codes can be inside the ends of the range, in drive units."""

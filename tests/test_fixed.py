@@ -121,6 +121,37 @@ def test_bounds_are_not_slack(arithmetic: str) -> None:
 
 
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    "down", [(6.0, 0.3, -1.4, 5.6), (6.0, 0.3, -1.2, 5.3), (6.0, 0.3, -1.0, 6.0)], ids=["lifted", "shifted", "far"]
+)
+def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
+    arithmetic: str, down: tuple[float, float, float, float]
+) -> None:
+    """It holds while both are on the same branch, and is that of one branch: however far the other one is."""
+    pi, ends = PI([0, 0.5, 1.2, 2], [0.7, 0.2, 0.1, 0.05]), (0.0, 10.0)
+    up = (6.0, 0.3, -1.4, 5.3)
+    model = Cascade(pi, (TanhEnvelope(up, down),), 0.0, ends)
+    tables, form = built(model, arithmetic)
+    assert form.inverse_rounding is not None
+    single = [Cascade(pi, (TanhEnvelope(branch),), 0.0, ends) for branch in (up, down)]
+    alone = [built(each, arithmetic)[1].inverse_rounding or 0.0 for each in single]
+    # the bound takes the steepest and the flattest slope of both branches, and a step as long as one branch's or twice
+    slopes = [each.front_slopes for each in single]
+    both = max(s[1] for s in slopes) / min(s[0] for s in slopes)
+    assert form.inverse_rounding <= 2 * max(b * both / (s[1] / s[0]) for b, s in zip(alone, slopes, strict=True))
+    low, high = (int(x) for x in tables.limits[2:4])
+    k = np.linspace(0, 1, 3000)
+    codes = np.rint((low + high) / 2 + (high - low) / 2 * np.sin(30 * k) * (1 - 0.9 * k)).astype(np.int64)
+    ours, exact = Session(model, "inverse", arithmetic), Session(model, "inverse", clamp=True)
+    errors = []
+    for code in codes:
+        answer = ours.run([code])[0][0]
+        errors.append(abs(answer - exact.run([code * float(form.output_lsb)])[0][0] / float(form.drive_lsb)))
+        assert ours.state.counts[reference.ASCENDING] == exact.state.counts[reference.ASCENDING]
+    assert 0 < max(errors) <= form.inverse_rounding
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", FILES)
 def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     """Plain Python whole numbers, which cannot overflow, run the reference and every intermediate sum is looked at."""

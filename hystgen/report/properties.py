@@ -97,11 +97,9 @@ def _shown(value: Any) -> str:
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
     """What fixed point gives the user, in physical units, or why it cannot be had."""
     lines = []
-    emit = model.parameters.emit
     for arithmetic in ("q31", "q15"):
         try:
-            engine = model.engine(arithmetic=arithmetic)
-            form = fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]
+            form = _format(model, arithmetic)
         except FormatError as error:
             lines.append(f"{arithmetic}                not available: " + str(error).replace("\n", "\n" + 34 * " "))
             continue
@@ -141,9 +139,13 @@ def warnings(model: Model) -> list[str]:
 
 def _inverse_error(model: Model, arithmetic: str) -> float:
     """Most that the emitted inverse differs from the exact one, input units. Raises FormatError."""
-    engine = model.engine(arithmetic=arithmetic)
     if arithmetic in ("float32", "float64"):
-        return error_bounds(model.cascade, arithmetic, engine).rounding
-    emit = model.parameters.emit
-    form = fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]
+        return error_bounds(model.cascade, arithmetic, model.engine(arithmetic=arithmetic)).rounding
+    form = _format(model, arithmetic)
     return 0.0 if form.inverse_rounding is None else form.inverse_rounding * float(form.drive_lsb)
+
+
+def _format(model: Model, arithmetic: str) -> fixed_tables.Format:
+    """What the model comes to in fixed point. Raises FormatError."""
+    emit, engine = model.parameters.emit, model.engine(arithmetic=arithmetic)
+    return fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]
