@@ -3,7 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-# Seeds of each kind that `make blind` takes from the report block, and where it works
+# Seeds of each kind that `make blind` takes from the report block, the first of them, and where it works
+FIRST := 0
 BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
@@ -45,7 +46,7 @@ fuzz: $(VENV)/ready
 # Makes the cases with their labels, has them diagnosed and counts; a case whose result is there is not run again
 blind: $(VENV)/ready
 	set -e; for part in $(BLIND); do $(BIN)/python -m tests.plants generate --block report --kind $${part%=*} \
-	    --seeds 0:$${part#*=} -o $(BLIND_DIR) --jobs $(JOBS); done
+	    --seeds $(FIRST):$$(($(FIRST) + $${part#*=})) -o $(BLIND_DIR) --jobs $(JOBS); done
 	$(BIN)/python -m tests.plants run $(BLIND_DIR)/cases -o $(BLIND_DIR)/results --jobs $(JOBS)
 	$(BIN)/python -m tests.plants score $(BLIND_DIR)/cases $(BLIND_DIR)/labels $(BLIND_DIR)/results \
 	    --json $(BLIND_DIR)/score.json
