@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hystgen.diagnosis import description
+from hystgen.words import counted
 
 REPAIRED = ("saturated", "drop_outs", "held_samples", "isolated_samples", "swapped_channels")
 """Kinds that are left out of the comparison or put right: what remains of the records is as good as any."""
@@ -37,7 +38,7 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
         )
     if kind == "stick_slip":
         return (
-            f"{record}: stick-slip, {_count(each['count'], 'jump')} of about {each['size']:.3g}{u} after standing "
+            f"{record}: stick-slip, {counted(each['count'], 'jump')} of about {each['size']:.3g}{u} after standing "
             f"still, the first at {each['first']:.6g} s"
         )
     if kind == "scale":
@@ -61,15 +62,15 @@ def _samples(each: Mapping[str, Any], u: str) -> str:
     kind, count = each["kind"], each["count"]
     at = f", the first at {each['first']:.6g} s" if "first" in each else ""
     if kind == "saturated":
-        return f"{_count(count, 'sample')} at the converter's end, {each['level']:.6g}{u}, not compared{at}"
+        return f"{counted(count, 'sample')} at the converter's end, {each['level']:.6g}{u}, not compared{at}"
     if kind == "drop_outs":
         level = f" to {each['level']:.6g}{u}" if "level" in each else ""
-        return f"{_count(count, 'drop-out')}{level}, {_count(each['samples'], 'sample')} not compared{at}"
+        return f"{counted(count, 'drop-out')}{level}, {counted(each['samples'], 'sample')} not compared{at}"
     if kind == "held_samples":
-        held = _count(each["samples"], "sample")
-        return f"the output stands still {_count(count, 'time')} while the drive moves, {held} not compared{at}"
+        held = counted(each["samples"], "sample")
+        return f"the output stands still {counted(count, 'time')} while the drive moves, {held} not compared{at}"
     done = "bridged" if each["channel"] == "v" else "not compared"
-    return f"{_count(count, 'isolated sample')} of {each['channel']} far from the neighbours, {done}{at}"
+    return f"{counted(count, 'isolated sample')} of {each['channel']} far from the neighbours, {done}{at}"
 
 
 def faults(entries: Sequence[Mapping[str, Any]]) -> str:
@@ -84,7 +85,7 @@ def faults(entries: Sequence[Mapping[str, Any]]) -> str:
         extra = {"swapped_channels": " with exchanged columns", "saturated": " at the converter's end",
                  "held_samples": " of held samples"}.get(kind, "")  # fmt: skip
         plural = "stretches" if what == "stretch" and number != 1 else None
-        said.append(f"{number} {plural}{extra}" if plural else f"{_count(number, what)}{extra}")
+        said.append(f"{number} {plural}{extra}" if plural else f"{counted(number, what)}{extra}")
     return ", ".join(said)
 
 
@@ -104,7 +105,3 @@ def advice(each: Mapping[str, Any]) -> list[str]:
 
 def _several(names: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= 3 else f"{len(names)} records ({names[0]}, {names[1]}, ..)"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from hystgen import operators
+from hystgen.words import counted
 
 Array = NDArray[np.float64]
 
@@ -172,18 +173,14 @@ def not_one_a_play(
 ) -> Iterator[Problem]:
     """The problem of a key that does not have one of `what` for each play with a threshold."""
     if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
-        counts = f"{_count(len(values), what)} for {_count(len(thresholds) - 1, 'play')}"
+        counts = f"{counted(len(values), what)} for {counted(len(thresholds) - 1, 'play')}"
         yield (key,), f"has {counts}; give one for each threshold but r_0"
 
 
 def not_as_many(key: str, values: Sequence[object], other: str, others: Sequence[object]) -> Iterator[Problem]:
     """The problem of a key that does not have as many values as another."""
     if len(values) != len(others):
-        yield (key,), f"has {_count(len(values), 'value')} for {len(others)} in {other}; give as many as {other}"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
+        yield (key,), f"has {counted(len(values), 'value')} for {len(others)} in {other}; give as many as {other}"
 
 
 Compensated = Literal[

@@ -12,6 +12,7 @@ from pydantic import Field
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
 from hystgen.effects.recursions import code
 from hystgen.param_models import NotNegative, Positive
+from hystgen.words import counted
 
 FASTEST = 0.01
 """s; what follows a move faster than this is a lag or friction of the domain walls, and has other names."""
@@ -96,7 +97,7 @@ class ExponentialCreep(_Creep):
             places = low + (high - low) * (np.arange(n) + 0.5) / n
             found.append(
                 Candidate(
-                    f"creep, exponential, {n} state{'s' if n > 1 else ''}",
+                    f"creep, exponential, {counted(n, 'state')}",
                     np.concatenate([np.full(n, low), np.zeros(n)]),
                     np.concatenate([np.full(n, high), np.full(n, MOST_OF_A_STATE / 0.1)]),
                     np.concatenate([places, np.full(n, 0.1)]),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.records import Record
+from hystgen.words import counted
 
 Array = NDArray[np.float64]
 
@@ -159,8 +160,7 @@ BRIDGED, NOT_COMPARED = "v jump away and back unseen by y, bridged", "y far from
 
 def told(name: str, found: NDArray[np.intp], what: str) -> str:
     """The sentence that counts isolated wrong samples, given where they are."""
-    plural = "" if len(found) == 1 else "s"
-    return f"{name}: {len(found)} isolated sample{plural} of {what}; the first is sample {found[0]}"
+    return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -19,6 +19,7 @@ from hystgen.identification.report import Row, table
 from hystgen.identification.uncertainty import Intervals
 from hystgen.identification.used import Used
 from hystgen.records import Record, read_record, write_atomically
+from hystgen.words import counted
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -144,7 +145,7 @@ class Fit:
         """What the fit table's words mean, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
         told = [
-            f"{n} play{'' if n == 1 else 's'}. Errors of a free run with a free offset a record; % of the largest "
+            f"{counted(n, 'play')}. Errors of a free run with a free offset a record; % of the largest "
             "peak-to-peak output of the row's records, each taken whole."
         ]
         if any(row.model == "trial" for row in self.rows):

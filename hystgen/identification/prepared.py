@@ -12,6 +12,7 @@ from hystgen.identification import faults, pi
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.records import Record
+from hystgen.words import counted
 
 
 def courses(
@@ -39,7 +40,7 @@ def courses(
         if not found:
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         told.append(
-            f"{record.name}: cut at {len(pieces) - 1} gap{'' if len(pieces) == 2 else 's'} of more than "
+            f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
             f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found

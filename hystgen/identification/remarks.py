@@ -11,6 +11,7 @@ from hystgen.identification import pi, reduction
 from hystgen.identification.pi import Solution
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
+from hystgen.words import counted
 
 AMPLIFIES = 100.0
 """Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""
@@ -54,7 +55,7 @@ def about_model(
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
         if beyond:
             told.append(
-                f"{len(beyond)} threshold{'' if len(beyond) == 1 else 's'} above {solution.reach:.6g} hardly move in "
+                f"{counted(len(beyond), 'threshold')} above {solution.reach:.6g} hardly move in "
                 "these records; their weights are not to be trusted for larger drives"
             )
     outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]

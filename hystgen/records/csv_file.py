@@ -18,7 +18,7 @@ from hystgen.problems import printable
 from hystgen.records.columns import LISTED, Column, column
 from hystgen.records.reading import Lines, Reading, Table
 from hystgen.records.record import Array
-from hystgen.records.repair import count
+from hystgen.words import counted
 
 BLOCK = 1 << 20
 """Bytes read at a time; a longer line is none of a CSV file."""
@@ -239,7 +239,7 @@ class _Body:
                 continue
             cells = _cells(row, delimiter)
             if len(cells) != len(names):
-                self._wrong(f"{count(len(cells), 'column')} where the header has {len(names)}; complete or remove "
+                self._wrong(f"{counted(len(cells), 'column')} where the header has {len(names)}; complete or remove "
                             "the line", line, 1)  # fmt: skip
                 continue
             lines.append(line)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hystgen.records.reading import Reading, Table
 from hystgen.records.record import Array, Record
+from hystgen.words import counted
 
 SHORTEST = 16
 """Fewest samples of a record that a model is fitted to."""
@@ -41,7 +42,7 @@ def repaired(reading: Reading, table: Table) -> Record:
     fit = "y" in reading.need
     shortest = SHORTEST if fit else 1
     if samples < shortest and not reading.problems:
-        reading.problem(f"has {count(samples, 'sample')}, at least {shortest} are needed; record for longer")
+        reading.problem(f"has {counted(samples, 'sample')}, at least {shortest} are needed; record for longer")
     elif fit and samples and "v" in columns and float(np.ptp(columns["v"])) == 0.0:
         reading.problem(
             f"the drive v is {columns['v'][0]:g} throughout; a fit needs a drive that moves, check the columns"
@@ -59,11 +60,6 @@ def repaired(reading: Reading, table: Table) -> Record:
     return Record(Path(reading.file).name, t, v, y, columns, step, tuple(reading.notes), table.units)
 
 
-def count(number: int, what: str) -> str:
-    """`1 sample`, `2 samples`."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:
     """Note the samples that are dropped, or refuse when they are too many."""
     number = int(np.count_nonzero(wrong))
@@ -79,7 +75,7 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
             line,
         )
     else:
-        reading.notes.append(f"{count(number, 'sample')} {which} dropped, {first}")
+        reading.notes.append(f"{counted(number, 'sample')} {which} dropped, {first}")
 
 
 def _rising(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -105,7 +101,7 @@ def _step(reading: Reading, t: Array) -> float:
         np.subtract(t[1:], t[:-1], out=steps)  # the median has put them in another order
         worst = int(np.argmax(steps))
         reading.notes.append(
-            f"{count(number, 'gap')} longer than {GAP:g} median steps kept, the largest {steps[worst]:.4g} s "
+            f"{counted(number, 'gap')} longer than {GAP:g} median steps kept, the largest {steps[worst]:.4g} s "
             f"at t = {t[worst]:.6g} s"
         )
     given = reading.sample_time

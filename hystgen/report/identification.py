@@ -21,6 +21,7 @@ from hystgen.params import parameters_sha256
 from hystgen.report import drawing, fit_figures, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
+from hystgen.words import counted
 
 if TYPE_CHECKING:
     from hystgen.identification import Fit, Row
@@ -81,12 +82,12 @@ def _kind(fit: Fit) -> str:
     """What kind of model it is, in words."""
     plays = fit.parameters.model.pi.thresholds
     cascade = cascade_of(fit.parameters)
-    count = _count(len(plays) - 1, "play")
+    count = counted(len(plays) - 1, "play")
     if not cascade.stages:
         return f"A Prandtl-Ishlinskii model with {count}"
     (stage,) = cascade.stages
     if isinstance(stage, DeadZone):
-        bends = _count(sum(r != 0.0 for r in stage.thresholds), "bend")
+        bends = counted(sum(r != 0.0 for r in stage.thresholds), "bend")
         return f"A generalized Prandtl-Ishlinskii model with {count} behind a dead-zone front with {bends}"
     branches = "two branches" if stage.branches_differ else "one branch"
     return f"A generalized Prandtl-Ishlinskii model with {count} behind a tanh front with {branches}"
@@ -125,7 +126,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     operator = " --operator forward" if problems else ""
     said += [f"Mind that {text}." for text in properties.warnings(Model(fit.parameters))]
     if fit.warnings:
-        said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {_count(len(fit.warnings), 'warning')} below.")
+        said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {counted(len(fit.warnings), 'warning')} below.")
     command = f"hystgen emit {parameter_file} -o firmware/{operator}"
     return [*(Text(text) for text in said), Text("To get the C code, run:", command)]
 
@@ -227,7 +228,7 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
         "inside them. "
     )
     said += (
-        f"{_count(beyond, 'sample')} of the records below lie outside: there the model is a guess."
+        f"{counted(beyond, 'sample')} of the records below lie outside: there the model is a guess."
         if beyond
         else "No record leaves them."
     )
@@ -263,10 +264,6 @@ def _fingerprint(record: Record) -> str:
     return digest.hexdigest()[:16]
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
-
-
 # Captions and what pictures show in words -------------------------------------------------------------------
 
 
@@ -300,12 +297,12 @@ def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
     for each in fit_figures.drawn_ones(shown):
         skipped, ignored, outliers, bridged, gaps, left_out = map(len, _masks(each))
         counts = [
-            _count(skipped + ignored, "sample") + " ignored at the start",
-            _count(outliers, "outlier"),
-            _count(bridged, "bridged drive sample"),
-            _count(gaps, "gap"),
+            counted(skipped + ignored, "sample") + " ignored at the start",
+            counted(outliers, "outlier"),
+            counted(bridged, "bridged drive sample"),
+            counted(gaps, "gap"),
         ]
-        counts += [_count(left_out, "sample") + " left out between gaps"] if left_out else []
+        counts += [counted(left_out, "sample") + " left out between gaps"] if left_out else []
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (
         "Measured and model along time; below it, measured less model where it was compared. Grey: ignored; yellow: "
@@ -381,7 +378,7 @@ def _weights_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
     if len(part.weights) > 1:
         k = int(np.argmax(part.weights[1:])) + 1
         said += (
-            f", {_count(len(part.weights) - 1, 'play')} up to a threshold of {part.thresholds[-1]:.3g}, the largest "
+            f", {counted(len(part.weights) - 1, 'play')} up to a threshold of {part.thresholds[-1]:.3g}, the largest "
             f"weight {part.weights[k]:.3g} at {part.thresholds[k]:.3g}"
         )
     return said
