@@ -169,6 +169,17 @@ def test_flexure_stage(measured: Path, tmp_path: Path) -> None:
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
 
 
+@pytest.mark.data
+def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
+    """With the start-up transient in both records a delay leaves as much as the lag: both are named."""
+    sine = measured / "p885_sine_1hz.csv"
+    hystgen.identify(sine).write(tmp_path / "stage.yaml")
+    content = hystgen.diagnose(tmp_path / "stage.yaml", sine, holdout=measured / "p885_fades_and_hold.csv").content
+    assert content["effects"][0]["name"] == "lag"
+    assert ["lag", "delay"] in content["not_separable"]
+    assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
+
+
 class TestNoise:
     def item(self, y: Array, v: Array, name: str = "made") -> Item:
         return Item(name, Run(np.arange(len(v)) * 1e-3, v), y, None, float(np.ptp(y)))

@@ -206,6 +206,24 @@ def test_a_small_lead_on_held_out_records_is_not_enough(held_out: float, fitted:
 TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
 
 
+@pytest.mark.parametrize(
+    ("left", "fitted", "follows"), [(0.304, 0.502, True), (0.304, 0.55, False), (0.33, 0.502, False)]
+)
+def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float, follows: bool) -> None:
+    """Five others come before it on held-out records, one of which leaves as much as it does."""
+
+    def screened(name: str, left: float, fitted: float = 0.6) -> Any:
+        option = SimpleNamespace(name=name, label=name)
+        return SimpleNamespace(option=option, left=left, fitted=SimpleNamespace(rms=fitted))
+
+    others = [screened(name, 0.1 + 0.02 * k) for k, name in enumerate("abcd")]
+    delay, lag = screened("delay", 0.303, 0.5), screened("lag", left, fitted)
+    best_fits = [screened(name, 0.9, 0.4) for name in "ef"]
+    tried = [*others, lag, delay, *best_fits]
+    assert [each.option.name for each in trials._kept(tried, tried)] == [*"abcd", "delay", *"ef"] + ["lag"] * follows
+    assert lag not in trials._kept(tried, others)
+
+
 class Made:
     """What an option leaves of records to fit and of held-out ones; `on_equal_terms`: of these with what is free in
     the other option's."""

@@ -61,6 +61,12 @@ JOINT_STEPS, HOPEFUL = 5, 1.3
 SHAPES = 2
 """Of one effect no more than so many."""
 
+TWIN = 0.02
+"""An effect that is not among them follows where what it leaves, fitted and held out, is within this share of theirs.
+
+Which of two like a lag and a delay is cut off would be chance, and what cannot be told apart has to be said.
+"""
+
 RINGING = 3
 """Frequencies at which the error rings, from which a search for a resonance starts too."""
 
@@ -227,19 +233,27 @@ def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_S
             best, search = search, search.further(SCREENING_STEPS, COARSE)
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
-    def begun(some: Sequence[Option]) -> list[_Screened]:
+    def first_steps(some: Sequence[Option]) -> list[_Screened]:
         return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
 
     def helps(each: _Screened, rms: float, left: float) -> bool:
         return each.fitted.rms < (1.0 - HELPS) * rms or each.left < (1.0 - HELPS) * left
 
-    tried = begun([option for option in found if not option.beyond])
+    tried = first_steps([option for option in found if not option.beyond])
     simpler = {each.option.label: each for each in tried if helps(each, *without)}
-    for each in begun([option for option in found if option.beyond in simpler]):
+    for each in first_steps([option for option in found if option.beyond in simpler]):
         less = simpler[each.option.beyond]
         if helps(each, less.fitted.rms, less.left):
             tried.append(each)
     tried = [each for each in tried if math.isfinite(each.left)]
+    kept = _kept(tried, [each for each in tried if helps(each, *without)])
+    contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
+    kept += [each for each in contained if each not in kept]  # whether more numbers are worth it shows when all fit
+    return kept
+
+
+def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
+    """The best on held-out records, others that fit best, and of the helpful ones their twins."""
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.left), sorted(tried, key=lambda one: one.fitted.rms)
     for order, most in ((by_held_out, KEPT), (by_fit, KEPT + ALSO)):
@@ -248,9 +262,17 @@ def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_S
                 break
             if sum(other.option.name == each.option.name for other in kept) < SHAPES and each not in kept:
                 kept.append(each)
-    contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
-    kept += [each for each in contained if each not in kept]  # whether more numbers are worth it shows when all fit
-    return kept
+    twins: dict[str, _Screened] = {}
+    for each in sorted(helpful, key=lambda one: one.left):
+        if all(other.option.name != each.option.name for other in kept) and any(_twins(each, k) for k in kept):
+            twins.setdefault(each.option.name, each)
+    return [*kept, *twins.values()]
+
+
+def _twins(one: _Screened, other: _Screened) -> bool:
+    """Whether two leave as good as the same, fitted and held out."""
+    both = (one.fitted.rms, other.fitted.rms), (one.left, other.left)
+    return all(abs(a - b) <= TWIN * b for a, b in both)
 
 
 def _each(
