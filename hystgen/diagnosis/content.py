@@ -92,6 +92,7 @@ def content_of(
         "not_separable": rivals,
         "advice": [
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
+            *([ONE_LOOP] if rivals and found.one_loop else []),
             *(more for each in left for more in told.advice(each)),
         ],
         "ranking": [
@@ -110,6 +111,8 @@ ADVICE: dict[frozenset[str], str] = {
     frozenset(("asymmetry", "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
 }
 """Which experiment tells two effects apart."""
+
+ONE_LOOP = "all records pass one loop in the same time: add smaller loops inside it, other speeds and holds"
 
 
 def _advice(one: str, other: str) -> str:
