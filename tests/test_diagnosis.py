@@ -20,7 +20,7 @@ from recordings import brute_output, noisy, part_of_file, record, wander
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import _extended, believed, decisions, floor, options, structure, trials
+from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, trials
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep import ExponentialCreep
@@ -178,6 +178,20 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     assert content["effects"][0]["name"] == "lag"
     assert ["lag", "delay"] in content["not_separable"]
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
+
+
+def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
+    """What may be another effect, and an error far from noise."""
+    content: dict[str, Any] = {
+        "verdict": "effects_found", "unit": "um", "noise_floor": 0.02, "unexplained": [],
+        "gap": {"refitted": {"holdout": 0.5}, "after": {"holdout": 0.05}},
+        "effects": [{"name": "lag"}, {"name": "creep"}], "not_separable": [["lag", "delay"], ["lag", "resonance"]],
+    }  # fmt: skip
+    found = Diagnosis(content, hystgen.load(_model(tmp_path)).parameters, (), ())
+    said = "Missing: lag (or delay or resonance), creep. The held-out rms error falls from 0.5 um to 0.05 um"
+    assert found.sentence() == said + "."
+    content["unexplained"] = [{"kind": "structure"}]
+    assert found.sentence() == said + ", 2.5 times the noise and with structure."
 
 
 class TestNoise:

@@ -78,8 +78,11 @@ class Diagnosis:
         wrong = told.faults(seen)
         but = f" The data have faults: {wrong}." if wrong else ""
         if self.verdict == "effects_found":
-            names = ", ".join(effect["name"] for effect in self.content["effects"])
-            return f"Missing: {names}. The held-out rms error falls from {before} to {after}.{but}"
+            names = ", ".join(self._name(effect["name"]) for effect in self.content["effects"])
+            more, floor = "", self.content["noise_floor"]
+            if floor and any(each["kind"] == "structure" for each in seen):
+                more = f", {gap['after']['holdout'] / floor:.2g} times the noise and with structure"
+            return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}.{but}"
         if self.verdict == "nothing_missing":
             noise = f"the refitted model leaves {after} rms on held-out records, which is noise"
             return f"Nothing is missing: {noise}.{but}"
@@ -90,6 +93,11 @@ class Diagnosis:
             return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
         missing = "Something is missing that the catalogue does not hold or the records cannot show"
         return f"{missing}: {after} rms is left.{but}"
+
+    def _name(self, name: str) -> str:
+        """An effect with those that it cannot be told from."""
+        others = [other for one, other in self.content["not_separable"] if one == name]
+        return f"{name} (or {' or '.join(others)})" if others else name
 
     def to_json(self) -> str:
         """`diagnosis.json`."""

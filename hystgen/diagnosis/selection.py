@@ -203,8 +203,9 @@ def _rivals(step: _Step, records: Records) -> list[Tried]:
 
 
 def _left_open(step: _Step, records: Records) -> list[str]:
-    """Names of those that cannot be told from the one that is taken."""
-    others = _rivals(step, records)
+    """Names of those that cannot be told from the one that is taken, by fitted records neither."""
+    least = step.best.fitted.rms
+    others = [each for each in _rivals(step, records) if decisions.no_worse(each.fitted.rms, least, records.noise)]
     if records.one_loop:
         enough = MOSTLY * records.left(step.now)
         others += [each for each in step.tried if each.name != step.best.name and each.held_out <= enough]

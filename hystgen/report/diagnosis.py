@@ -183,7 +183,7 @@ def _where(content: Mapping[str, Any]) -> list[Text | Table]:
         return [Text("No stretch of a record of the refitted model is far above the noise.")]
     rows = [["record", "what goes on there", "from (s)", "to (s)", label("rms", content["unit"])]]
     rows += [
-        [w["record"], str(w["kind"]).replace("_", " "), *(f"{x:.4g}" for x in w["interval"]), f"{w['rms']:.3g}"]
+        [w["record"], str(w["kind"]).replace("_", " "), *(f"{x:.6g}" for x in w["interval"]), f"{w['rms']:.3g}"]
         for w in content["where"]
     ]
     return [Text("The stretches where the refitted model does worst:"), Table(rows, (0, 1))]
