@@ -246,9 +246,6 @@ def test_a_small_lead_on_held_out_records_is_not_enough(held_out: float, fitted:
     assert first_of(Made("best", 1, (1.0, 1.0)), Made("other", 5, (fitted, held_out))) == first
 
 
-TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
-
-
 @pytest.mark.parametrize(
     ("left", "fitted", "follows"), [(0.304, 0.502, True), (0.304, 0.55, False), (0.33, 0.502, False)]
 )
@@ -265,6 +262,21 @@ def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float
     tried = [*others, lag, delay, *best_fits]
     assert [each.option.name for each in trials._kept(tried, tried)] == [*"abcd", "delay", *"ef"] + ["lag"] * follows
     assert lag not in trials._kept(tried, others)
+
+
+def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of three that held-out records find alike, one leaves far more of those it was fitted to."""
+
+    def made(name: str, fitted: float) -> Any:
+        return SimpleNamespace(name=name, fitted=SimpleNamespace(rms=fitted))
+
+    monkeypatch.setattr(selection, "_rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
+    step: Any = SimpleNamespace(best=made("a", 1.0))
+    records: Any = SimpleNamespace(noise=NOISE, one_loop=False)
+    assert selection._left_open(step, records) == ["b"]
+
+
+TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
 
 
 class Made:
@@ -286,13 +298,22 @@ class Made:
         return [share[item in HELD] * random.normal(size=2000) for item in items]
 
 
-def first_of(best: Made, other: Made) -> str:
+def first_of(best: Made, other: Made, effect: str | None = None) -> str:
+    """Which of two is taken; `effect`: of which both are shapes."""
     tried: list[Any] = [
-        trials.Tried(SimpleNamespace(name=made.name), made, (made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
+        trials.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
         for made in (best, other)
     ]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
-    return str(decisions.simplest_first(tried, records)[0].name)
+    first: Any = decisions.simplest_first(tried, records)[0].fitted
+    return str(first.name)
+
+
+def test_what_a_shape_leaves_free_is_part_of_the_effect() -> None:
+    """Of another effect it would be no merit; the simpler shape of the same one leaves twice as much without it."""
+    rich, simple = Made("rich", 9, (1.0, 1.0)), Made("simple", 2, (2.0, 2.0), (1.0, 1.0))
+    assert first_of(rich, simple) == "simple"
+    assert first_of(rich, simple, "creep") == "rich"
 
 
 def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:

@@ -109,7 +109,8 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     """All, the best and those about as good before the others, and of these the ones of fewer numbers first.
 
     About as good: where all leave the same free in every record, held-out records find them no worse, whatever more the
-    best explains of those it was fitted to; or they find them alike within a few per cent, and fitted ones no worse, or
+    best explains of those it was fitted to (what one shape of an effect leaves free is part of that effect: between two
+    shapes of it each has its own); or they find them alike within a few per cent, and fitted ones no worse, or
     by chance, or by less than an effect is where the best has come to the end of what one of its numbers may be.
     Between equal numbers of numbers all records decide, or the catalogue's order where they find hardly any difference:
     a lag, which every amplifier has, before a delay. What leaves far more of the fitted records than another is not
@@ -136,7 +137,8 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     for each in tried:
         if each is best:
             continue
-        left, errors = fits.rms(each.fitted.errors(held, best.fitted)), each.fitted.errors(to_fit, best.fitted)
+        like = None if each.name == best.name else best.fitted
+        left, errors = fits.rms(each.fitted.errors(held, like)), each.fitted.errors(to_fit, like)
         more = fits.rms(errors)
         if less > FAR_LESS * more and (left <= best.held_out or (left <= enough and as_good(errors, more))):
             near.append((each.numbers(held), _everywhere(each, best, records), each))
