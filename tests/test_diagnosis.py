@@ -491,6 +491,26 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
     assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
 
 
+@pytest.mark.parametrize("held_out", [True, False])
+def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> None:
+    """Held out alone, others judge in its place; among others, it is told that it is not compared."""
+    rng = np.random.default_rng(1)
+    ends = [rng.permutation(np.linspace(0, 100, 11)) for _ in "abcd"]
+    drives = [np.concatenate([[50, 100, 0], np.interp(np.arange(900), np.arange(0, 901, 90), x)]) for x in ends]
+    drives.append(np.linspace(0.0, 100.0, 600))
+    made = [
+        record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), name)
+        for v, name in zip(drives, [*"abcd", "sweep"], strict=True)
+    ]
+    held = made[4:] if held_out else made[3:]
+    found = hystgen.diagnose(_model(tmp_path), made[: 4 if held_out else 3], holdout=held)
+    told = " ".join(found.notes)
+    assert ("sweep: there is too little to judge by" in told) is held_out
+    assert ("that can judge: c set aside" in told) is held_out
+    assert ("sweep: says next to nothing, 1 sample" in told) is not held_out
+    assert found.verdict == "nothing_missing"
+
+
 def test_no_records_to_judge_by(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="record"):
         hystgen.diagnose(hystgen.load(_model(tmp_path)), [])

@@ -29,6 +29,7 @@ from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
 from hystgen.identification.thresholds import rounded
 from hystgen.records import Record, read_records
+from hystgen.words import counted
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -159,9 +160,14 @@ def diagnose(
             for group in (usable[: len(several)], usable[len(several) :])
         )
         ready = believed.prepare(to_fit or read[: len(several)], to_hold, before, rest)
+        if to_hold and len(to_fit) > 2 and not _tells(ready.held):
+            silent = _too_little(ready.held, "judge by")
+            ready = believed.prepare(to_fit, [], before, rest)
+            ready.notes.insert(0, silent)
         for group, what in ((ready.to_fit, "fit"), (ready.held, "judge by")):
             if not _tells(group):
                 raise IdentificationError(_too_little(group, what))
+        ready.notes.extend(_silent(ready))
         ready = _without_faults(ready)
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
@@ -200,6 +206,19 @@ def _too_little(group: Sequence[Item], what: str) -> str:
         f"{names}: there is too little to {what}: {most} samples at most in a record behind the start, whose memory is "
         f"not known, and more than {ENOUGH} are needed; give --history, or records that sweep their range again"
     )
+
+
+def _silent(ready: believed.Prepared) -> list[str]:
+    """Of records that say nothing beside others that do."""
+    compared: dict[str, int] = {}
+    for item in (*ready.to_fit, *ready.held):  # the two ends of a record are two items
+        compared[item.name] = compared.get(item.name, 0) + int(np.count_nonzero(item.known))
+    return [
+        f"{name}: says next to nothing, {counted(number, 'sample')} are compared; where its start memory is not known "
+        "give --history, or let it sweep its range again"
+        for name, number in compared.items()
+        if number <= ENOUGH
+    ]
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:

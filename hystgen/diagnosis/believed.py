@@ -85,7 +85,8 @@ def prepare(
         aside = set_aside(records)
         holdout = [records[k] for k in aside]
         records = [record for k, record in enumerate(records) if k not in aside]
-        notes.append("no record was given as held out: " + ", ".join(record.name for record in holdout) + " set aside")
+        names = ", ".join(record.name for record in holdout)
+        notes.append(f"no record was given that can judge: {names} set aside")
     fit_courses, held_courses = (
         [prepared.bridged(pi.course(record, history, 0)) for record in group] for group in (records, holdout)
     )
@@ -105,7 +106,7 @@ def prepare(
     to_fit, held = _in_session(to_fit, held)
     if not held:
         to_fit, held = _ends(to_fit)
-        notes.append(f"no record was given as held out: the last {100 * SET_ASIDE:g} % of each is set aside")
+        notes.append(f"no record was given that can judge: the last {100 * SET_ASIDE:g} % of each is set aside")
     reach = thresholds.largest(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
