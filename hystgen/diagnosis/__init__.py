@@ -214,7 +214,7 @@ def _silent(ready: believed.Prepared) -> list[str]:
     for item in (*ready.to_fit, *ready.held):  # the two ends of a record are two items
         compared[item.name] = compared.get(item.name, 0) + int(np.count_nonzero(item.known))
     return [
-        f"{name}: says next to nothing, {counted(number, 'sample')} are compared; where its start memory is not known "
+        f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not known "
         "give --history, or let it sweep its range again"
         for name, number in compared.items()
         if number <= ENOUGH
