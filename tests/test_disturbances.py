@@ -205,6 +205,29 @@ def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
     return out, at
 
 
+def sweep(*ends: float, seconds: float = 1.0) -> Item:
+    """Straight moves between drives, 200 samples each."""
+    v = np.interp(np.arange(200 * (len(ends) - 1) + 1) / 200, np.arange(len(ends)), ends)
+    run = Run(np.arange(len(v)) * seconds / 200, v)
+    return Item("made", run, v, None, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("items", "one", "speed"),
+    [
+        ([sweep(60, 20, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0)], True, True),  # what leads to the first end is none
+        ([sweep(120, 0, 100, 0, 100), sweep(0, 97, 4, 97, 4, seconds=1.2)], True, True),  # about the same, as fast
+        ([sweep(0, 100, 0, 100), sweep(0, 100, 0)], True, True),
+        ([sweep(0, 100, 0, 100, 50, 100, 0)], False, True),  # a loop inside
+        ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 80, 0)], False, True),  # another size
+        ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=3)], True, False),  # another speed
+        ([sweep(0, 100)], False, True),  # no loop
+    ],
+)
+def test_records_of_one_loop(items: list[Item], one: bool, speed: bool) -> None:
+    assert (description.one_loop(items), description.one_speed(items)) == (one, speed)
+
+
 def test_stick_slip() -> None:
     items = session()
     jumps = {}

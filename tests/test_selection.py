@@ -11,8 +11,6 @@ import pytest
 from numpy.typing import NDArray
 
 from hystgen.diagnosis import decisions, selection, trials
-from hystgen.diagnosis.structure import Item
-from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
 
@@ -50,7 +48,7 @@ class World:
     """Which hypotheses there are, and how much of what is missing each leaves; those not told leave everything."""
 
     to_fit, held, noise = (0, 1, 2), (3, 4, 5), NOISE
-    one_loop = False
+    one_loop = one_speed = False
 
     def __init__(self, left: dict[frozenset[str], float], names: str, memory: float = 0.0) -> None:
         self.left, self.all, self.memory = left, names, memory
@@ -83,7 +81,7 @@ class World:
     def records(self) -> Any:
         return SimpleNamespace(
             to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
-            left=self.gap, one_loop=self.one_loop,
+            left=self.gap, one_loop=self.one_loop, one_speed=self.one_speed,
         )  # fmt: skip
 
 
@@ -133,44 +131,35 @@ def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     assert together(World(BOTH, "ab"), monkeypatch, {"a": 0.021, "b": 0.021}) == []
 
 
+@pytest.mark.parametrize("one_speed", [False, True])
 @pytest.mark.parametrize("one_loop", [False, True])
-def test_of_one_loop_alone_two_that_explain_most_are_alike_and_no_pair(one_loop: bool) -> None:
-    """`b` takes away most of what is missing too, and beside `a` the rest of it; `c` does nothing."""
-    shares = {"a": 0.2, "b": 0.4, "c": 1.0, "ab": 0.02, "ac": 0.2}
+@pytest.mark.parametrize("second", [0.4, 0.6])
+def test_one_loop_alone_supports_one_name_and_not_alone_where_another_explains_most(
+    one_loop: bool, one_speed: bool, second: float
+) -> None:
+    """`b` leaves `second` of what is missing, and beside `a` hardly anything; `c` does nothing."""
+    shares = {"a": 0.2, "b": second, "c": 1.0, "ab": 0.02, "ac": 0.2}
     world = World({frozenset(names): share for names, share in shares.items()}, "abc")
-    world.one_loop = one_loop
+    world.one_loop, world.one_speed = one_loop, one_speed
     now: Any = Hypothesis(world, frozenset())
     step = selection._step(now, world.gap(now), world.records)
     assert step is not None
     found = selection._found(step, world.records)
-    assert (found.name, found.rivals) == ("a", ("b",) if one_loop else ())
-    worth = selection._doubtless([found], world.records)
-    further = selection._step(step.best.fitted, world.gap(now), world.records, worth)
+    assert (found.name, found.rivals) == ("a", ("b",) if one_loop and second == 0.4 else ())
+    further = selection._step(step.best.fitted, world.gap(now), world.records)
     assert further is not None
-    assert (further.merit is None) is one_loop
+    assert (further.merit is None) is (one_loop and one_speed)
 
 
-def sweep(*ends: float, seconds: float = 1.0) -> Item:
-    """Straight moves between drives, 200 samples each."""
-    v = np.interp(np.arange(200 * (len(ends) - 1) + 1) / 200, np.arange(len(ends)), ends)
-    run = Run(np.arange(len(v)) * seconds / 200, v)
-    return Item("made", run, v, None, 10.0)
-
-
-@pytest.mark.parametrize(
-    ("items", "one"),
-    [
-        ([sweep(60, 20, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0)], True),  # what leads to the first end is no loop
-        ([sweep(120, 0, 100, 0, 100), sweep(0, 97, 4, 97, 4, seconds=1.2)], True),  # about the same, about as fast
-        ([sweep(0, 100, 0, 100), sweep(0, 100, 0)], True),
-        ([sweep(0, 100, 0, 100, 50, 100, 0)], False),  # a loop inside
-        ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 80, 0)], False),  # another size
-        ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=3)], False),  # another speed
-        ([sweep(0, 100)], False),  # no loop
-    ],
-)
-def test_records_of_one_loop(items: list[Item], one: bool) -> None:
-    assert trials._one_loop(items) is one
+@pytest.mark.parametrize(("left", "named"), [(0.45, True), (0.55, False)])
+@pytest.mark.parametrize("one_loop", [False, True])
+def test_of_one_loop_alone_what_explains_most_is_named(one_loop: bool, left: float, named: bool) -> None:
+    world = World({frozenset("a"): left}, "a")
+    world.one_loop = one_loop
+    now: Any = Hypothesis(world, frozenset())
+    step = selection._step(now, world.gap(now), world.records)
+    assert step is not None
+    assert (step.merit is not None) is (named or not one_loop)
 
 
 @pytest.mark.parametrize("left", [0.0, 1.0])
@@ -270,10 +259,9 @@ def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.Mon
     def made(name: str, fitted: float) -> Any:
         return SimpleNamespace(name=name, fitted=SimpleNamespace(rms=fitted))
 
-    monkeypatch.setattr(selection, "_rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
-    step: Any = SimpleNamespace(best=made("a", 1.0))
-    records: Any = SimpleNamespace(noise=NOISE, one_loop=False)
-    assert selection._left_open(step, records) == ["b"]
+    monkeypatch.setattr(decisions, "rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
+    now, records = made("", 2.0), SimpleNamespace(noise=NOISE, one_loop=False)
+    assert decisions.left_open(now, made("a", 1.0), [], records) == ["b"]  # type: ignore[arg-type]
 
 
 TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)

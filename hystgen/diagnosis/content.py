@@ -73,6 +73,7 @@ def content_of(
                 "evidence": _evidence(each),
             }
         )
+    open_ended = any(each["kind"] == "structure" for each in left)
     rivals = [[each.name, rival] for each in found.found for rival in each.rivals]
     units = parameters.units
     whole = {
@@ -92,7 +93,7 @@ def content_of(
         "not_separable": rivals,
         "advice": [
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
-            *([ONE_LOOP] if rivals and found.one_loop else []),
+            *([ONE_LOOP] if (rivals or open_ended) and description.one_loop(everything) else []),
             *(more for each in left for more in told.advice(each)),
         ],
         "ranking": [
@@ -112,7 +113,10 @@ ADVICE: dict[frozenset[str], str] = {
 }
 """Which experiment tells two effects apart."""
 
-ONE_LOOP = "all records pass one loop in the same time: add smaller loops inside it, other speeds and holds"
+ONE_LOOP = (
+    "all records pass one loop, which tells little more than of one effect: add smaller loops inside it, other speeds "
+    "and holds"
+)
 
 
 def _advice(one: str, other: str) -> str:

@@ -53,6 +53,12 @@ FAR_LESS = 0.5
 EQUAL = 0.005
 """Errors that differ by less than this share are equal."""
 
+MOSTLY = 0.5
+"""Of records of one loop alone, passed again and again, whatever leaves at most this share of what is no noise may be
+what is missing, and what leaves more is not named: two functions, up and down, tell no more than that the shape of one
+effect is the handier. Where they were fitted at one speed, no second one is named either: its shape may have left it.
+"""
+
 AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
 """A held-out error within this factor of the noise leaves nothing that would be enough for a name."""
 
@@ -177,6 +183,30 @@ def alike(other: Tried, best: Tried, noise: float) -> bool:
     if no_worse(other.held_out, best.held_out, noise):
         return True
     return other.held_out <= (1.0 + UNSURE) * best.held_out and difference(other.errors, best.errors) > DIFFERENT
+
+
+def rivals(best: Tried, tried: Sequence[Tried], records: Records) -> list[Tried]:
+    """Effects of other names that cannot be told from the one that is taken, the best one first."""
+    return [each for each in tried if each.name != best.name and alike(each, best, records.noise)]
+
+
+def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records) -> list[str]:
+    """Names of those that cannot be told from the one that is taken, by fitted records neither."""
+    least = best.fitted.rms
+    others = [each for each in rivals(best, tried, records) if no_worse(each.fitted.rms, least, records.noise)]
+    if records.one_loop:
+        others += [each for each in tried if each.name != best.name and explains_most(now, each, records)]
+    return [each.name for each in others]
+
+
+def explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
+    """Whether it leaves hardly half of the error that is no noise."""
+    return apart(tried.held_out, records.noise) <= MOSTLY * apart(records.left(now), records.noise)
+
+
+def supported(now: Fitted, best: Tried, records: Records) -> bool:
+    """Whether records that may tell as little as those of one loop alone support a name."""
+    return not records.one_loop or ((now.bare or not records.one_speed) and explains_most(now, best, records))
 
 
 def apart(more: float, less: float) -> float:

@@ -30,6 +30,9 @@ THINNED = 12_000
 TURNS = 0.02
 """A reversal counts from this share of the drive range on."""
 
+SAME_PLACE, SAME_TIME = 0.1, 1.5
+"""Loops are one where their ends lie within this share of the drive's range, at one speed up to this ratio of times."""
+
 PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
 """Thresholds that tell of the memory, as shares of the drive range."""
 
@@ -91,6 +94,31 @@ def reversals(v: Array) -> NDArray[np.intp]:
         return np.empty(0, dtype=np.intp)
     turned = np.flatnonzero(np.diff(np.sign(np.diff(z)[moved])))
     return np.asarray(moved[turned] + 1)
+
+
+def one_loop(items: Sequence[Item]) -> bool:
+    """Whether the drive goes to and fro between the same two ends in all records."""
+    ends = []
+    for item in items:
+        v, at = item.run.v, _ends(item.run.v)
+        if not len(at):
+            return False
+        ends += [v[at], np.array([v[at[0] :].min(), v[at[0] :].max()])]
+    levels = np.concatenate(ends)
+    low, high = float(levels.min()), float(levels.max())
+    return bool(np.minimum(levels - low, high - levels).max() <= SAME_PLACE * (high - low))
+
+
+def one_speed(items: Sequence[Item]) -> bool:
+    """Whether the drive takes the same time from each of its ends to the next in all records."""
+    passed = np.concatenate([np.diff(item.run.t[_ends(item.run.v)]) for item in items])
+    return not len(passed) or bool(passed.max() <= SAME_TIME * passed.min())
+
+
+def _ends(v: Array) -> NDArray[np.intp]:
+    """Where the drive turns; the way to the first turn begins anywhere."""
+    at = reversals(v)
+    return at[1:] if len(at) > 1 else at
 
 
 VARIABLES = (

@@ -30,11 +30,6 @@ EXCHANGE = 0.05
 EXCHANGES = 4
 """At most so many times one effect takes the place of another."""
 
-MOSTLY = 0.5
-"""Of records of one loop alone, passed in the same way again and again, whatever leaves at most this share of the error
-may be what is missing: two functions, up and down, tell no more than that the shape of one effect is the handier.
-"""
-
 
 @dataclass(frozen=True)
 class Found:
@@ -50,16 +45,12 @@ class Found:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The believed model refitted, what was found, the model after it, and the ranking of each round.
-
-    `one_loop`: whether the records tell that little, as `Records.one_loop`.
-    """
+    """The believed model refitted, what was found, the model after it, and the ranking of each round."""
 
     refitted: Fitted
     fitted: Fitted
     found: tuple[Found, ...]
     rankings: tuple[tuple[Tried, ...], ...]
-    one_loop: bool
 
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
@@ -78,7 +69,7 @@ def select(records: Records, refitted: Fitted) -> Outcome:
     for _ in range(ROUNDS):
         if records.left(now) <= decisions.AT_FLOOR * records.noise:
             break
-        step = _step(now, gap, records, _doubtless(found, records))
+        step = _step(now, gap, records)
         if latest is not None and step is not None:
             pair = _with_rival(latest, step, gap, records)
             if pair is not None:
@@ -104,7 +95,7 @@ def select(records: Records, refitted: Fitted) -> Outcome:
     if found:
         now = fits.fit(now.structure, records.most, now.shape, now.weights)
         found[-1] = replace(found[-1], after=records.left(now))
-    return Outcome(refitted, now, tuple(found), tuple(rankings), records.one_loop)
+    return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
 @dataclass(frozen=True)
@@ -136,7 +127,7 @@ def _step(
         return None
     for best in decisions.simplest_first(tried, records):
         merit = decisions.merit_of(now, best, records, least)
-        if merit is not None and merit.worth(gap, records):
+        if merit is not None and merit.worth(gap, records) and decisions.supported(now, best, records):
             return _Step(now, tried, best, merit)
     return _Step(now, tried, tried[0], None)
 
@@ -147,7 +138,8 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     Which one of several it was shows beside the next effect: where nothing more qualifies behind the one that was
     taken, or less, or no more by more numbers, it was the wrong one.
     """
-    others = {each.name: each for each in reversed(_rivals(latest, records))}  # of each name the best one
+    alike = decisions.rivals(latest.best, latest.tried, records)
+    others = {each.name: each for each in reversed(alike)}  # of each name the best one
     left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
     names = {each.name for each in step.tried}
     pairs = []
@@ -196,34 +188,10 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
     return None
 
 
-def _rivals(step: _Step, records: Records) -> list[Tried]:
-    """Effects of other names that cannot be told from the one that is taken, the best one first."""
-    best = step.best
-    return [each for each in step.tried if each.name != best.name and decisions.alike(each, best, records.noise)]
-
-
-def _left_open(step: _Step, records: Records) -> list[str]:
-    """Names of those that cannot be told from the one that is taken, by fitted records neither."""
-    least = step.best.fitted.rms
-    others = [each for each in _rivals(step, records) if decisions.no_worse(each.fitted.rms, least, records.noise)]
-    if records.one_loop:
-        enough = MOSTLY * records.left(step.now)
-        others += [each for each in step.tried if each.name != step.best.name and each.held_out <= enough]
-    return [each.name for each in others]
-
-
-def _doubtless(found: Sequence[Found], records: Records) -> Callable[[Option], bool] | None:
-    """Of records of one loop alone, that an effect may not be what one that was found is: it is none besides."""
-    if not (records.one_loop and found):
-        return None
-    doubtful = {name for each in found for name in each.rivals}
-    return lambda option: option.name not in doubtful
-
-
 def _found(step: _Step, records: Records) -> Found:
     best, merit = step.best, step.merit
     assert merit is not None
-    rivals = tuple(dict.fromkeys([*best.names[1:], *_left_open(step, records)]))
+    rivals = tuple(dict.fromkeys([*best.names[1:], *decisions.left_open(step.now, best, step.tried, records)]))
     return Found(best.name, best.option.label, records.left(step.now), best.held_out, merit.p_value, rivals)
 
 

@@ -76,9 +76,6 @@ HELPS = 0.05
 And these have to lower the error that it leaves by as much again.
 """
 
-SAME_PLACE, SAME_TIME = 0.1, 1.5
-"""Loops are one where their ends lie within this share of the drive's range, and are passed in times of this ratio."""
-
 LARGE = 20_000
 """Samples to fit from which on the options are tried in several processes; of fewer it takes a few seconds at most."""
 
@@ -133,7 +130,9 @@ class Records:
     tick: Callable[[], None]
     jobs: int
     one_loop: bool
-    """whether all of them pass the same loop at the same speed, again and again"""
+    """whether all of them pass the same loop"""
+    one_speed: bool
+    """whether those to fit pass their loops in the same time"""
 
     @classmethod
     def of(
@@ -154,8 +153,10 @@ class Records:
         thin, thin_held = thinned(groups, SCREENED, masks)
         gap = fits.rms(refitted.errors(to_fit))
         known = about(to_fit, structure.thresholds)
-        one_loop = _one_loop([*to_fit, *held])
-        return cls(to_fit, held, most, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit), one_loop)
+        return cls(
+            to_fit, held, most, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
+            description.one_loop([*to_fit, *held]), description.one_speed(to_fit),
+        )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """One effect more, the best shapes of all, the best one first; `worth`: of the options that are worth it."""
@@ -181,24 +182,6 @@ def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
     np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # behind a map near ones are needed
     structure = replace(now.structure, thresholds=np.ascontiguousarray(all_of_them[places]))
     return fits.begun(structure, thin, now.shape, p).found(p)
-
-
-def _one_loop(items: Sequence[Item]) -> bool:
-    """Whether the drive goes to and fro between the same two ends, in the same time, in all records."""
-    ends: list[Array] = []
-    times: list[Array] = []
-    for item in items:
-        v, at = item.run.v, description.reversals(item.run.v)
-        if not len(at):
-            return False
-        at = at[1:] if len(at) > 1 else at  # the way to the first one begins anywhere
-        ends += [v[at], np.array([v[at[0] :].min(), v[at[0] :].max()])]
-        times.append(np.diff(item.run.t[at]))
-    levels, passed = np.concatenate(ends), np.concatenate(times)
-    low, high = float(levels.min()), float(levels.max())
-    off = np.minimum(levels - low, high - levels)
-    same_time = not len(passed) or passed.max() <= SAME_TIME * passed.min()
-    return bool(off.max() <= SAME_PLACE * (high - low) and same_time)
 
 
 def _jobs(to_fit: Sequence[Item]) -> int:
