@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from recordings import brute_output, noisy, part_of_file, record, wander
+from scipy.signal import lfilter
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, trials
+from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, told, trials
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep import ExponentialCreep
@@ -192,6 +193,24 @@ def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
     assert found.sentence() == said + "."
     content["unexplained"] = [{"kind": "structure"}]
     assert found.sentence() == said + ", 2.5 times the noise and with structure."
+
+
+def test_one_loop_supports_one_name(tmp_path: Path) -> None:
+    """A lag and a bent sensor behind one sine, again and again: one is named, and the report says what to record."""
+    t = np.arange(3000) * 1e-3
+    v = 50.0 - 50.0 * np.cos(2 * np.pi * 4.0 * t)
+    decay = np.exp(-1e-3 / 0.004)
+    records = []
+    for seed in range(3):
+        w = lfilter([1.0 - decay], [1.0, -decay], v)
+        x = brute_output(w, (0.0, 5.0, 12.0, 25.0), (0.1, 0.02, 0.02, 0.02), 0.0)
+        noise = np.random.default_rng(seed).normal(0.0, 0.003, len(x))
+        records.append(Record(f"r{seed}", t, v, x + 2e-3 * (x - 6.0) ** 2 + noise))
+    found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:])
+    assert len(found.content["effects"]) == 1
+    assert told.ONE_LOOP in found.content["advice"]
+    found.write(tmp_path / "out")
+    assert told.ONE_LOOP.capitalize() in (tmp_path / "out" / "report.html").read_text()
 
 
 class TestNoise:

@@ -134,8 +134,9 @@ def diagnose(
     """Find what a believed model is missing.
 
     `parameters`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
-    waveforms that judge; without them every third record, or the end of one, is set aside. `history`: drive values
-    visited before every record, `rest`: seconds of pause after them. `effects`: further effects that take part.
+    waveforms that judge; without them, or where too little of them can be compared, every third record, or the end of
+    one, is set aside. `history`: drive values visited before every record, `rest`: seconds of pause after them.
+    `effects`: further effects that take part.
 
     The believed model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
     weights on the free-run error, and accepted when it removes a worthwhile part of the held-out error that chance does

@@ -93,7 +93,7 @@ def content_of(
         "not_separable": rivals,
         "advice": [
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
-            *([ONE_LOOP] if (rivals or open_ended) and description.one_loop(everything) else []),
+            *([told.ONE_LOOP] if (rivals or open_ended) and description.one_loop(everything) else []),
             *(more for each in left for more in told.advice(each)),
         ],
         "ranking": [
@@ -112,11 +112,6 @@ ADVICE: dict[frozenset[str], str] = {
     frozenset(("asymmetry", "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
 }
 """Which experiment tells two effects apart."""
-
-ONE_LOOP = (
-    "all records pass one loop, which tells little more than of one effect: add smaller loops inside it, other speeds "
-    "and holds"
-)
 
 
 def _advice(one: str, other: str) -> str:

@@ -14,6 +14,12 @@ REPAIRED = ("saturated", "drop_outs", "held_samples", "isolated_samples", "swapp
 ACTUATOR = "structure"
 """The kind that may be of the actuator."""
 
+ONE_LOOP = (
+    "all records pass one loop, which tells little more than of one effect: add smaller loops inside it, other speeds "
+    "and holds"
+)
+"""What to do about records that are that poor."""
+
 
 def sentence(each: Mapping[str, Any], unit: str | None) -> str:
     """An entry as a sentence without its full stop; `unit` of the displacement."""

@@ -149,7 +149,8 @@ WHAT = {
 def _faults(content: Mapping[str, Any]) -> list[Text | Table]:
     seen = [each for each in content["unexplained"] if each["kind"] in told.REPAIRED]
     if not seen:
-        return [Text("None were seen.")]
+        disturbed = any(each["kind"] != told.ACTUATOR for each in content["unexplained"])
+        return [Text("None in single samples; other disturbances are told above." if disturbed else "None were seen.")]
     rows = [["record", "what", "times", "samples", "first at (s)", label("level", content["unit"]), "done"]]
     for each in sorted(seen, key=lambda one: (str(one["record"]), str(one["kind"]))):
         single = each["kind"] in ("saturated", "isolated_samples")
@@ -172,10 +173,12 @@ def _faults(content: Mapping[str, Any]) -> list[Text | Table]:
 
 
 def _rivals(content: Mapping[str, Any]) -> list[Text | Listing]:
+    advice = content["advice"]
+    more = [Text(f"{told.ONE_LOOP.capitalize()}.")] if told.ONE_LOOP in advice else []
     if not content["not_separable"]:
-        return [Text("Nothing came close to what was named." if content["effects"] else "Nothing was named.")]
+        return [Text("Nothing came close to what was named." if content["effects"] else "Nothing was named."), *more]
     pairs = (" and ".join(pair) for pair in content["not_separable"])
-    return [Listing([f"{pair}: {advice}" for pair, advice in zip(pairs, content["advice"], strict=False)])]
+    return [Listing([f"{pair}: {text}" for pair, text in zip(pairs, advice, strict=False)]), *more]
 
 
 def _where(content: Mapping[str, Any]) -> list[Text | Table]:
