@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from recordings import brute_output, noisy, part_of_file, record, wander
+from recordings import brute_output, brute_plays, noisy, part_of_file, record, wander
 from scipy.signal import lfilter
 
 import hystgen
@@ -211,6 +211,18 @@ def test_one_loop_supports_one_name(tmp_path: Path) -> None:
     assert told.ONE_LOOP in found.content["advice"]
     found.write(tmp_path / "out")
     assert told.ONE_LOOP.capitalize() in (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_noisy_drive_is_known_as_soon_as_a_clean_one(noise: float) -> None:
+    """From the sample on from which brute force finds the same plays whatever the start was, ten periods of them."""
+    t = np.arange(4000) * 1e-3
+    v = 50.0 - 50.0 * np.cos(2 * np.pi * 2.5 * t) + np.random.default_rng(3).normal(0.0, noise, len(t))
+    ready = believed.prepare([Record("made", t, v, 0.1 * v)], [Record("other", t, v, 0.1 * v)], None, 0.0)
+    first = int(np.argmax(ready.to_fit[0].known))
+    assert 180 <= first <= 200  # the first rise ends at 200
+    least, most = (brute_plays(v, ready.thresholds, v[0] + side * ready.thresholds)[first:] for side in (-1.0, 1.0))
+    assert np.array_equal(least, most)
 
 
 class TestNoise:

@@ -205,9 +205,10 @@ def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
     return out, at
 
 
-def sweep(*ends: float, seconds: float = 1.0) -> Item:
+def sweep(*ends: float, seconds: float = 1.0, noise: float = 0.0) -> Item:
     """Straight moves between drives, 200 samples each."""
     v = np.interp(np.arange(200 * (len(ends) - 1) + 1) / 200, np.arange(len(ends)), ends)
+    v = v + np.random.default_rng(1).normal(0.0, noise, len(v))
     run = Run(np.arange(len(v)) * seconds / 200, v)
     return Item("made", run, v, None, 10.0)
 
@@ -222,6 +223,8 @@ def sweep(*ends: float, seconds: float = 1.0) -> Item:
         ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 80, 0)], False, True),  # another size
         ([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=3)], True, False),  # another speed
         ([sweep(0, 100)], False, True),  # no loop
+        ([sweep(0, 100, 100, 0, 0, 100, 100, 0)], False, True),  # holds
+        ([sweep(0, 100, 0, 100, 0, noise=0.2)], True, True),
     ],
 )
 def test_records_of_one_loop(items: list[Item], one: bool, speed: bool) -> None:

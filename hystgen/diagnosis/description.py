@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hystgen import operators
 from hystgen.diagnosis.periodic import repetition
 from hystgen.diagnosis.structure import Item
+from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,9 @@ TURNS = 0.02
 
 SAME_PLACE, SAME_TIME = 0.1, 1.5
 """Loops are one where their ends lie within this share of the drive's range, at one speed up to this ratio of times."""
+
+STANDING = 0.3
+"""A drive stands still between its turns where it does so for this share of the time from one to the next."""
 
 PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
 """Thresholds that tell of the memory, as shares of the drive range."""
@@ -87,8 +91,7 @@ def since_reversal(item: Item) -> Array:
 
 def reversals(v: Array) -> NDArray[np.intp]:
     """Samples at which the drive turns, by more than a share of its range."""
-    r = 0.5 * TURNS * float(np.ptp(v))
-    z = operators.plays(v, np.array([r]), np.array([v[0]]))[0]
+    z = _followed(v)
     moved = np.flatnonzero(np.diff(z))
     if len(moved) < 2:
         return np.empty(0, dtype=np.intp)
@@ -96,17 +99,29 @@ def reversals(v: Array) -> NDArray[np.intp]:
     return np.asarray(moved[turned] + 1)
 
 
+def _followed(v: Array) -> Array:
+    """The drive without its noise, as a play follows it."""
+    return np.asarray(operators.plays(v, np.array([0.5 * TURNS * float(np.ptp(v))]), np.array([v[0]]))[0])
+
+
 def one_loop(items: Sequence[Item]) -> bool:
-    """Whether the drive goes to and fro between the same two ends in all records."""
+    """Whether the drive goes to and fro between the same two ends in all records, and stands still nowhere: a hold
+    tells more than a loop."""
     ends = []
     for item in items:
         v, at = item.run.v, _ends(item.run.v)
-        if not len(at):
+        if not len(at) or _stands(item.run):
             return False
         ends += [v[at], np.array([v[at[0] :].min(), v[at[0] :].max()])]
     levels = np.concatenate(ends)
     low, high = float(levels.min()), float(levels.max())
     return bool(np.minimum(levels - low, high - levels).max() <= SAME_PLACE * (high - low))
+
+
+def _stands(run: Run) -> bool:
+    moving = run.t[np.flatnonzero(np.diff(_followed(run.v)))]
+    passing = float(np.ptp(moving)) / (len(reversals(run.v)) + 1)
+    return bool(np.max(np.diff(moving)) > STANDING * passing)
 
 
 def one_speed(items: Sequence[Item]) -> bool:
