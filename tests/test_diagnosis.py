@@ -31,6 +31,7 @@ from hystgen.effects.rate_dependence import RelaxingPlays
 from hystgen.effects.sensor_nonlinearity import SensorPolynomial
 from hystgen.identification.fronts import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record
+from hystgen.report import diagnosis as report
 from tests.plants import run as plants_run
 from tests.plants.__main__ import main as plants
 
@@ -193,6 +194,23 @@ def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
     assert found.sentence() == said + "."
     content["unexplained"] = [{"kind": "structure"}]
     assert found.sentence() == said + ", 2.5 times the noise and with structure."
+
+
+@pytest.mark.parametrize(
+    ("share", "structure", "begins"),
+    [(0.1, True, "Something is missing"), (0.1, False, "The records are"), (0.9, True, "The records are")],
+)
+def test_the_sentence_is_about_what_is_most_of_the_error(
+    tmp_path: Path, share: float, structure: bool, begins: str
+) -> None:
+    line = {"kind": "line", "frequency": 50.0, "mains": None, "amplitude": 0.1, "share": share, "records": ["r"]}
+    content: dict[str, Any] = {
+        "verdict": "unexplained", "unit": "um", "unexplained": [line, *([{"kind": "structure"}] if structure else [])],
+        "gap": {"refitted": {"holdout": 0.5}, "after": {"holdout": 0.5}},
+    }  # fmt: skip
+    said = Diagnosis(content, hystgen.load(_model(tmp_path)).parameters, (), ()).sentence()
+    assert said.startswith(begins)
+    assert "a line at 50 Hz" in said
 
 
 def test_one_loop_supports_one_name(tmp_path: Path) -> None:
@@ -692,3 +710,14 @@ def _model(folder: Path) -> Path:
         "hystgen: 1\nname: stage\ninput_range: [0, 100]\nmodel: {pi: {thresholds: [0, 10], weights: [1, 0.5]}}\n"
     )
     return path
+
+
+def test_the_report_says_why_refitting_may_widen_the_gap() -> None:
+    content: dict[str, Any] = {
+        "unit": "um",
+        "gap": {"as_given": {"fit": 2.0, "holdout": 3.0}, "refitted": {"fit": 0.5, "holdout": 4.0}},
+    }
+    (said,) = report._refitted(content)
+    assert "from 2 to 0.5 um rms" in said.text
+    content["gap"]["refitted"]["holdout"] = 2.9
+    assert report._refitted(content) == []
