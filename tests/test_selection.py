@@ -151,6 +151,20 @@ def test_one_loop_alone_supports_one_name_and_not_alone_where_another_explains_m
     assert (further.merit is None) is (one_loop and one_speed)
 
 
+@pytest.mark.parametrize(("held_out", "open_"), [(0.02, []), (0.3, ["b"])])
+def test_one_loop_leaves_open_what_fitted_records_explain_unless_others_bear_it_out(
+    held_out: float, open_: list[str]
+) -> None:
+    """Of the fitted records `a` and `b` leave hardly anything, and `b` fails on held-out ones."""
+    now = Made("", 0, (1.0, 1.0))
+    records: Any = SimpleNamespace(noise=NOISE, one_loop=True, left=lambda each: each.left[1])
+    tried: list[Any] = [
+        SimpleNamespace(name=name, fitted=SimpleNamespace(rms=0.02), held_out=left, errors=[np.full(100, left)])
+        for name, left in (("a", held_out), ("b", 0.8))
+    ]
+    assert decisions.left_open(now, tried[0], tried, records) == open_  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(("left", "named"), [(0.45, True), (0.55, False)])
 @pytest.mark.parametrize("one_loop", [False, True])
 def test_of_one_loop_alone_what_explains_most_is_named(one_loop: bool, left: float, named: bool) -> None:

@@ -195,13 +195,23 @@ def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records
     least = best.fitted.rms
     others = [each for each in rivals(best, tried, records) if no_worse(each.fitted.rms, least, records.noise)]
     if records.one_loop:
-        others += [each for each in tried if each.name != best.name and explains_most(now, each, records)]
+        sure = best.held_out <= AT_FLOOR * records.noise  # else what fitted records tell is not borne out by others
+        others += [
+            each for each in tried
+            if each.name != best.name
+            and (explains_most(now, each, records) or (not sure and most(each.fitted.rms, now.rms, records.noise)))
+        ]  # fmt: skip
     return [each.name for each in others]
 
 
 def explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
-    """Whether it leaves hardly half of the error that is no noise."""
-    return apart(tried.held_out, records.noise) <= MOSTLY * apart(records.left(now), records.noise)
+    """Whether held-out records find it to leave hardly half of the error that is no noise."""
+    return most(tried.held_out, records.left(now), records.noise)
+
+
+def most(left: float, gap: float, noise: float) -> bool:
+    """Whether what is left is hardly half of a gap, noise apart."""
+    return apart(left, noise) <= MOSTLY * apart(gap, noise)
 
 
 def supported(now: Fitted, best: Tried, records: Records) -> bool:
