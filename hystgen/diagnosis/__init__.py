@@ -217,16 +217,24 @@ def _too_little(group: Sequence[Item], what: str) -> str:
 
 
 def _silent(ready: believed.Prepared) -> list[str]:
-    """Of records that say nothing beside others that do."""
-    compared: dict[str, int] = {}
+    """Of records that say nothing beside others that do, and of those of which most is not compared."""
+    known: dict[str, NDArray[np.bool_]] = {}
     for item in (*ready.to_fit, *ready.held):  # the two ends of a record are two items
-        compared[item.name] = compared.get(item.name, 0) + int(np.count_nonzero(item.known))
-    return [
-        f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not known "
-        "give --history, or let it sweep its range again"
-        for name, number in compared.items()
-        if number <= ENOUGH
-    ]
+        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
+    notes = []
+    for name, compared in known.items():
+        number = int(np.count_nonzero(compared))
+        if number <= ENOUGH:
+            notes.append(
+                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
+                "known give --history, or let it sweep its range again"
+            )
+        elif np.argmax(compared) > len(compared) // 2:
+            notes.append(
+                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
+                "drive, from where its memory is known; more with --history"
+            )
+    return notes
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:

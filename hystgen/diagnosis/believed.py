@@ -15,7 +15,7 @@ from hystgen.diagnosis import bad_samples
 from hystgen.diagnosis.structure import Actuator, Item, Structure, kept
 from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
-from hystgen.identification import faults, pi, prepared, reduction, thresholds
+from hystgen.identification import faults, pi, prepared, thresholds
 from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh
 from hystgen.identification.reduction import Course
 from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
@@ -29,12 +29,6 @@ takes part in every comparison of effects; more leave no less."""
 
 SET_ASIDE = 0.3
 """Share of a single record, its end, that is held out where nothing else can be."""
-
-NEAR = 0.01
-"""A drive has been at its ends once it has come as near to them as this share of its range: where it is measured, noise
-puts the very ends anywhere. The plays that are fitted settle within less (`thresholds.LEAST_TRAVEL`), also behind a
-front that is several times as steep there.
-"""
 
 REACHED = 0.5
 """A record is a fast one from this share of the largest rate of the drive on, and a wide one from that of its swing."""
@@ -94,8 +88,7 @@ def prepare(
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
     fit_courses, held_courses = (
-        [_settled(prepared.bridged(pi.course(record, history, 0))) for record in group]
-        for group in (records, holdout)
+        [prepared.bridged(pi.course(record, history, 0)) for record in group] for group in (records, holdout)
     )
     repaired = _without_rails(fit_courses) + _without_rails(held_courses)
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
@@ -136,13 +129,6 @@ def set_aside(records: Sequence[Record]) -> list[int]:
     counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
     others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
     return max(counts + others, key=shared)
-
-
-def _settled(course: Course) -> Course:
-    """The course with its start left out until its memory is known."""
-    if course.history is not None:
-        return course
-    return replace(course, first=reduction.settled(course.v, math.inf, NEAR))
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:

@@ -77,15 +77,14 @@ def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -
     return np.ascontiguousarray(operators.plays(history, thresholds, 0.0)[:, -1])
 
 
-def settled(v: Array, reach: float, near: float = 0.0) -> int:
+def settled(v: Array, reach: float) -> int:
     """First sample at which the plays no longer depend on an unknown start memory, but for an offset.
 
     Once the drive has swept `2 reach`, every play up to threshold `reach` is exact (MODEL.md section 2). Once it has
-    visited its own largest and least value, plays that reach further never move again in this record: a constant; or
-    it has come as `near` as that share of its range, and they move no further. Whichever comes first.
+    visited its own largest and least value, plays that reach further never move again in this record: a constant.
+    Whichever comes first.
     """
-    high, low, margin = float(v.max()), float(v.min()), near * float(np.ptp(v))
-    extremes = max(int(np.argmax(v >= high - margin)), int(np.argmax(v <= low + margin)))
+    extremes = max(int(np.argmax(v)), int(np.argmin(v)))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
     return min(extremes, int(np.argmax(swept))) if swept[-1] else extremes
 
