@@ -720,3 +720,20 @@ def test_the_report_says_why_refitting_may_widen_the_gap() -> None:
     assert "from 2 to 0.5 um rms" in said.text
     content["gap"]["refitted"]["holdout"] = 2.9
     assert report._refitted(content) == []
+
+
+def test_a_model_with_a_bent_sensor_is_refitted(tmp_path: Path) -> None:
+    """Its curve is for its own outputs, and a search that begins far from them leads anywhere."""
+    v = np.concatenate([np.linspace(0.0, 100.0, 200), wander(3), wander(8)])
+    x = brute_output(v, (0.0, 5.0, 12.0, 25.0), (0.04, 0.01, 0.01, 0.01), 0.0)
+    xi = x / 6.0
+    bent = noisy(x + 6.0 * (0.15 * xi**2 - 0.1 * xi**3), 0.003)
+    path = tmp_path / "bent.yaml"
+    path.write_text(
+        "hystgen: 1\nname: bent\ninput_range: [0, 100]\nmodel:\n"
+        "  pi: {thresholds: [0, 5, 12, 25], weights: [0.04, 0.01, 0.01, 0.01]}\n"
+        "  effects: [{name: sensor_nonlinearity, coefficients: [0.15, -0.1], scale: 6}]\n"
+    )
+    found = hystgen.diagnose(path, record(v, bent, "r"), history=[0.0])
+    assert found.verdict == "nothing_missing"
+    assert found.content["gap"]["refitted"]["holdout"] < 0.0033

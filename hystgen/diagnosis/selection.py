@@ -196,7 +196,10 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    return fits.begun(base, to_fit, start, np.ones(len(base.thresholds))).now.best
+    """Those without the effects, which is linear, then with them: a sensor's curve far from where it was found leads on
+    to anywhere."""
+    near = fits.begun(replace(base, parts=()), to_fit, start, np.ones(len(base.thresholds))).now.best
+    return fits.begun(base, to_fit, start, near).now.best
 
 
 def _without_needless(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
