@@ -192,6 +192,17 @@ class TestPeriodic:
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
         assert [each for each in periodic.lines([item], [left])[0] if each["kind"] == "line"] == []
 
+    @pytest.mark.parametrize(("frequency", "seen"), [(10.6, False), (13.0, True), (50.0, True)])
+    def test_harmonics_of_a_drive_that_swells_are_no_lines(self, frequency: float, seen: bool) -> None:
+        """It never repeats itself."""
+        t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
+        v = 50.0 - np.linspace(10.0, 50.0, len(t)) * np.cos(2 * np.pi * 5.3 * t)
+        assert periodic.repetition(v) is None
+        left = 0.05 * np.cos(2 * np.pi * frequency * t) + noise(len(t), 1)
+        item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
+        told = [each["frequency"] for each in periodic.lines([item], [left])[0] if each["kind"] == "line"]
+        assert told == ([pytest.approx(frequency, abs=0.01)] if seen else [])
+
 
 def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
     """A follower that stands until it is behind by about a distance, then catches up at once."""

@@ -23,6 +23,10 @@ SHARE, ALONE = 0.03, 0.3
 OWN, PEAK = 1e-6, 10.0
 """A line is the drive's own where that has so much of its power there, and so many times its surroundings'."""
 
+CARRIED, HARMONICS = 0.5, 10
+"""A drive that has at least this share of its power in one line answers with that line's harmonics, these of them: its
+swing may change from turn to turn, so that it does not repeat itself, and an actuator bends it all the same."""
+
 PERIODS = 8
 """Fewest periods in a record for a line to be seen, and fewest pitches in the travel."""
 
@@ -140,6 +144,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     if total == 0.0:
         return []
     period = repetition(item.run.v)
+    carrier = _carrier(drive)
     found: list[tuple[float, float]] = []
     for k in np.argsort(power)[::-1][:5].tolist():
         if k < PERIODS or power[k] < np.max(power[k - 1 : k + 2]):
@@ -155,9 +160,19 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
             continue
         if period is not None and abs(k * period / n - round(k * period / n)) * n / period < 1.5:
             continue  # a harmonic of the drive
+        if carrier is not None and k < (HARMONICS + 0.5) * carrier and abs(k - round(k / carrier) * carrier) < 1.5:
+            continue
         if not any(abs(other - k / (n * step)) < 4.0 / (n * step) for _, other in found):
             found.append((share, k / (n * step)))
     return found
+
+
+def _carrier(power: Array) -> float | None:
+    """Place of the line that holds most of a windowed drive's power, in bins; None where none holds so much."""
+    k = int(np.argmax(power))
+    near = np.arange(max(k - 2, 0), min(k + 3, len(power)))
+    held = float(np.sum(power[near]))
+    return float(near @ power[near]) / held if k and held >= CARRIED * float(np.sum(power)) else None
 
 
 def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[float, ...]:
