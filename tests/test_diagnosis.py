@@ -20,7 +20,7 @@ from recordings import brute_output, noisy, part_of_file, record, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen import diagnosis, parallel
+from hystgen import parallel
 from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, told, trials
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
@@ -237,9 +237,9 @@ def test_a_record_of_which_most_is_not_compared_is_told() -> None:
     v = 50.0 - np.interp(t, [0.0, 3.0], [40.0, 50.0]) * np.cos(2 * np.pi * 2.0 * t)
     late, early = Record("late", t, v, 0.1 * v), Record("early", t, v[::-1], 0.1 * v[::-1])
     ready = believed.prepare([early, late], [early], None, 0.0)
-    (said,) = diagnosis._silent(ready)
+    (said,) = ready.notes
     assert said.startswith(f"late: {np.count_nonzero(ready.to_fit[1].known)} of 4000 samples are compared")
-    assert diagnosis._silent(believed.prepare([early, late], [early], (0.0,), 0.0)) == []
+    assert believed.prepare([early, late], [early], (0.0,), 0.0).notes == []
 
 
 class TestNoise:
@@ -533,8 +533,11 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
     with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"sweep: there is too little to fit.*--history"):
         hystgen.diagnose(path, sweep, holdout=sweep)
     short = record(v[:-55], np.asarray(sweep.y)[:-55], "short")
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: \d samples at most .*--history"):
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: \d samples? at most .*--history"):
         hystgen.diagnose(path, short, holdout=short)
+    last = record(v[:600], np.asarray(sweep.y)[:600], "last")  # nothing moves behind its largest drive
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"last: there is too little to fit: 1 sample at"):
+        hystgen.diagnose(path, last, holdout=last)
     content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
     assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
 

@@ -672,8 +672,8 @@ class TestRefused:
                 np.arange(400.0),
                 SINE,
                 (),
-                "once the start memory is known the drive does not move any more; record more cycles, or give "
-                "--history",
+                "data.csv: once the start memory is known the drive does not move any more; record more cycles, or "
+                "give --history",
             ),
             (
                 SINE,

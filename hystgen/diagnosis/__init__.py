@@ -11,14 +11,14 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import bad_samples, believed, channels, floor, intervals, selection, structure, told
+from hystgen.diagnosis import believed, channels, floor, intervals, selection, structure, told
 from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
@@ -29,7 +29,6 @@ from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
 from hystgen.identification.thresholds import rounded
 from hystgen.records import Record, read_records
-from hystgen.words import counted
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -39,10 +38,6 @@ Array = NDArray[np.float64]
 
 MOST = 0.5
 """Share of the error's variance from which on the sentence of the verdict is about that alone."""
-
-ENOUGH = 100
-"""More samples than this have to be left of some record, to fit and held out each."""
-
 
 @dataclass(frozen=True)
 class Signals:
@@ -168,15 +163,6 @@ def diagnose(
             for group in (usable[: len(several)], usable[len(several) :])
         )
         ready = believed.prepare(to_fit or read[: len(several)], to_hold, before, rest)
-        if to_hold and len(to_fit) > 2 and not _tells(ready.held):
-            silent = _too_little(ready.held, "judge by")
-            ready = believed.prepare(to_fit, [], before, rest)
-            ready.notes.insert(0, silent)
-        for group, what in ((ready.to_fit, "fit"), (ready.held, "judge by")):
-            if not _tells(group):
-                raise IdentificationError(_too_little(group, what))
-        ready.notes.extend(_silent(ready))
-        ready = _without_faults(ready)
         noise = floor.noise_floor([*ready.to_fit, *ready.held])
         base, start = believed.structure_of(model.cascade, given, ready)
         refitted = selection.refit(base, ready.to_fit, start)
@@ -189,52 +175,6 @@ def diagnose(
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
     extended = _extended(model.parameters, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
-
-
-def _without_faults(ready: believed.Prepared) -> believed.Prepared:
-    """The records without samples that are plainly wrong, unless hardly any would be left."""
-    repaired = bad_samples.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
-    number = len(ready.to_fit)
-    items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
-    to_fit, held = items[:number], items[number:]
-    if not (_tells(to_fit) and _tells(held)):
-        return ready
-    return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
-
-
-def _tells(group: Sequence[Item]) -> bool:
-    """Whether any of the records has enough samples to compare."""
-    return any(np.count_nonzero(item.known) > ENOUGH for item in group)
-
-
-def _too_little(group: Sequence[Item], what: str) -> str:
-    names = ", ".join(item.name for item in group)
-    most = max(int(np.count_nonzero(item.known)) for item in group)
-    return (
-        f"{names}: there is too little to {what}: {most} samples at most in a record behind the start, whose memory is "
-        f"not known, and more than {ENOUGH} are needed; give --history, or records that sweep their range again"
-    )
-
-
-def _silent(ready: believed.Prepared) -> list[str]:
-    """Of records that say nothing beside others that do, and of those of which most is not compared."""
-    known: dict[str, NDArray[np.bool_]] = {}
-    for item in (*ready.to_fit, *ready.held):  # the two ends of a record are two items
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
-    notes = []
-    for name, compared in known.items():
-        number = int(np.count_nonzero(compared))
-        if number <= ENOUGH:
-            notes.append(
-                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
-                "known give --history, or let it sweep its range again"
-            )
-        elif np.argmax(compared) > len(compared) // 2:
-            notes.append(
-                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
-                "drive, from where its memory is known; more with --history"
-            )
-    return notes
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:

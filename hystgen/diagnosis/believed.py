@@ -17,15 +17,20 @@ from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
 from hystgen.identification import faults, pi, prepared, thresholds
 from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh
+from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
 from hystgen.records import Record
+from hystgen.words import counted
 
 Array = NDArray[np.float64]
 
 PLAYS = 32
 """With half as many, what the steps between thresholds leave is up to 1.4 times the noise in effect-free records, and
 takes part in every comparison of effects; more leave no less."""
+
+ENOUGH = 100
+"""More samples than this have to be left of some record, to fit and held out each."""
 
 SET_ASIDE = 0.3
 """Share of a single record, its end, that is held out where nothing else can be."""
@@ -76,21 +81,30 @@ class Prepared:
 def prepare(
     records: Sequence[Record], holdout: Sequence[Record], history: tuple[float, ...] | None, rest: float
 ) -> Prepared:
-    """Items for the fits; without held-out records one in three is held out, or the end of a single one.
+    """Items for the fits; without held-out records that can judge one in three is held out, or the end of each.
 
-    Raises IdentificationError.
+    Raises IdentificationError, also where there is too little to compare.
     """
     notes: list[str] = []
+    held_courses, held_rails = _courses(holdout, history)
+    if holdout and len(records) > 2 and not _tell(held_courses):
+        notes.append(_too_little(held_courses, JUDGE))
+        holdout = []
     if not holdout and len(records) > 2:
         aside = set_aside(records)
         holdout = [records[k] for k in aside]
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
-    fit_courses, held_courses = (
-        [prepared.bridged(pi.course(record, history, 0)) for record in group] for group in (records, holdout)
-    )
-    repaired = _without_rails(fit_courses) + _without_rails(held_courses)
+        held_courses, held_rails = _courses(holdout, history)
+    fit_courses, fit_rails = _courses(records, history)
+    if not _tell(fit_courses):
+        raise IdentificationError(_too_little(fit_courses, "fit"))
+    if holdout and not _tell(held_courses):
+        raise IdentificationError(_too_little(held_courses, JUDGE))
+    if not holdout and not _tell(fit_courses, SET_ASIDE):
+        raise IdentificationError(_too_little(fit_courses, f"fit and {JUDGE}", SET_ASIDE))
+    repaired = fit_rails + held_rails
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
         for channel, wrong, what in (
@@ -111,7 +125,66 @@ def prepare(
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
     places = np.array(thresholds.dense(reach, samples, PLAYS).thresholds)
-    return Prepared(to_fit, held, notes, repaired, drive, places)
+    notes.extend(_hardly_compared([*to_fit, *held]))
+    return _without_faults(Prepared(to_fit, held, notes, repaired, drive, places))
+
+
+def _courses(
+    records: Sequence[Record], history: tuple[float, ...] | None
+) -> tuple[list[Course], list[dict[str, Any]]]:
+    """The records as they take part, and what was left out at a converter's end."""
+    courses = [prepared.bridged(pi.course(record, history, 0)) for record in records]
+    return courses, _without_rails(courses)
+
+
+JUDGE = "judge by"
+
+
+def _tell(courses: Sequence[Course], share: float = 1.0) -> bool:
+    """Whether a share of any of them is enough to compare."""
+    return any(share * course.used > ENOUGH for course in courses)
+
+
+def _too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
+    names = ", ".join(course.name for course in courses)
+    most = max(course.used for course in courses)
+    return (
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, whose memory is "
+        f"not known, and more than {ENOUGH / share:.0f} are needed; give --history, or records that sweep their range "
+        "again"
+    )
+
+
+def _hardly_compared(items: Sequence[Item]) -> list[str]:
+    """Of records that say nothing beside others that do, and of those of which most is not compared."""
+    known: dict[str, NDArray[np.bool_]] = {}
+    for item in items:  # the two ends of a record are two items
+        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
+    notes = []
+    for name, compared in known.items():
+        number = int(np.count_nonzero(compared))
+        if number <= ENOUGH:
+            notes.append(
+                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
+                "known give --history, or let it sweep its range again"
+            )
+        elif np.argmax(compared) > len(compared) // 2:
+            notes.append(
+                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
+                "drive, from where its memory is known; more with --history"
+            )
+    return notes
+
+
+def _without_faults(ready: Prepared) -> Prepared:
+    """The records without samples that are plainly wrong, unless hardly any would be left."""
+    repaired = bad_samples.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
+    number = len(ready.to_fit)
+    items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
+    to_fit, held = items[:number], items[number:]
+    if any(max(np.count_nonzero(item.known) for item in group) <= ENOUGH for group in (to_fit, held)):
+        return ready
+    return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
 
 
 def set_aside(records: Sequence[Record]) -> list[int]:

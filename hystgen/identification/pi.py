@@ -88,8 +88,10 @@ def solve(
     """
     reach = thresholds.largest([item for item in courses if item.used])
     if reach == 0.0:
+        names = ", ".join(dict.fromkeys(item.name for item in courses))
         raise IdentificationError(
-            "once the start memory is known the drive does not move any more; record more cycles, or give --history"
+            f"{names}: once the start memory is known the drive does not move any more; record more cycles, or give "
+            "--history"
         )
     if isinstance(wanted, tuple):
         lists = [Candidate(wanted)]
