@@ -720,8 +720,8 @@ def test_the_report_says_why_refitting_may_widen_the_gap() -> None:
         "gap": {"as_given": {"fit": 2.0, "holdout": 3.0}, "refitted": {"fit": 0.5, "holdout": 4.0}},
     }
     (said,) = report._refitted(content)
-    assert "from 2 to 0.5 um rms" in said.text
-    content["gap"]["refitted"]["holdout"] = 2.9
+    assert "rms error (um) of the records that are fitted from 2 to 0.5, and that" in said.text
+    content["gap"]["refitted"]["holdout"] = 3.02
     assert report._refitted(content) == []
 
 

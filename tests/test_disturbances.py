@@ -16,6 +16,7 @@ from scipy.signal import lfilter
 
 import hystgen
 from hystgen.diagnosis import bad_samples, channels, description, intervals, periodic, stick_slip, structure
+from hystgen.diagnosis.drives import one_loop, one_speed
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
@@ -239,7 +240,7 @@ def sweep(*ends: float, seconds: float = 1.0, noise: float = 0.0) -> Item:
     ],
 )
 def test_records_of_one_loop(items: list[Item], one: bool, speed: bool) -> None:
-    assert (description.one_loop(items), description.one_speed(items)) == (one, speed)
+    assert (one_loop(items), one_speed(items)) == (one, speed)
 
 
 def test_stick_slip() -> None:

@@ -251,6 +251,18 @@ def test_what_no_record_shows_ringing_is_no_resonance() -> None:
         assert fastest.damping < math.sqrt(0.5)
 
 
+@pytest.mark.parametrize(("slope", "end"), [(-1.0, 0.0), (1.0, 1.0)])
+@pytest.mark.parametrize("rounding", [-1e-13, 0.0, 1e-13])
+def test_an_even_density_has_its_bump_at_the_higher_end(slope: float, end: float, rounding: float) -> None:
+    """Above its middle at one end by as much as below it at the other: which is taken is not left to rounding."""
+    about = About((0.0, 90.0), 10.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0, 10.0))
+    (candidate,) = effects.shapes("noncongruent")[1].candidates(about)
+    assert candidate.grown is not None
+    amplitude, place, _ = candidate.grown(np.array([slope, rounding]))
+    assert place == end
+    assert amplitude > 0.0
+
+
 def test_candidates_without_plays_or_temperature_are_left_out() -> None:
     about = About((0.0, 1.0), 1.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,))
     for name in ("rate_dependence", "noncongruent"):

@@ -306,7 +306,7 @@ def first_of(best: Made, other: Made, effect: str | None = None) -> str:
         trials.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
         for made in (best, other)
     ]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     first: Any = decisions.simplest_first(tried, records)[0].fitted
     return str(first.name)
 
@@ -338,7 +338,7 @@ def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, 
     """Of 1 it removes 0.8, 0.6 and 0.44, which are 1.33, 0.75 and 0.48 times what it leaves."""
     better = Made("better", 1, (left, left))
     best = trials.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     for bare, accepted in ((True, first), (False, further)):
         now: Any = Made("now", 1, (1.0, 1.0))
         now.bare = bare
@@ -351,7 +351,7 @@ def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> Non
     now, better = Made("now", 1, (1.0, 1.0)), Made("better", 1, (fitted, 0.5))
     option: Any = SimpleNamespace(name="better")
     best = trials.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     assert (decisions.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
 
 
@@ -361,5 +361,5 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     now, better = Made("now", 5, (own, own), (1.0, 1.0)), Made("better", 5, (0.6, 0.6))
     option: Any = SimpleNamespace(name="better")
     best = trials.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE)
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     assert (decisions.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]

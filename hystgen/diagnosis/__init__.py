@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MOST = 0.5
+MAINLY = 0.5
 """Share of the error's variance from which on the sentence of the verdict is about that alone."""
 
 @dataclass(frozen=True)
@@ -85,15 +85,16 @@ class Diagnosis:
         if self.verdict == "nothing_missing":
             noise = f"the refitted model leaves {after} rms on held-out records, which is noise"
             return f"Nothing is missing: {noise}.{but}"
-        missing = "Something is missing that the catalogue does not hold or the records cannot show"
-        missing = f"{missing}: {after} rms is left"
+        missing = (
+            f"Something is missing that the catalogue does not hold or the records cannot show: {after} rms is left"
+        )
         disturbing = [each for each in seen if each["kind"] not in (*told.REPAIRED, told.ACTUATOR)]
         if not disturbing:
             return f"{missing}.{but}"
         first = told.sentence(disturbing[0], unit)
         more = f", and {len(disturbing) - 1} more below" if len(disturbing) > 1 else ""
-        mostly = max(each.get("share", 1.0) for each in disturbing) >= MOST
-        if mostly or all(each["kind"] != told.ACTUATOR for each in seen):
+        mainly = max(each.get("share", 1.0) for each in disturbing) >= MAINLY
+        if mainly or all(each["kind"] != told.ACTUATOR for each in seen):
             return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
         return f"{missing}. The records are disturbed too: {first}{more}.{but}"
 

@@ -149,9 +149,9 @@ def _too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str
     names = ", ".join(course.name for course in courses)
     most = max(course.used for course in courses)
     return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, whose memory is "
-        f"not known, and more than {ENOUGH / share:.0f} are needed; give --history, or records that sweep their range "
-        "again"
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
+        f"whose memory is not known, and more than {ENOUGH / share:.0f} are needed; give --history, or records that "
+        "sweep their range again"
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.diagnosis import bad_samples, description, intervals, periodic, stick_slip, structure, told, where
+from hystgen.diagnosis import bad_samples, description, drives, intervals, periodic, stick_slip, structure, told, where
 from hystgen.diagnosis.believed import Prepared
 from hystgen.diagnosis.floor import Floor
 from hystgen.diagnosis.selection import Found, Outcome
@@ -93,7 +93,7 @@ def content_of(
         "not_separable": rivals,
         "advice": [
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
-            *([told.ONE_LOOP] if (rivals or open_ended) and description.one_loop(everything) else []),
+            *([told.ONE_LOOP] if (rivals or open_ended) and drives.one_loop(everything) else []),
             *(more for each in left for more in told.advice(each)),
         ],
         "ranking": [

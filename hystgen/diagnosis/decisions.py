@@ -81,10 +81,12 @@ class Merit:
 
 def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
     """None where chance explains the difference, or what is removed is too little to be told from the noise, or all but
-    nothing of it is in the records that its numbers are from.
+    nothing of it is in the records that its numbers are from, or where records of one loop alone do not support a name.
 
     `least`: how many times what is left, or the noise, has to be removed; by default as `ABOVE_NOISE` says.
     """
+    if not _supported(now, best, records):
+        return None
     errors = _without_merit(now, best, records.held)
     equal = fits.rms(errors)
     removed = apart(equal, best.held_out)
@@ -195,28 +197,34 @@ def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records
     least = best.fitted.rms
     others = [each for each in rivals(best, tried, records) if no_worse(each.fitted.rms, least, records.noise)]
     if records.one_loop:
-        sure = best.held_out <= AT_FLOOR * records.noise  # else what fitted records tell is not borne out by others
-        others += [
-            each for each in tried
-            if each.name != best.name
-            and (explains_most(now, each, records) or (not sure and most(each.fitted.rms, now.rms, records.noise)))
-        ]  # fmt: skip
-    return [each.name for each in others]
+        others += [each for each in tried if each.name != best.name and _explains_most(now, each, records)]
+        if best.held_out > AT_FLOOR * records.noise:  # what fitted records tell is not borne out by others
+            others += [
+                each
+                for each in tried
+                if each.name != best.name and takes_most(each.fitted.rms, now.rms, records.noise)
+            ]
+    return list(dict.fromkeys(each.name for each in others))
 
 
-def explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
+def _explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
     """Whether held-out records find it to leave hardly half of the error that is no noise."""
-    return most(tried.held_out, records.left(now), records.noise)
+    return takes_most(tried.held_out, records.left(now), records.noise)
 
 
-def most(left: float, gap: float, noise: float) -> bool:
+def takes_most(left: float, gap: float, noise: float) -> bool:
     """Whether what is left is hardly half of a gap, noise apart."""
     return apart(left, noise) <= MOSTLY * apart(gap, noise)
 
 
-def supported(now: Fitted, best: Tried, records: Records) -> bool:
+def bear_two(records: Records) -> bool:
+    """Whether records may support a second name, or one beside what a model has already."""
+    return not (records.one_loop and records.one_speed)
+
+
+def _supported(now: Fitted, best: Tried, records: Records) -> bool:
     """Whether records that may tell as little as those of one loop alone support a name."""
-    return not records.one_loop or ((now.bare or not records.one_speed) and explains_most(now, best, records))
+    return not records.one_loop or ((now.bare or bear_two(records)) and _explains_most(now, best, records))
 
 
 def apart(more: float, less: float) -> float:

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import operators
+from hystgen.diagnosis.drives import reversals
 from hystgen.diagnosis.periodic import repetition
 from hystgen.diagnosis.structure import Item
-from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
 
@@ -27,15 +27,6 @@ FEWEST = 200
 
 THINNED = 12_000
 """Samples that are used where several variables are taken together."""
-
-TURNS = 0.02
-"""A reversal counts from this share of the drive range on."""
-
-SAME_PLACE, SAME_TIME = 0.1, 1.5
-"""Loops are one where their ends lie within this share of the drive's range, at one speed up to this ratio of times."""
-
-STANDING = 0.3
-"""A drive stands still between its turns where it does so for this share of the time from one to the next."""
 
 PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
 """Thresholds that tell of the memory, as shares of the drive range."""
@@ -87,53 +78,6 @@ def since_reversal(item: Item) -> Array:
     v = item.run.v
     at = np.concatenate([[0], reversals(v)])
     return np.asarray(np.abs(v - v[at[np.searchsorted(at, np.arange(len(v)), side="right") - 1]]))
-
-
-def reversals(v: Array) -> NDArray[np.intp]:
-    """Samples at which the drive turns, by more than a share of its range."""
-    z = _followed(v)
-    moved = np.flatnonzero(np.diff(z))
-    if len(moved) < 2:
-        return np.empty(0, dtype=np.intp)
-    turned = np.flatnonzero(np.diff(np.sign(np.diff(z)[moved])))
-    return np.asarray(moved[turned] + 1)
-
-
-def _followed(v: Array) -> Array:
-    """The drive without its noise, as a play follows it."""
-    return np.asarray(operators.plays(v, np.array([0.5 * TURNS * float(np.ptp(v))]), np.array([v[0]]))[0])
-
-
-def one_loop(items: Sequence[Item]) -> bool:
-    """Whether the drive goes to and fro between the same two ends in all records, and stands still nowhere: a hold
-    tells more than a loop."""
-    ends = []
-    for item in items:
-        v, at = item.run.v, _ends(item.run.v)
-        if not len(at) or _stands(item.run):
-            return False
-        ends += [v[at], np.array([v[at[0] :].min(), v[at[0] :].max()])]
-    levels = np.concatenate(ends)
-    low, high = float(levels.min()), float(levels.max())
-    return bool(np.minimum(levels - low, high - levels).max() <= SAME_PLACE * (high - low))
-
-
-def _stands(run: Run) -> bool:
-    moving = run.t[np.flatnonzero(np.diff(_followed(run.v)))]
-    passing = float(np.ptp(moving)) / (len(reversals(run.v)) + 1)
-    return bool(np.max(np.diff(moving)) > STANDING * passing)
-
-
-def one_speed(items: Sequence[Item]) -> bool:
-    """Whether the drive takes the same time from each of its ends to the next in all records."""
-    passed = np.concatenate([np.diff(item.run.t[_ends(item.run.v)]) for item in items])
-    return not len(passed) or bool(passed.max() <= SAME_TIME * passed.min())
-
-
-def _ends(v: Array) -> NDArray[np.intp]:
-    """Where the drive turns; the way to the first turn begins anywhere."""
-    at = reversals(v)
-    return at[1:] if len(at) > 1 else at
 
 
 VARIABLES = (

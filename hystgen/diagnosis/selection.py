@@ -69,13 +69,15 @@ def select(records: Records, refitted: Fitted) -> Outcome:
     for _ in range(ROUNDS):
         if records.left(now) <= decisions.AT_FLOOR * records.noise:
             break
+        if found and not decisions.bear_two(records):
+            break
         step = _step(now, gap, records)
         if latest is not None and step is not None:
             pair = _with_rival(latest, step, gap, records)
             if pair is not None:
                 other, step = pair
                 found[-1] = replace(_found(other, records), before=found[-1].before)
-        if step is not None and step.merit is None and not found:
+        if step is not None and step.merit is None and not found and decisions.bear_two(records):
             both = _together(step, gap, records)
             if both is not None:
                 rankings.append(tuple(step.tried))
@@ -93,7 +95,7 @@ def select(records: Records, refitted: Fitted) -> Outcome:
         if now is not step.best.fitted:
             latest = None
     if found:
-        now = fits.fit(now.structure, records.most, now.shape, now.weights)
+        now = fits.fit(now.structure, records.full, now.shape, now.weights)
         found[-1] = replace(found[-1], after=records.left(now))
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
@@ -127,7 +129,7 @@ def _step(
         return None
     for best in decisions.simplest_first(tried, records):
         merit = decisions.merit_of(now, best, records, least)
-        if merit is not None and merit.worth(gap, records) and decisions.supported(now, best, records):
+        if merit is not None and merit.worth(gap, records):
             return _Step(now, tried, best, merit)
     return _Step(now, tried, tried[0], None)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import parallel
-from hystgen.diagnosis import description, periodic
+from hystgen.diagnosis import drives, periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Search, Structure
@@ -113,12 +113,12 @@ def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
 class Records:
     """What a search is over, and what it is like: the records, thinned for searches, and further to tell shapes apart.
 
-    `most`: those to fit, with as many samples compared as any search compares.
+    `full`: those to fit, with as many samples compared as any search compares.
     """
 
     to_fit: Sequence[Item]
     held: Sequence[Item]
-    most: Sequence[Item]
+    full: Sequence[Item]
     quick: Sequence[Item]
     thin: Sequence[Item]
     thin_held: Sequence[Item]
@@ -149,13 +149,13 @@ class Records:
         masks = everything(groups)
         if not user and not any(part.name.startswith("user:") for part in structure.parts):
             masks = [needed(group, refitted.errors(group), noise) for group in groups]
-        most, quick = (thinned(groups, number, masks)[0] for number in (joint.COMPARED, SEARCHED))
+        full, quick = (thinned(groups, number, masks)[0] for number in (joint.COMPARED, SEARCHED))
         thin, thin_held = thinned(groups, SCREENED, masks)
         gap = fits.rms(refitted.errors(to_fit))
         known = about(to_fit, structure.thresholds)
         return cls(
-            to_fit, held, most, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
-            description.one_loop([*to_fit, *held]), description.one_speed(to_fit),
+            to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
+            drives.one_loop([*to_fit, *held]), drives.one_speed(to_fit),
         )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:

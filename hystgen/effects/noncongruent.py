@@ -33,6 +33,9 @@ PLACES = 101
 LOWEST, HIGHEST = -0.8, 2.5
 """Amplitudes of a bump from which a search starts."""
 
+EVEN = 1e-6
+"""A density that is as far below its ends as above them, within this share, has a bump and no dip."""
+
 
 class _Noncongruent(Effect):
     name: Literal["noncongruent"] = Field(description="name of the effect")
@@ -169,7 +172,9 @@ class LoopCentre(_Noncongruent):
             at = np.linspace(low, high, PLACES)
             density = np.maximum(1.0 + 0.2 * cubic[0] * at / largest + 0.3 * cubic[1] * (at / largest) ** 2, 0.05)
             outside = 0.5 * float(density[0] + density[-1])
-            k = int(np.argmax(np.abs(density - outside)))
+            above, below = int(np.argmax(density)), int(np.argmin(density))
+            # from one end to the other it may rise or fall evenly: which is further off would be a matter of rounding
+            k = above if density[above] - outside >= (1.0 - EVEN) * (outside - density[below]) else below
             amplitude = float(np.clip(density[k] / outside - 1.0, LOWEST, HIGHEST))
             return np.array([amplitude, k / (PLACES - 1), start])
 

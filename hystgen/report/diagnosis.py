@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
 """How far and how a compensator takes out what is a stage in front of the plays."""
 
+LONGER = 0.01
+"""An error is plainly larger than another from this share on."""
+
 AT_NOISE = 1.25
 """An error within this factor of the noise is called noise."""
 
@@ -56,16 +59,16 @@ def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
 
 
 def _refitted(content: Mapping[str, Any]) -> list[Text]:
-    """Why the second bar is longer than the first, where it is."""
+    """What the second bar means where it is plainly longer than the first."""
     given, refitted = content["gap"]["as_given"], content["gap"]["refitted"]
-    if refitted["holdout"] <= given["holdout"]:
+    if refitted["holdout"] <= (1.0 + LONGER) * given["holdout"]:
         return []
-    unit = f" {content['unit']}" if content["unit"] else ""
-    fitted = f"from {given['fit']:.4g} to {refitted['fit']:.4g}{unit} rms"
+    fitted = f"{given['fit']:.4g} to {refitted['fit']:.4g}"
     return [
         Text(
-            f"Refitting lowers the error of the records that are fitted, {fitted}, and not that of the held-out ones: "
-            "its weights have taken what is missing in the former, and the latter lack it in another way."
+            f"Refitting changes the {label('rms error', content['unit'])} of the records that are fitted from "
+            f"{fitted}, and that of the held-out ones from {given['holdout']:.4g} to {refitted['holdout']:.4g}: "
+            "weights fitted where something is missing take some of it, and other records may miss it in another way."
         )
     ]
 
