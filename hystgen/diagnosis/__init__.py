@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 MAINLY = 0.5
 """Share of the error's variance from which on the sentence of the verdict is about that alone."""
 
+
 @dataclass(frozen=True)
 class Signals:
     """A record with the errors of the refitted model and of the one with the effects; NaN where not compared."""
