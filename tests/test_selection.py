@@ -28,7 +28,7 @@ class Hypothesis:
     def __init__(self, world: World, names: frozenset[str], left: float | None = None) -> None:
         self.world, self.names = world, names
         self.left = world.left.get(names, 1.0) if left is None else left
-        self.shape = np.zeros(len(names))
+        self.shape, self.weights, self.structure = np.zeros(len(names)), np.zeros(0), None
         self.bare = not names
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
 
@@ -81,7 +81,7 @@ class World:
     def records(self) -> Any:
         return SimpleNamespace(
             to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
-            left=self.gap, one_loop=self.one_loop, one_speed=self.one_speed,
+            left=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
         )  # fmt: skip
 
 
@@ -174,6 +174,24 @@ def test_of_one_loop_alone_what_explains_most_is_named(one_loop: bool, left: flo
     step = selection._step(now, world.gap(now), world.records)
     assert step is not None
     assert (step.merit is not None) is (named or not one_loop)
+
+
+@pytest.mark.parametrize("one_loop", [False, True])
+@pytest.mark.parametrize(("share", "named"), [(0.03, True), (0.1, False)])
+def test_of_one_loop_a_name_leaves_a_few_times_the_noise_at_most(
+    one_loop: bool, share: float, named: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A share of what is missing stays beside the noise: 1.5 times the noise in all, or 3.7 times."""
+    world = World({frozenset("a"): share}, "a")
+    world.one_loop = one_loop
+
+    now: Any = Hypothesis(world, frozenset())
+    monkeypatch.setattr(selection.fits, "begun", lambda *_: SimpleNamespace(found=lambda _: now))
+    monkeypatch.setattr(selection.fits, "fit", lambda *_: Hypothesis(world, frozenset("a")))
+    outcome = selection.select(world.records, now)
+    assert [each.name for each in outcome.found] == (["a"] if named or not one_loop else [])
+    assert world.gap(outcome.fitted) == world.gap(Hypothesis(world, frozenset("a" if outcome.found else "")))
+    assert len(outcome.rankings) == 1
 
 
 @pytest.mark.parametrize("left", [0.0, 1.0])

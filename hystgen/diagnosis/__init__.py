@@ -173,7 +173,7 @@ def diagnose(
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
-        content = content_of(model.parameters, ready, noise, found, as_given, odd)
+        content = content_of(model.parameters, ready, noise, found, as_given, odd, searched.one_loop)
     notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
     extended = _extended(model.parameters, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.diagnosis import bad_samples, description, drives, intervals, periodic, stick_slip, structure, told, where
+from hystgen.diagnosis import bad_samples, description, intervals, periodic, stick_slip, structure, told, where
 from hystgen.diagnosis.believed import Prepared
+from hystgen.diagnosis.decisions import FAR_ABOVE
 from hystgen.diagnosis.floor import Floor
 from hystgen.diagnosis.selection import Found, Outcome
 from hystgen.diagnosis.structure import Array, Fitted
@@ -20,10 +21,7 @@ STRUCTURE = 0.15
 """Share of the residual's variance that goes with a variable on unseen samples, beyond which it is no noise."""
 
 ABOVE_FLOOR = 1.25
-"""A residual this much larger than the noise, and with structure, is unexplained."""
-
-FAR_ABOVE = 2.0
-"""One this much larger is, whatever it goes with: noise that is not white exceeds its floor by less."""
+"""A residual this much larger than the noise, and with structure, is unexplained; one that is far above it anyway."""
 
 ELSEWHERE = 3.0
 """What is left shows in a held-out record alone where that leaves so many times what the fitted ones do."""
@@ -36,11 +34,12 @@ def content_of(
     found: Outcome,
     as_given: Sequence[float],
     odd: list[dict[str, Any]],
+    one_loop: bool,
 ) -> dict[str, Any]:
     """All that `diagnosis.json` says.
 
     `as_given`: rms errors of the model as it was believed, on fitted and held-out records; `odd`: what was found about
-    whole records.
+    whole records; `one_loop`: whether all of them pass the same one.
     """
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
@@ -93,7 +92,7 @@ def content_of(
         "not_separable": rivals,
         "advice": [
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
-            *([told.ONE_LOOP] if (rivals or open_ended) and drives.one_loop(everything) else []),
+            *([told.ONE_LOOP] if (rivals or open_ended) and one_loop else []),
             *(more for each in left for more in told.advice(each)),
         ],
         "ranking": [

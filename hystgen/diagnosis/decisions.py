@@ -59,6 +59,11 @@ what is missing, and what leaves more is not named: two functions, up and down, 
 effect is the handier. Where they were fitted at one speed, no second one is named either: its shape may have left it.
 """
 
+FAR_ABOVE = 2.0
+"""An error so many times as large as the noise is no noise, whatever it goes with: noise that is not white exceeds its
+floor by less. What leaves more of records of one loop alone is not named either: a right name in a wrong shape leaves
+it as well as a wrong name, and no other loop tells which of the two it was."""
+
 AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
 """A held-out error within this factor of the noise leaves nothing that would be enough for a name."""
 
@@ -220,6 +225,11 @@ def takes_most(left: float, gap: float, noise: float) -> bool:
 def bear_two(records: Records) -> bool:
     """Whether records may support a second name, or one beside what a model has already."""
     return not (records.one_loop and records.one_speed)
+
+
+def borne_out(left: float, records: Records) -> bool:
+    """Whether what is left in the end is little enough for the names that were found."""
+    return not records.one_loop or left <= FAR_ABOVE * records.noise
 
 
 def _supported(now: Fitted, best: Tried, records: Records) -> bool:

@@ -62,6 +62,7 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
 def select(records: Records, refitted: Fitted) -> Outcome:
     """Add effects to the refitted model as long as one qualifies."""
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
+    none = now
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
     gap = records.left(now)
@@ -94,6 +95,8 @@ def select(records: Records, refitted: Fitted) -> Outcome:
         now, found = _exchanged(now, found, {each.option.name for tried in rankings for each in tried}, records)
         if now is not step.best.fitted:
             latest = None
+    if not decisions.borne_out(records.left(now), records):
+        now, found = none, []
     if found:
         now = fits.fit(now.structure, records.full, now.shape, now.weights)
         found[-1] = replace(found[-1], after=records.left(now))
