@@ -56,6 +56,8 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
         raise _Failed(f"{path}: error: {error}", 1) from None
     except FormatError as error:
         raise _Failed(str(located(path, error.problems)), 2) from None
+    except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
+        raise
     except (ValueError, OSError) as error:
         raise _Failed(f"error: {error}", 2) from None
 

@@ -109,6 +109,16 @@ def test_the_package_is_a_command_too() -> None:
         assert said in done.stdout + done.stderr
 
 
+def test_a_reader_that_has_had_enough_is_no_error() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    words = [sys.executable, "-m", "hystgen", "diagnose", "--plan", "stage.yaml", "-o", "plan"]
+    done = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (done.returncode, "rror" in done.stderr) == (1, False), done.stderr
+    assert Path("plan").is_dir()
+
+
 # emit ----------------------------------------------------------------------------------------------------
 
 
