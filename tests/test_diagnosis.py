@@ -22,6 +22,7 @@ from scipy.signal import lfilter
 import hystgen
 from hystgen import parallel
 from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, told, trials
+from hystgen.diagnosis.held_out import set_aside
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep import ExponentialCreep
@@ -507,7 +508,7 @@ def test_either_side_has_fast_records(rates: list[float], aside: list[int]) -> N
     for number, rate in enumerate(rates):
         t = np.arange(400) * 0.01
         records.append(Record(f"record {number}", t, 50.0 * np.abs((rate * t) % 2.0 - 1.0), t, sample_time=0.01))
-    assert believed.set_aside(records) == aside
+    assert set_aside(records) == aside
 
 
 def test_held_out_records_take_no_part_in_the_fit(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import bad_samples
+from hystgen.diagnosis import bad_samples, held_out
 from hystgen.diagnosis.structure import Actuator, Item, Structure, kept
 from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
@@ -21,23 +21,12 @@ from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
 from hystgen.records import Record
-from hystgen.words import counted
 
 Array = NDArray[np.float64]
 
 PLAYS = 32
 """With half as many, what the steps between thresholds leave is up to 1.4 times the noise in effect-free records, and
 takes part in every comparison of effects; more leave no less."""
-
-ENOUGH = 100
-"""More samples than this have to be left of some record, to fit and held out each."""
-
-SET_ASIDE = 0.3
-"""Share of a single record, its end, that is held out where nothing else can be."""
-
-REACHED = 0.5
-"""A record is a fast one from this share of the largest rate of the drive on, and a wide one from that of its swing."""
-
 
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
     """The believed front as a family around it, and the shape that it has in that family."""
@@ -87,23 +76,23 @@ def prepare(
     """
     notes: list[str] = []
     held_courses, held_rails = _courses(holdout, history)
-    if holdout and len(records) > 2 and not _tell(held_courses):
-        notes.append(_too_little(held_courses, JUDGE))
+    if holdout and len(records) > 2 and not held_out.enough(held_courses):
+        notes.append(held_out.too_little(held_courses, held_out.JUDGE))
         holdout = []
     if not holdout and len(records) > 2:
-        aside = set_aside(records)
+        aside = held_out.set_aside(records)
         holdout = [records[k] for k in aside]
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
         held_courses, held_rails = _courses(holdout, history)
     fit_courses, fit_rails = _courses(records, history)
-    if not _tell(fit_courses):
-        raise IdentificationError(_too_little(fit_courses, "fit"))
-    if holdout and not _tell(held_courses):
-        raise IdentificationError(_too_little(held_courses, JUDGE))
-    if not holdout and not _tell(fit_courses, SET_ASIDE):
-        raise IdentificationError(_too_little(fit_courses, f"fit and {JUDGE}", SET_ASIDE))
+    if not held_out.enough(fit_courses):
+        raise IdentificationError(held_out.too_little(fit_courses, "fit"))
+    if holdout and not held_out.enough(held_courses):
+        raise IdentificationError(held_out.too_little(held_courses, held_out.JUDGE))
+    if not holdout and not held_out.enough(fit_courses, held_out.SET_ASIDE):
+        raise IdentificationError(held_out.too_little(fit_courses, f"fit and {held_out.JUDGE}", held_out.SET_ASIDE))
     repaired = fit_rails + held_rails
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
@@ -119,13 +108,14 @@ def prepare(
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
     if not held:
-        to_fit, held = _ends(to_fit)
-        notes.append(f"no record was given that can judge: the last {100 * SET_ASIDE:g} % of each is set aside")
+        to_fit, held = held_out.parted(to_fit)
+        share = f"{100 * held_out.SET_ASIDE:g} %"
+        notes.append(f"no record was given that can judge: the last {share} of each is set aside")
     reach = thresholds.largest(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
     places = np.array(thresholds.dense(reach, samples, PLAYS).thresholds)
-    notes.extend(_hardly_compared([*to_fit, *held]))
+    notes.extend(held_out.hardly_compared([*to_fit, *held]))
     return _without_faults(Prepared(to_fit, held, notes, repaired, drive, places))
 
 
@@ -137,71 +127,15 @@ def _courses(
     return courses, _without_rails(courses)
 
 
-JUDGE = "judge by"
-
-
-def _tell(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether a share of any of them is enough to compare."""
-    return any(share * course.used > ENOUGH for course in courses)
-
-
-def _too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
-    names = ", ".join(course.name for course in courses)
-    most = max(course.used for course in courses)
-    return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
-        f"whose memory is not known, and more than {ENOUGH / share:.0f} are needed; give --history, or records that "
-        "sweep their range again"
-    )
-
-
-def _hardly_compared(items: Sequence[Item]) -> list[str]:
-    """Of records that say nothing beside others that do, and of those of which most is not compared."""
-    known: dict[str, NDArray[np.bool_]] = {}
-    for item in items:  # the two ends of a record are two items
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
-    notes = []
-    for name, compared in known.items():
-        number = int(np.count_nonzero(compared))
-        if number <= ENOUGH:
-            notes.append(
-                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
-                "known give --history, or let it sweep its range again"
-            )
-        elif np.argmax(compared) > len(compared) // 2:
-            notes.append(
-                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
-                "drive, from where its memory is known; more with --history"
-            )
-    return notes
-
-
 def _without_faults(ready: Prepared) -> Prepared:
     """The records without samples that are plainly wrong, unless hardly any would be left."""
     repaired = bad_samples.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
     items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
     to_fit, held = items[:number], items[number:]
-    if any(max(np.count_nonzero(item.known) for item in group) <= ENOUGH for group in (to_fit, held)):
+    if any(max(np.count_nonzero(item.known) for item in group) <= held_out.ENOUGH for group in (to_fit, held)):
         return ready
     return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
-
-
-def set_aside(records: Sequence[Record]) -> list[int]:
-    """Every third record, in a count or with a neighbour in place of one by which either side has fast and wide drives.
-
-    What a fast edge shows cannot be found where none is fitted, nor judged where none is held out.
-    """
-    rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
-    swings = np.array([float(np.ptp(record.v)) for record in records])
-    showing = [{k for k, x in enumerate(found) if x >= REACHED * np.max(found)} for found in (rates, swings)]
-
-    def shared(aside: Sequence[int]) -> int:
-        return sum(bool(some.intersection(aside)) and bool(some.difference(aside)) for some in showing)
-
-    counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
-    others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
-    return max(counts + others, key=shared)
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:
@@ -244,19 +178,6 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
         [replace(item, session=whole.run, part=parts[id(item)]) for item in group] for group in (to_fit, held)
     )
     return first, second
-
-
-def _ends(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
-    """Every item twice: its beginning to be fitted, its end to be compared."""
-    fronts, ends = [], []
-    for item in items:
-        known = np.flatnonzero(item.known)
-        split = int(known[int((1.0 - SET_ASIDE) * len(known))])
-        front, end = item.y.copy(), item.y.copy()
-        front[split:], end[:split] = np.nan, np.nan
-        fronts.append(replace(item, y=front))
-        ends.append(replace(item, y=end))
-    return fronts, ends
 
 
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:

@@ -67,10 +67,9 @@ def select(records: Records, refitted: Fitted) -> Outcome:
     rankings: list[tuple[Tried, ...]] = []
     gap = records.left(now)
     latest: _Step | None = None
-    for _ in range(ROUNDS):
+    rounds = ROUNDS if decisions.bear_two(records) else 1
+    for _ in range(rounds):
         if records.left(now) <= decisions.AT_FLOOR * records.noise:
-            break
-        if found and not decisions.bear_two(records):
             break
         step = _step(now, gap, records)
         if latest is not None and step is not None:
@@ -78,7 +77,7 @@ def select(records: Records, refitted: Fitted) -> Outcome:
             if pair is not None:
                 other, step = pair
                 found[-1] = replace(_found(other, records), before=found[-1].before)
-        if step is not None and step.merit is None and not found and decisions.bear_two(records):
+        if step is not None and step.merit is None and not found and rounds > 1:
             both = _together(step, gap, records)
             if both is not None:
                 rankings.append(tuple(step.tried))
