@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from recordings import brute_output, noisy, part_of_file, record, wander
+from recordings import brute_output, noisy, part_of_file, record, wander, write_csv
 from scipy.signal import lfilter
 
 import hystgen
@@ -541,6 +541,63 @@ def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) ->
         hystgen.diagnose(path, last, holdout=last)
     content = hystgen.diagnose(path, sweep, holdout=sweep, history=[0.0]).content
     assert content["gap"]["refitted"]["holdout"] < 0.01 * content["output_range"]
+
+
+def _behind_a_cycle(drives: list[Array]) -> list[Record]:
+    """Records of an actuator that had been at 100 and at 0 before each of them."""
+    records = []
+    for number, v in enumerate(drives):
+        before = np.concatenate([np.linspace(0.0, 100.0, 50), np.linspace(100.0, 0.0, 50), np.linspace(0.0, v[0], 50)])
+        y = brute_output(np.concatenate([before, v]), (0.0, 10.0, 25.0), (1.0, 0.5, 0.4), 0.0)[len(before) :]
+        records.append(record(v, noisy(y, 0.05, number), f"record {number}"))
+    return records
+
+
+def test_a_history_that_the_starts_contradict_is_left_out(tmp_path: Path) -> None:
+    """What it would make of the starts is no effect of the actuator."""
+    records = _behind_a_cycle([wander(number) for number in (1, 2, 3, 4)])
+    right, wrong, none = (
+        hystgen.diagnose(_model(tmp_path), records[:3], holdout=records[3:], history=history)
+        for history in ([100.0, 0.0], [0.0], None)
+    )
+    assert right.verdict == wrong.verdict == none.verdict == "nothing_missing"
+    assert right.content["unexplained"] == none.content["unexplained"] == []
+    (said,) = wrong.content["unexplained"]
+    assert (said["kind"], said["record"]) == ("history", "all")
+    assert said["start"] > said["rest"] > 0.05
+    assert wrong.content["gap"] == none.content["gap"]
+    assert wrong.sentence().endswith("The data have faults: 1 history that the starts contradict.")
+    wrong.write(tmp_path / "out")
+    assert "another history than was given" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_without_the_history_that_the_starts_contradict_there_may_be_too_little(tmp_path: Path) -> None:
+    ways = [np.random.default_rng(number).uniform(0.0, 100.0, 9) for number in range(8)]
+    legs = [np.concatenate([[way[0], 60.0, 5.0, 0.0, 100.0], way[1:]]) for way in ways]
+    records = _behind_a_cycle([np.interp(np.arange(130) / 10.0, np.arange(len(leg)), leg) for leg in legs])
+    hystgen.diagnose(_model(tmp_path), records[:6], holdout=records[6:], history=[100.0, 0.0])
+    said = r"^the \d+ samples at the start, .* the history is left out, and without it record 0, .* too little to fit"
+    with pytest.raises(hystgen.diagnosis.IdentificationError, match=said):
+        hystgen.diagnose(_model(tmp_path), records[:6], holdout=records[6:], history=[0.0])
+
+
+@pytest.mark.parametrize("command", ["identify", "diagnose"])
+def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Path, run: Call) -> None:
+    """As by a wildcard: what is fitted judges nothing."""
+    v = wander(1)
+    files = [write_csv(tmp_path / name, v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01, seed))
+             for seed, name in enumerate(("a.csv", "b.csv", "c.csv"))]  # fmt: skip
+    files.append(tmp_path / "d.csv")
+    files[-1].write_bytes(files[0].read_bytes())
+    words = ["identify"] if command == "identify" else ["diagnose", _model(tmp_path)]
+    code, _, err = run(*words, files[0], files[1], "--holdout", files[3], "-o", tmp_path / "out")
+    assert code == 0, err
+    assert "warning: d.csv: held out and, as a.csv, fitted too, so that it judges nothing; leave it out of" in err
+    assert "b.csv" not in err
+    code, _, err = run(*words, files[0], files[1], files[3], "--holdout", files[2], "-o", tmp_path / "out")
+    assert code == 0, err
+    assert "warning: d.csv: fitted twice, as a.csv too; leave one of them out" in err
+    assert "held out" not in err
 
 
 @pytest.mark.parametrize("held_out", [True, False])

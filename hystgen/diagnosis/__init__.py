@@ -18,13 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import believed, channels, floor, intervals, selection, structure, told
+from hystgen.diagnosis import believed, channels, floor, intervals, selection, starts, structure, told
 from hystgen.diagnosis.content import content_of
+from hystgen.diagnosis.floor import Floor
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
 from hystgen.effects.base import Place
-from hystgen.identification import stage_content, threads
+from hystgen.identification import remarks, stage_content, threads
 from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
 from hystgen.identification.thresholds import rounded
@@ -139,8 +140,8 @@ def diagnose(
 
     `parameters`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
     waveforms that judge; without them, or where too little of them can be compared, every third record, or the end of
-    one, is set aside. `history`: drive values visited before every record, `rest`: seconds of pause after them.
-    `effects`: further effects that take part.
+    one, is set aside. `history`: drive values visited before every record, which is left out where the starts of the
+    records contradict it; `rest`: seconds of pause after them. `effects`: further effects that take part.
 
     The believed model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
     weights on the free-run error, and accepted when it removes a worthwhile part of the held-out error that chance does
@@ -164,17 +165,30 @@ def diagnose(
             [record for record in group if record is not None]
             for group in (usable[: len(several)], usable[len(several) :])
         )
-        ready = believed.prepare(to_fit or read[: len(several)], to_hold, before, rest)
-        noise = floor.noise_floor([*ready.to_fit, *ready.held])
-        base, start = believed.structure_of(model.cascade, given, ready)
-        refitted = selection.refit(base, ready.to_fit, start)
-        searched = Records.of(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
-        found = selection.select(searched, refitted)
+
+        def searched(history: tuple[float, ...] | None) -> tuple[believed.Prepared, Floor, Records, Outcome]:
+            ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
+            noise = floor.noise_floor([*ready.to_fit, *ready.held])
+            base, start = believed.structure_of(model.cascade, given, ready)
+            refitted = selection.refit(base, ready.to_fit, start)
+            records = Records.of(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
+            return ready, noise, records, selection.select(records, refitted)
+
+        ready, noise, compared, found = searched(before)
+        wrong = starts.contradicted([*ready.to_fit, *ready.held], found.fitted)
+        if wrong is not None:
+            odd.append(wrong)
+            try:
+                ready, noise, compared, found = searched(None)
+            except IdentificationError as error:
+                said = told.sentence(wrong, model.parameters.units.output)
+                raise IdentificationError(f"{said}, and without it {error}") from None
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
-        content = content_of(model.parameters, ready, noise, found, as_given, odd, searched.one_loop)
-    notes = [*(f"{record.name}: {note}" for record in read for note in record.notes), *ready.notes]
+        content = content_of(model.parameters, ready, noise, found, as_given, odd, compared.one_loop)
+    notes = [f"{record.name}: {note}" for record in read for note in record.notes]
+    notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
     extended = _extended(model.parameters, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
 

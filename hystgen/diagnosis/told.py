@@ -8,7 +8,7 @@ from typing import Any
 from hystgen.diagnosis import description
 from hystgen.words import counted
 
-REPAIRED = ("saturated", "drop_outs", "held_samples", "isolated_samples", "swapped_channels")
+REPAIRED = ("saturated", "drop_outs", "held_samples", "isolated_samples", "swapped_channels", "history")
 """Kinds that are left out of the comparison or put right: what remains of the records is as good as any."""
 
 ACTUATOR = "structure"
@@ -59,6 +59,12 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
         )
     if kind == "swapped_channels":
         return f"{record}: drive and displacement are exchanged (the output is ahead of the drive); put right"
+    if kind == "history":
+        return (
+            f"the {counted(each['samples'], 'sample')} at the start, whose output depends on the history, are off by "
+            f"{each['start']:.3g}{u} rms, all others by {each['rest']:.3g}{u}: the actuator came from elsewhere, and "
+            "the history is left out"
+        )
     if kind == "exchanged_records":
         return f"{record}: left out, its output belongs to the drive of {each['with']}"
     return f"{record}: {_samples(each, u)}"
@@ -79,19 +85,27 @@ def _samples(each: Mapping[str, Any], u: str) -> str:
     return f"{counted(count, 'isolated sample')} of {each['channel']} far from the neighbours, {done}{at}"
 
 
+FAULTS = {
+    "swapped_channels": ("record", " with exchanged columns"),
+    "saturated": ("sample", " at the converter's end"),
+    "drop_outs": ("drop-out", ""),
+    "held_samples": ("stretch", " of held samples"),
+    "isolated_samples": ("isolated sample", ""),
+    "history": ("history", " that the starts contradict"),
+}
+"""What is counted of each kind, and what goes with it."""
+
+
 def faults(entries: Sequence[Mapping[str, Any]]) -> str:
     """The kinds of what was put right or left out, with their counts, in a few words."""
     said = []
-    for kind, what in (("swapped_channels", "record"), ("saturated", "sample"), ("drop_outs", "drop-out"),
-                       ("held_samples", "stretch"), ("isolated_samples", "isolated sample")):  # fmt: skip
+    for kind, (what, extra) in FAULTS.items():
         found = [each for each in entries if each["kind"] == kind]
         if not found:
             continue
         number = sum(each.get("count", 1) for each in found)
-        extra = {"swapped_channels": " with exchanged columns", "saturated": " at the converter's end",
-                 "held_samples": " of held samples"}.get(kind, "")  # fmt: skip
-        plural = "stretches" if what == "stretch" and number != 1 else None
-        said.append(f"{number} {plural}{extra}" if plural else f"{counted(number, what)}{extra}")
+        several = "stretches" if what == "stretch" and number != 1 else None
+        said.append(f"{f'{number} {several}' if several else counted(number, what)}{extra}")
     return ", ".join(said)
 
 

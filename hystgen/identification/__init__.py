@@ -100,6 +100,7 @@ def identify(
     if not fit_records:
         raise ValueError("there is no record to fit")
     told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
+    told += remarks.repeated(fit_records, held_records)
     units, conflicts = agreed_units(read, units)
     told += conflicts
     for record in fit_records if loading_curve else ():

@@ -11,6 +11,7 @@ from hystgen.identification import pi, reduction
 from hystgen.identification.pi import Solution
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
+from hystgen.records import Record
 from hystgen.words import counted
 
 AMPLIFIES = 100.0
@@ -82,6 +83,23 @@ def about_start(errors: pi.Errors, largest: float) -> str:
         f"{item.name}: the first {end} samples, whose output depends on the history, are off by {start:.3g} rms "
         f"against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out if in doubt"
     )
+
+
+def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
+    """Of records that were measured once and given twice."""
+    told = []
+    for k, record in enumerate([*to_fit, *held]):
+        for other in to_fit[: min(k, len(to_fit))]:
+            if np.array_equal(record.v, other.v) and np.array_equal(np.asarray(record.y), np.asarray(other.y)):
+                if k < len(to_fit):
+                    told.append(f"{record.name}: fitted twice, as {other.name} too; leave one of them out")
+                else:
+                    told.append(
+                        f"{record.name}: held out and, as {other.name}, fitted too, so that it judges nothing; leave "
+                        "it out of the one or the other"
+                    )
+                break
+    return told
 
 
 def outside(name: str, v: NDArray[np.float64], allowed: tuple[float, float]) -> str:

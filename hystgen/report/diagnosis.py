@@ -161,6 +161,7 @@ WHAT = {
     "held_samples": "held samples",
     "isolated_samples": "isolated samples",
     "swapped_channels": "drive and displacement exchanged",
+    "history": "another history than was given",
 }
 
 
