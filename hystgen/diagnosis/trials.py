@@ -76,8 +76,8 @@ HELPS = 0.05
 And these have to lower the error that it leaves by as much again.
 """
 
-LARGE = 20_000
-"""Samples to fit from which on the options are tried in several processes; of fewer it takes a few seconds at most."""
+LARGE = 5_000
+"""Samples to fit from which on the options are tried in several processes; of fewer there is little to share."""
 
 
 @dataclass(frozen=True)
