@@ -28,19 +28,22 @@ def _onto_the_plays(
     levels: NDArray[np.float64], least: Any, low: float, high: float, length: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """Turns that end where another play starts to follow, give or take last bits; most are asked for again."""
-    x = np.empty(length)
-    at, i = (low + high) / 2, 0
-    while i < length:
-        way = 2 * float(rng.choice(levels)) * (1 if rng.random() < 0.5 else -1)
-        if not low <= at + way <= high:
-            way = -way
-        at = at + way if low <= at + way <= high else float(rng.uniform(low, high))
-        for _ in range(rng.integers(1, 4)):
-            times = int(rng.integers(1, 3))
-            x[i : i + times] = at
-            i += times
-            at = at + float(least(at)) * int(rng.integers(-2, 3))
-    return x
+    turns = (rng.random(length) < 0.5).tolist()
+    ways = (2 * rng.choice(levels, length) * rng.choice([-1.0, 1.0], length)).tolist()
+    others = rng.uniform(low, high, length).tolist()
+    bits = rng.integers(-2, 3, length).tolist()
+    times = rng.integers(1, 3, length).tolist()
+    x: list[float] = []
+    at = (low + high) / 2
+    for turn, way, other, bit, number in zip(turns, ways, others, bits, times, strict=True):
+        if not turn:
+            at = at + float(least(at)) * bit
+        elif low <= at + way <= high:
+            at = at + way
+        else:
+            at = at - way if low <= at - way <= high else other
+        x += [at] * number
+    return np.array(x[:length])
 
 
 def _coincidences(
