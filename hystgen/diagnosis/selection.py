@@ -72,7 +72,7 @@ def select(records: Records, refitted: Fitted) -> Outcome:
         if records.left(now) <= decisions.AT_FLOOR * records.noise:
             break
         step = _step(now, gap, records)
-        if latest is not None and step is not None:
+        if latest is not None and step is not None and not _explained(step, records):
             pair = _with_rival(latest, step, gap, records)
             if pair is not None:
                 other, step = pair
@@ -134,6 +134,12 @@ def _step(
         if merit is not None and merit.worth(gap, records):
             return _Step(now, tried, best, merit)
     return _Step(now, tried, tried[0], None)
+
+
+def _explained(step: _Step, records: Records) -> bool:
+    """Whether hardly more than noise is left: no other first effect can do better, and beside this one `_exchanged` asks
+    for each that does as well."""
+    return step.merit is not None and step.best.held_out <= decisions.AT_FLOOR * records.noise
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
