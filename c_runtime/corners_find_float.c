@@ -66,17 +66,102 @@ HYSTGEN_COPIES unsigned int hystgen_corners_find(const hystgen_tables_t *t, cons
     return left;
 }
 
-/* First of the plays k .. high-1 that a way has not reached, by its output or by its input, or high. */
-static unsigned int hystgen_play_not_reached(const hystgen_tables_t *t, unsigned int k, unsigned int high,
-                                             hystgen_real_t output, hystgen_real_t input)
+/* Whether a move to output x, or to the input `limit` if that comes first, takes along the last play that a corner
+   holds, whose output is reached from `level` on. */
+static bool hystgen_taken(const hystgen_tables_t *t, const hystgen_corner_t *c, hystgen_real_t x, hystgen_real_t level,
+                          hystgen_real_t limit, bool rising)
+{
+    return x >= level && hystgen_reached(limit, hystgen_activation(t, c, c->end - 1u, rising), rising);
+}
+
+/* First of the plays k .. high-1 of a corner that such a move does not take along, or high; on: how far x lies above
+   what the corner holds. */
+HYSTGEN_COPIES unsigned int hystgen_play_not_taken(const hystgen_tables_t *t, hystgen_real_t extremum, unsigned int k,
+                                                   unsigned int high, hystgen_real_t on, hystgen_real_t limit,
+                                                   bool rising)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
-        if (output >= t->start_level[middle] && input >= t->threshold[middle]) {
+        const hystgen_real_t r = t->threshold[middle];
+        if (on >= t->start_level[middle]
+            && (rising ? limit >= extremum + (r + r) : limit <= extremum - (r + r))) {
             k = middle + 1;
         } else {
             high = middle;
         }
     }
     return k;
+}
+
+/* Where such a move leads that leaves all corners but those of the start, or begins with no others: as below. */
+HYSTGEN_NOINLINE static unsigned int hystgen_corners_find_start(const hystgen_tables_t *t,
+                                                                const hystgen_corner_t *corner, unsigned int left,
+                                                                unsigned int *k, unsigned int *end, hystgen_real_t x,
+                                                                hystgen_real_t limit, bool rising)
+{
+    unsigned int low = 1;
+    unsigned int high;
+    const hystgen_corner_t *c;
+    while (low < left) {
+        const unsigned int middle = (low + left) / 2;
+        c = &corner[middle];
+        if (hystgen_taken(t, c, x, t->start_level[c->end - 1] - c->pass[!rising], limit, rising)) {
+            left = middle;
+            *k = c->end;
+            *end = *k;
+        } else {
+            low = middle + 1;
+        }
+    }
+    if (left == 0) {
+        return 0;
+    }
+    c = &corner[left - 1];
+    high = left == 1 ? c->end : c->end - 1u;
+    while (*k < high) {
+        const unsigned int middle = (*k + high) / 2;
+        if (x + c->pass[!rising] >= t->start_level[middle]
+            && hystgen_reached(limit, hystgen_activation(t, c, middle, rising), rising)) {
+            *k = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    if (*k == c->end) { /* the last one too */
+        *end = *k;
+        return 0;
+    }
+    return left;
+}
+
+/* Where a move leads that ends at the input `limit`, that of a limit of the drive, if that comes before output x; what
+   begins and ends it as above. No turning point lies beyond the limit, so that all corners are left but those of the
+   start and the first one above them, which the caller has asked x for. */
+HYSTGEN_COPIES unsigned int hystgen_corners_find_within(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                        unsigned int start, unsigned int depth, unsigned int *k,
+                                                        unsigned int *end, hystgen_real_t x, hystgen_real_t limit,
+                                                        bool rising)
+{
+    const hystgen_corner_t *c = &corner[start];
+    *end = 0;
+    if (depth > start + 1u) {
+        *k = corner[start + 1u].end;
+        *end = *k;
+    } else if (*k > 1) {
+        *k = *k - 1; /* what the output tells to follow may lie beyond the limit */
+    } else {
+        /* a turn */
+    }
+    if (depth > start) {
+        if (!hystgen_taken(t, c, x, c->pass[rising], limit, rising)) {
+            if (rising ? c->side > 0 : c->side < 0) {
+                *k = hystgen_play_not_taken(t, c->extremum, *k, c->end - 1u, hystgen_half(x + c->pass[!rising]),
+                                            limit, rising);
+            }
+            return start + 1u;
+        }
+        *k = c->end;
+        *end = *k;
+    }
+    return hystgen_corners_find_start(t, corner, start, k, end, x, limit, rising);
 }

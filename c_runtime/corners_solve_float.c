@@ -19,7 +19,8 @@ static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output
    where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
 HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
-                                             unsigned int end, hystgen_real_t output, bool *room)
+                                             unsigned int end, hystgen_real_t output, bool within,
+                                             hystgen_real_t limit, bool *room, bool *limited)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -57,6 +58,12 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
         next = HYSTGEN_REACH_MAX;
         next_level = HYSTGEN_SUM_MAX;
     }
+    if (within && next > limit
+        && output > level + (limit - first) * t->slope[k]) { /* the limit comes first */
+        hystgen_write_place(&m->there, level, next_level, first, next, k, left, true);
+        *limited = true;
+        return limit;
+    }
     w = first + (output - level) * t->inverse_slope[k];
     if (w > next) {
         w = next;
@@ -82,7 +89,8 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
 /* The same for a falling move. */
 HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
-                                             unsigned int end, hystgen_real_t output, bool *room)
+                                             unsigned int end, hystgen_real_t output, bool within,
+                                             hystgen_real_t limit, bool *room, bool *limited)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -120,6 +128,12 @@ HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen
         next = -HYSTGEN_REACH_MAX;
         next_level = -HYSTGEN_SUM_MAX;
     }
+    if (within && next < limit
+        && output < level + (limit - first) * t->slope[k]) { /* the limit comes first */
+        hystgen_write_place(&m->there, level, next_level, first, next, k, left, false);
+        *limited = true;
+        return limit;
+    }
     w = first + (output - level) * t->inverse_slope[k];
     if (w < next) {
         w = next;
@@ -149,7 +163,7 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, hystg
 {
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, m, corner, left, k, end, output, room);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, 0, room, room);
 }
 
 /* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
@@ -159,7 +173,43 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystg
 {
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, m, corner, left, k, end, output, room);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, 0, room, room);
+}
+
+/* The same where it may lead to the input `limit` of the plays, that of a limit of the drive, which comes first only
+   where `output` lies beyond `beyond`. *limited tells whether it does; then the place is that of the limit. */
+HYSTGEN_API hystgen_real_t hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                       const hystgen_corner_t *corner, unsigned int depth,
+                                                       unsigned int k, hystgen_real_t output, hystgen_real_t beyond,
+                                                       hystgen_real_t limit, bool *room, bool *limited)
+{
+    unsigned int end;
+    const unsigned int most = m->start + 1u;
+    unsigned int left;
+    *limited = false;
+    if (output > beyond && (depth <= most || output >= corner[most].pass[1])) {
+        left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, output, limit, true);
+        return hystgen_rise_to(t, m, corner, left, k, end, output, true, limit, room, limited);
+    }
+    left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, limit, room, limited);
+}
+
+HYSTGEN_API hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                                       const hystgen_corner_t *corner, unsigned int depth,
+                                                       unsigned int k, hystgen_real_t output, hystgen_real_t beyond,
+                                                       hystgen_real_t limit, bool *room, bool *limited)
+{
+    unsigned int end;
+    const unsigned int most = m->start + 1u;
+    unsigned int left;
+    *limited = false;
+    if (output < beyond && (depth <= most || -output >= corner[most].pass[0])) {
+        left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, -output, limit, false);
+        return hystgen_fall_to(t, m, corner, left, k, end, output, true, limit, room, limited);
+    }
+    left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, limit, room, limited);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;

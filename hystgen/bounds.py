@@ -114,3 +114,26 @@ def error_bounds(cascade: Cascade, arithmetic: str, engine: str) -> ErrorBounds:
         whole = cascade.input_range[1] - cascade.input_range[0]
         inverse, rounding = min(inverse, whole), min(rounding, whole)
     return ErrorBounds(SECOND_ORDER * (forward + own_forward), inverse, rounding)
+
+
+def straight_margin(cascade: Cascade, arithmetic: str) -> float:
+    """How far short of the next play's output a straight piece is left, so that rounding cannot lead beyond.
+
+    In unit roundoffs, with S the largest sum: 4 S for the two start levels in the tables, 6 S for the two sums with
+    them, 4 S and 2 S for the same of the thresholds, 2 S each for the difference, the reciprocal and the product, S
+    for the last sum, S for taking this off, 2 S and twice the offset for adding and taking off the offset: below 32.
+    """
+    return 16 * float(np.finfo(arithmetic).eps) * (largest_sum(cascade) + abs(cascade.output_offset))
+
+
+def limited(cascade: Cascade, arithmetic: str) -> tuple[float | None, float | None]:
+    """References below, above which the drive may be at its lower, its upper limit; None where rounding alone can.
+
+    No memory makes the output at a limit lie further inside than that after the other end of the range.
+    """
+    margin = straight_margin(cascade, arithmetic)
+    (low, high), (lowest, highest) = cascade.swung, cascade.output_range
+    return (
+        low + margin if low - lowest > margin else None,
+        high - margin if highest - high > margin else None,
+    )

@@ -229,11 +229,19 @@ def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
     return True
 
 
+def tells_limit(t: FixedTables, s: State, v: Any, inside: Any) -> bool:  # noqa: ARG001  as above
+    """Where the limit leads is looked up when it is taken to memory."""
+    return False
+
+
 _OWN: list[Callable[..., Any]] = [
     half, nearest, over_slope, going, corners_locate, corners_solve, loop_solve, curve, front_forward,
-    front_inverse, output, solve, finite,
+    front_inverse, output, solve, finite, tells_limit,
 ]  # fmt: skip
-_NAMES = {function.__name__ for function in _OWN} | {"envelope_forward", "envelope_inverse", "dead_zone"}
+_NAMES = {function.__name__ for function in _OWN} | {
+    "envelope_forward", "envelope_inverse", "dead_zone", "may_be_limited", "taken", "corners_find_within",
+    "comes_first",
+}  # fmt: skip
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {
     "multiple", "activation", "level", "past", "all_follow", "reached", "corners_settle", "hint", "way",

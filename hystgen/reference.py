@@ -30,6 +30,7 @@ Bytes = NDArray[np.uint8]
 DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
 START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO, HALF = 5, 6, 7, 8, 9, 10
 MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
+LIMITED_LOW, LIMITED_HIGH = 16, 17  # floating point only, as are these
 
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
@@ -37,7 +38,7 @@ TANH, DEAD_ZONE = 0, 1
 W, ANCHOR, ANCHOR_OUTPUT, NEXT, NEXT_OUTPUT, HINT_ANCHOR, HINT_ANCHOR_OUTPUT = 0, 1, 2, 3, 4, 5, 6
 PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 7, 8, 9, 10, 11
 K, DEPTH, RISING, ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-HINT_K, HINT_DEPTH, HINT_RISING, START = 9, 10, 11, 12
+HINT_K, HINT_DEPTH, HINT_RISING, START, TOLD = 9, 10, 11, 12, 13
 
 INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN = 1, 2, 4, 8
 
@@ -54,7 +55,7 @@ class Tables(NamedTuple):
     start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 where all start at the same value
-    limits: Reals  # DRIVE_MIN .. MULTIPLE + 2
+    limits: Reals  # DRIVE_MIN .. LIMITED_HIGH
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # where the stage's numbers begin in stage_data
     stage_size: Counts  # break points of a dead zone
@@ -100,7 +101,7 @@ def new_state(t: PlayTables) -> State:
     dtype = t.threshold.dtype
     return State(
         real=np.zeros(12, dtype),
-        counts=np.zeros(13, np.int64),
+        counts=np.zeros(14, np.int64),
         extremum=np.zeros(max(n, 1), dtype),
         output=np.zeros(max(n, 1), dtype),
         end=np.zeros(max(n, 1), np.int64),
@@ -247,6 +248,8 @@ def foretold(t: PlayTables, s: State, depth: int, rising: int, w: Any) -> bool:
     """Whether a move to w, which `depth` corners stand before, ends in the place that word was left of."""
     k = s.counts[HINT_K]
     left = s.counts[HINT_DEPTH]
+    if k > 0 and s.counts[TOLD]:
+        return True
     if k == 0 or rising != s.counts[HINT_RISING]:
         return False
     if left > 0 and past(w, activation(t, s, left - 1, t.threshold[k], rising), rising):
@@ -265,6 +268,7 @@ def corners_rest(t: PlayTables, s: State, w: Any) -> None:
     s.counts[DEPTH] = 0
     s.counts[RISING] = 1
     s.counts[HINT_K] = 0
+    s.counts[TOLD] = 0
     s.counts[START] = 0
     if n > 0:
         s.counts[START] = 1
@@ -285,6 +289,7 @@ def corners_start(t: PlayTables, s: State, play: Reals) -> None:
     s.counts[DEPTH] = n
     s.counts[RISING] = 1
     s.counts[HINT_K] = 0
+    s.counts[TOLD] = 0
     s.counts[START] = n
     for j in range(n):
         s.extremum[j] = play[n - j]
@@ -347,6 +352,7 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
             s.counts[K] = k
             corners_settle(t, s)
     s.counts[HINT_K] = 0
+    s.counts[TOLD] = 0
 
 
 def hint(t: PlayTables, s: State, left: int, k: int, rising: int) -> None:
@@ -385,6 +391,76 @@ def corners_foretell(t: PlayTables, s: State, w: Any) -> None:
         s.counts[HINT_K] = 0  # a move that goes on as it was
 
 
+# ---------------------------------------------------------------- corners_limit.c
+
+
+def may_be_limited(t: Tables, s: State, depth: int, rising: int, output: Any) -> bool:
+    """Whether a move to `output` may lead to the drive's limit, and among the lowest corners, as it does then.
+
+    A drive that is further inside the limit than by rounding is what the references on this side of LIMITED_LOW and
+    LIMITED_HIGH give. No turning point lies beyond the limit, so that all corners are left but those of the start and
+    the first one above them.
+    """
+    if not past(output, t.limits[LIMITED_HIGH if rising else LIMITED_LOW], rising):
+        return False
+    c = s.counts[START] + 1
+    return depth <= c or reached(output, level(t, s, c, s.end[c] - 1, rising), rising)
+
+
+def taken(t: Tables, s: State, c: int, output: Any, rising: int) -> bool:
+    """Whether a move to `output`, or to the drive's limit if that comes first, takes along all that corner c holds."""
+    last = s.end[c] - 1
+    limit = t.limits[DRIVE_MAX if rising else DRIVE_MIN]
+    return reached(output, level(t, s, c, last, rising), rising) and reached(
+        limit, activation(t, s, c, t.threshold[last], rising), rising
+    )
+
+
+def corners_find_within(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> tuple[int, int]:
+    """As `corners_find`, for a move that ends at the drive's limit if that comes before `output`."""
+    limit = t.limits[DRIVE_MAX if rising else DRIVE_MIN]
+    start = s.counts[START]
+    left = min(depth, start + 1)
+    if k > 1:
+        k = k - 1  # what the output tells to follow may lie beyond the limit
+    if left > start and taken(t, s, start, output, rising):
+        left = start
+    if left <= start:
+        low = 1
+        while low < left:
+            c = (low + left) // 2
+            if taken(t, s, c, output, rising):
+                left = c
+            else:
+                low = c + 1
+    if left < depth:
+        k = s.end[left]
+    c = left - 1
+    if left > 0 and opposite(s.side[c], rising):
+        last = left == 1 and start > 0
+        high = s.end[c] if last else s.end[c] - 1
+        on = way(t, output, s.output[c], s.side[c], rising)
+        while k < high:
+            middle = (k + high) // 2
+            if on >= t.start_level[middle] and reached(
+                limit, activation(t, s, c, t.threshold[middle], rising), rising
+            ):
+                k = middle + 1
+            else:
+                high = middle
+        if last and k == s.end[c]:
+            left = 0
+    return left, k
+
+
+def comes_first(t: Tables, s: State, left: int, k: int, rising: int, output: Any) -> bool:
+    """Whether the drive's limit comes before `output` in the place that was found."""
+    limit = t.limits[DRIVE_MAX if rising else DRIVE_MIN]
+    if left > 0 and not past(activation(t, s, left - 1, t.threshold[k], rising), limit, rising):
+        return False
+    return past(output, s.real[HINT_ANCHOR_OUTPUT] + (limit - s.real[HINT_ANCHOR]) * t.slope[k], rising)
+
+
 # ---------------------------------------------------------------- corners_solve.c
 
 
@@ -392,9 +468,16 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
     """Input that gives `output` when plays 0 .. k-1 follow and `depth` corners hold the others.
 
     Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
+    Where the drive's limit comes first, the place is that of the limit, and the input lies beyond any.
     """
-    left, k = corners_find(t, s, s.counts[START], depth, k, rising, output, s.output, t.start_level)
+    within = may_be_limited(t, s, depth, rising, output)
+    if within:
+        left, k = corners_find_within(t, s, depth, k, rising, output)
+    else:
+        left, k = corners_find(t, s, s.counts[START], depth, k, rising, output, s.output, t.start_level)
     hint(t, s, left, k, rising)
+    if within and comes_first(t, s, left, k, rising, output):
+        return t.limits[REAL_MAX] if rising else -t.limits[REAL_MAX]
     w = s.real[HINT_ANCHOR] + (output - s.real[HINT_ANCHOR_OUTPUT]) * t.inverse_slope[k]
     if left > 0:
         last = activation(t, s, left - 1, t.threshold[k], rising)
@@ -705,6 +788,14 @@ def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
     return s.real[APPLIED], limited
 
 
+def tells_limit(t: Tables, s: State, v: Any, inside: Any) -> bool:
+    """Whether the place that was found for drive v, which is beyond the limit `inside`, is that of the limit too.
+
+    It is not where the limit lies behind, or where the drive is at the limit already and moves no more.
+    """
+    return len(t.stage_kind) == 0 and past(inside, s.real[W], v > inside)
+
+
 def inverse_step(t: Tables, s: State, u: Any) -> Any:
     """One sample of the inverse operator."""
     if s.counts[HAS_PENDING]:
@@ -738,7 +829,10 @@ def inverse_step(t: Tables, s: State, u: Any) -> Any:
     inside = clamp_drive(t, v)
     if inside != v:
         bits = bits | OUTPUT_CLAMPED
-        s.counts[HINT_K] = 0  # where the limit leads does not depend on what is asked for beyond it
+        if tells_limit(t, s, v, inside):
+            s.counts[TOLD] = 1
+        else:
+            s.counts[HINT_K] = 0
     s.counts[BITS] = bits
     s.counts[STATUS] |= bits
     return answer(s, inside)
@@ -752,6 +846,9 @@ def inverse_commit(t: Tables, s: State, applied: Any) -> None:
     v = clamp_drive(t, applied)
     if v != applied:
         s.counts[STATUS] |= INPUT_CLAMPED
+    if s.counts[TOLD]:  # where the limit leads says nothing of another drive
+        s.counts[TOLD] = 0
+        s.counts[HINT_K] = 0
     s.real[PENDING] = v
     s.counts[HAS_PENDING] = 1
     s.counts[REPEAT] = 0
@@ -786,10 +883,11 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
-    turns, corners_absorb, hint, corners_foretell, corners_locate, corners_solve,
+    turns, corners_absorb, hint, corners_foretell, may_be_limited, taken, corners_find_within, comes_first,
+    corners_locate, corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
     front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, foretell, finite,
-    forward_step, answer, clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, run,
+    forward_step, answer, clamp_drive, fits, choose_branch, tells_limit, inverse_step, inverse_commit, reset, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through

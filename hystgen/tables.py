@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import kernels, reference
-from hystgen.bounds import error_bounds
+from hystgen.bounds import error_bounds, limited
 from hystgen.models import UNBOUNDED, Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import Path, Problem, path_text
 from hystgen.reference import Tables
@@ -82,6 +82,12 @@ def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
     if float(b) > high:
         b = np.nextafter(b, dtype(-np.inf))
     return a, b
+
+
+def upward(x: float, dtype: Any) -> Any:
+    """x in `dtype`, rounded up."""
+    rounded = dtype(x)
+    return rounded if float(rounded) >= x else np.nextafter(rounded, dtype(np.inf))
 
 
 def _stage_numbers(
@@ -172,7 +178,7 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         sizes.append(size)
         numbers += data
 
-    limits = [0.0] * 16
+    limits = [0.0] * 18
     limits[reference.HALF] = 0.5
     limits[reference.MULTIPLE - 2 : reference.MULTIPLE + 3] = [-2.0, -1.0, 0.0, 1.0, 2.0]
     if bounded:
@@ -192,6 +198,13 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     if cascade.branches_differ and not cascade.inverse_problems():
         limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits[reference.REAL_MAX] = largest
+    limits[reference.LIMITED_LOW], limits[reference.LIMITED_HIGH] = -largest, largest
+    if bounded and not cascade.stages and not cascade.inverse_problems():
+        below, above = limited(cascade, arithmetic)
+        if below is not None:
+            limits[reference.LIMITED_LOW] = float(upward(below - cascade.output_offset, dtype))
+        if above is not None:
+            limits[reference.LIMITED_HIGH] = -float(upward(cascade.output_offset - above, dtype))
     if max(map(abs, limits)) > largest:
         reached = max(map(abs, limits))
         message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"

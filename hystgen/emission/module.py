@@ -222,9 +222,9 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     if options.forward or values.branches or known:
         roots.add(f"hystgen_{engine}_output")
     if options.inverse and values.fast and not family.fixed:
-        roots |= {f"hystgen_corners_{part}" for part in ("begin", "find", "rise", "fall", "go")}
-        roots |= {"hystgen_corners_fall_within"} if values.limited_low else set()
-        roots |= {"hystgen_corners_rise_within"} if values.limited_high else set()
+        roots |= {f"hystgen_corners_{part}" for part in ("begin", "go")}
+        roots.add("hystgen_corners_fall" + ("_within" if values.limited_low else ""))
+        roots.add("hystgen_corners_rise" + ("_within" if values.limited_high else ""))
     elif options.inverse:
         roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
     if options.inverse and engine == "corners":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hystgen import fixed, fixed_tables, reference, tables
-from hystgen.bounds import error_bounds, largest_sum
+from hystgen.bounds import error_bounds, straight_margin
 from hystgen.emission.text import literal, operand, table
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
@@ -84,7 +84,8 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
     fast = options.inverse and corners and not stages
-    low, high = limited(cascade, options.arithmetic) if fast else (None, None)
+    low, high = (numbers.limits[place] for place in (reference.LIMITED_LOW, reference.LIMITED_HIGH))
+    largest = numbers.limits[reference.REAL_MAX]
     return {
         **_limits(numbers),
         "arrays": arrays,
@@ -93,44 +94,19 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "fronts": bool(stages),
         "front": bool(stages),
         "envelopes": any(stage["kind"] == "envelope" for stage in stages),
-        "forward_max_error": operand(_upward(bounds.forward, dtype)),
-        "inverse_max_error": operand(_upward(bounds.inverse, dtype)) if options.inverse else "",
-        "inverse_rounding_error": operand(_upward(bounds.rounding, dtype)) if options.inverse else "",
+        "forward_max_error": operand(tables.upward(bounds.forward, dtype)),
+        "inverse_max_error": operand(tables.upward(bounds.inverse, dtype)) if options.inverse else "",
+        "inverse_rounding_error": operand(tables.upward(bounds.rounding, dtype)) if options.inverse else "",
         "fast": fast,
-        "shy": literal(_upward(_shy(cascade, float(np.finfo(dtype).eps)), dtype)),
+        "shy": literal(tables.upward(straight_margin(cascade, options.arithmetic), dtype)),
         "elsewhere": any(numbers.start) or not cascade.input_range[0] <= 0.0 <= cascade.input_range[1],
-        "limited_low": "" if low is None else operand(_upward(low, dtype)),
-        "limited_high": "" if high is None else operand(-_upward(-high, dtype)),
+        "limited_low": operand(low) if fast and low > -largest else "",
+        "limited_high": operand(high) if fast and high < largest else "",
         "has_offset": bool(numbers.limits[reference.OFFSET]),
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
         "precision": [],
     }
-
-
-def _upward(x: float, dtype: Any) -> Any:
-    rounded = dtype(x)
-    return rounded if float(rounded) >= x else np.nextafter(rounded, dtype(np.inf))
-
-
-def _shy(cascade: Cascade, epsilon: float) -> float:
-    """How far short of the next play's output a straight piece is left.
-
-    In unit roundoffs, with S the largest sum: 4 S for the two start levels in the tables, 6 S for the two sums with
-    them, 4 S and 2 S for the same of the thresholds, 2 S each for the difference, the reciprocal and the product, S
-    for the last sum, S for taking this off, 2 S and twice the offset for adding and taking off the offset: below 32.
-    """
-    return 16 * epsilon * (largest_sum(cascade) + abs(cascade.output_offset))
-
-
-def limited(cascade: Cascade, arithmetic: str) -> tuple[float | None, float | None]:
-    """References below, above which the drive may be at its lower, its upper limit; None where rounding alone can.
-
-    No memory makes the output at a limit lie further inside than that after the other end of the range.
-    """
-    shy = _shy(cascade, float(np.finfo(arithmetic).eps))
-    (low, high), (lowest, highest) = cascade.swung, cascade.output_range
-    return low + shy if low - lowest > shy else None, high - shy if highest - high > shy else None
 
 
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:

@@ -26,7 +26,6 @@ FLOAT_KERNELS = (
     "corners_absorb.c",
     "corners_find_float.c",
     "corners_solve_float.c",
-    "corners_limit_float.c",
     "loop_absorb.c",
     "loop_solve.c",
 )
