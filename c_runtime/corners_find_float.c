@@ -1,12 +1,12 @@
 #include "hystgen_runtime.h"
 
-/* First of the start levels k .. high-1 that a way x has not reached, or high. */
-static unsigned int hystgen_level_not_reached(const hystgen_real_t *level, unsigned int k, unsigned int high,
-                                              hystgen_real_t x)
+/* First of the rising steps k .. high-1, thresholds or start levels, that a way x has not reached, or high. */
+static unsigned int hystgen_step_not_reached(const hystgen_real_t *step, unsigned int k, unsigned int high,
+                                             hystgen_real_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
-        if (x >= level[middle]) {
+        if (x >= step[middle]) {
             k = middle + 1;
         } else {
             high = middle;
@@ -54,13 +54,13 @@ HYSTGEN_COPIES unsigned int hystgen_corners_find(const hystgen_tables_t *t, cons
         const hystgen_corner_t *c = &corner[left - 1];
         if (c->side == 0) {
             const unsigned int high = left == 1 ? c->end : c->end - 1u;
-            *k = hystgen_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
+            *k = hystgen_step_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
             if (*k == c->end) { /* the last one too */
                 left = 0;
                 *end = *k;
             }
         } else if (c->side != (rising ? -1 : 1)) {
-            *k = hystgen_level_not_reached(t->start_level, *k, c->end - 1u, hystgen_half(x + c->pass[!rising]));
+            *k = hystgen_step_not_reached(t->start_level, *k, c->end - 1u, hystgen_half(x + c->pass[!rising]));
         }
     }
     return left;
@@ -74,33 +74,25 @@ static bool hystgen_taken(const hystgen_tables_t *t, const hystgen_corner_t *c, 
     return x >= level && hystgen_reached(limit, hystgen_activation(t, c, c->end - 1u, rising), rising);
 }
 
-/* First of the plays k .. high-1 of a corner that such a move does not take along, or high; on: how far x lies above
-   what the corner holds. */
-HYSTGEN_COPIES unsigned int hystgen_play_not_taken(const hystgen_tables_t *t, hystgen_real_t extremum, unsigned int k,
-                                                   unsigned int high, hystgen_real_t on, hystgen_real_t limit,
-                                                   bool rising)
+/* First of the plays k .. high-1 that such a move does not take along, or high: by the way of its output, and where
+   that leads beyond the limit by the way to there. */
+HYSTGEN_COPIES unsigned int hystgen_play_not_taken(const hystgen_tables_t *t, unsigned int k, unsigned int high,
+                                                   hystgen_real_t way, hystgen_real_t most)
 {
-    while (k < high) {
-        const unsigned int middle = (k + high) / 2;
-        const hystgen_real_t r = t->threshold[middle];
-        if (on >= t->start_level[middle]
-            && (rising ? limit >= extremum + (r + r) : limit <= extremum - (r + r))) {
-            k = middle + 1;
-        } else {
-            high = middle;
-        }
+    const unsigned int found = hystgen_step_not_reached(t->start_level, k, high, way);
+    if (found > k && !(most >= t->threshold[found - 1])) {
+        return hystgen_step_not_reached(t->threshold, k, found - 1, most);
     }
-    return k;
+    return found;
 }
 
-/* Where such a move leads that leaves all corners but those of the start, or begins with no others: as below. */
+/* Where such a move leads that leaves no corners but those of the start: as below. */
 HYSTGEN_NOINLINE static unsigned int hystgen_corners_find_start(const hystgen_tables_t *t,
                                                                 const hystgen_corner_t *corner, unsigned int left,
                                                                 unsigned int *k, unsigned int *end, hystgen_real_t x,
                                                                 hystgen_real_t limit, bool rising)
 {
     unsigned int low = 1;
-    unsigned int high;
     const hystgen_corner_t *c;
     while (low < left) {
         const unsigned int middle = (low + left) / 2;
@@ -117,16 +109,8 @@ HYSTGEN_NOINLINE static unsigned int hystgen_corners_find_start(const hystgen_ta
         return 0;
     }
     c = &corner[left - 1];
-    high = left == 1 ? c->end : c->end - 1u;
-    while (*k < high) {
-        const unsigned int middle = (*k + high) / 2;
-        if (x + c->pass[!rising] >= t->start_level[middle]
-            && hystgen_reached(limit, hystgen_activation(t, c, middle, rising), rising)) {
-            *k = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
+    *k = hystgen_play_not_taken(t, *k, left == 1 ? c->end : c->end - 1u, x + c->pass[!rising],
+                                rising ? limit - c->extremum : c->extremum - limit);
     if (*k == c->end) { /* the last one too */
         *end = *k;
         return 0;
@@ -142,7 +126,6 @@ HYSTGEN_COPIES unsigned int hystgen_corners_find_within(const hystgen_tables_t *
                                                         unsigned int *end, hystgen_real_t x, hystgen_real_t limit,
                                                         bool rising)
 {
-    const hystgen_corner_t *c = &corner[start];
     *end = 0;
     if (depth > start + 1u) {
         *k = corner[start + 1u].end;
@@ -153,10 +136,11 @@ HYSTGEN_COPIES unsigned int hystgen_corners_find_within(const hystgen_tables_t *
         /* a turn */
     }
     if (depth > start) {
+        const hystgen_corner_t *c = &corner[start];
         if (!hystgen_taken(t, c, x, c->pass[rising], limit, rising)) {
             if (rising ? c->side > 0 : c->side < 0) {
-                *k = hystgen_play_not_taken(t, c->extremum, *k, c->end - 1u, hystgen_half(x + c->pass[!rising]),
-                                            limit, rising);
+                *k = hystgen_play_not_taken(t, *k, c->end - 1u, hystgen_half(x + c->pass[!rising]),
+                                            hystgen_half(rising ? limit - c->extremum : c->extremum - limit));
             }
             return start + 1u;
         }

@@ -20,7 +20,7 @@ static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output
 HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
                                              unsigned int end, hystgen_real_t output, bool within,
-                                             hystgen_real_t limit, bool *room, bool *limited)
+                                             hystgen_real_t limit, bool *room)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -58,13 +58,11 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
         next = HYSTGEN_REACH_MAX;
         next_level = HYSTGEN_SUM_MAX;
     }
-    if (within && next > limit
-        && output > level + (limit - first) * t->slope[k]) { /* the limit comes first */
-        hystgen_write_place(&m->there, level, next_level, first, next, k, left, true);
-        *limited = true;
-        return limit;
-    }
     w = first + (output - level) * t->inverse_slope[k];
+    if (within && w > limit) {
+        hystgen_write_place(&m->there, level, next_level, first, next < limit ? limit : next, k, left, true);
+        return w;
+    }
     if (w > next) {
         w = next;
     } else {
@@ -90,7 +88,7 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
 HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
                                              unsigned int end, hystgen_real_t output, bool within,
-                                             hystgen_real_t limit, bool *room, bool *limited)
+                                             hystgen_real_t limit, bool *room)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -128,13 +126,11 @@ HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen
         next = -HYSTGEN_REACH_MAX;
         next_level = -HYSTGEN_SUM_MAX;
     }
-    if (within && next < limit
-        && output < level + (limit - first) * t->slope[k]) { /* the limit comes first */
-        hystgen_write_place(&m->there, level, next_level, first, next, k, left, false);
-        *limited = true;
-        return limit;
-    }
     w = first + (output - level) * t->inverse_slope[k];
+    if (within && w < limit) {
+        hystgen_write_place(&m->there, level, next_level, first, next > limit ? limit : next, k, left, false);
+        return w;
+    }
     if (w < next) {
         w = next;
     } else {
@@ -163,7 +159,7 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, hystg
 {
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, m, corner, left, k, end, output, false, 0, room, room);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, 0, room);
 }
 
 /* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
@@ -173,43 +169,41 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystg
 {
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, m, corner, left, k, end, output, false, 0, room, room);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, 0, room);
 }
 
 /* The same where it may lead to the input `limit` of the plays, that of a limit of the drive, which comes first only
-   where `output` lies beyond `beyond`. *limited tells whether it does; then the place is that of the limit. */
+   where `output` lies beyond `beyond`. A w beyond the limit has the limit's place. */
 HYSTGEN_API hystgen_real_t hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                        const hystgen_corner_t *corner, unsigned int depth,
                                                        unsigned int k, hystgen_real_t output, hystgen_real_t beyond,
-                                                       hystgen_real_t limit, bool *room, bool *limited)
+                                                       hystgen_real_t limit, bool *room)
 {
     unsigned int end;
     const unsigned int most = m->start + 1u;
     unsigned int left;
-    *limited = false;
     if (output > beyond && (depth <= most || output >= corner[most].pass[1])) {
         left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, output, limit, true);
-        return hystgen_rise_to(t, m, corner, left, k, end, output, true, limit, room, limited);
+        return hystgen_rise_to(t, m, corner, left, k, end, output, true, limit, room);
     }
     left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, m, corner, left, k, end, output, false, limit, room, limited);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, limit, room);
 }
 
 HYSTGEN_API hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                        const hystgen_corner_t *corner, unsigned int depth,
                                                        unsigned int k, hystgen_real_t output, hystgen_real_t beyond,
-                                                       hystgen_real_t limit, bool *room, bool *limited)
+                                                       hystgen_real_t limit, bool *room)
 {
     unsigned int end;
     const unsigned int most = m->start + 1u;
     unsigned int left;
-    *limited = false;
     if (output < beyond && (depth <= most || -output >= corner[most].pass[0])) {
         left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, -output, limit, false);
-        return hystgen_fall_to(t, m, corner, left, k, end, output, true, limit, room, limited);
+        return hystgen_fall_to(t, m, corner, left, k, end, output, true, limit, room);
     }
     left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, m, corner, left, k, end, output, false, limit, room, limited);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, limit, room);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;

@@ -341,6 +341,8 @@ def corners_absorb(t: PlayTables, s: State, w: Any) -> None:
         corners_settle(t, s)
         s.real[ANCHOR] = s.real[HINT_ANCHOR]
         s.real[ANCHOR_OUTPUT] = s.real[HINT_ANCHOR_OUTPUT]
+        if past(w, s.real[NEXT], s.counts[RISING]):  # at a limit, by rounding
+            s.real[NEXT] = w
     else:
         if turned:
             corners_settle(t, s)
@@ -382,7 +384,10 @@ def corners_foretell(t: PlayTables, s: State, w: Any) -> None:
         rising = 1 - rising
     if foretold(t, s, depth, rising, w):
         return
-    if depth > 0 and past(w, activation(t, s, depth - 1, t.threshold[k], rising), rising):
+    following = s.real[NEXT]
+    if turned and depth > 0:
+        following = activation(t, s, depth - 1, t.threshold[k], rising)
+    if depth > 0 and past(w, following, rising):
         left, k = corners_find(t, s, 0, depth, k + 1, rising, w, s.extremum, t.threshold)
         hint(t, s, left, k, rising)
     elif turned:
@@ -439,26 +444,14 @@ def corners_find_within(t: Tables, s: State, depth: int, k: int, rising: int, ou
     if left > 0 and opposite(s.side[c], rising):
         last = left == 1 and start > 0
         high = s.end[c] if last else s.end[c] - 1
-        on = way(t, output, s.output[c], s.side[c], rising)
-        while k < high:
-            middle = (k + high) // 2
-            if on >= t.start_level[middle] and reached(
-                limit, activation(t, s, c, t.threshold[middle], rising), rising
-            ):
-                k = middle + 1
-            else:
-                high = middle
+        found = not_reached(t.start_level, k, high, way(t, output, s.output[c], s.side[c], rising))
+        most = way(t, limit, s.extremum[c], s.side[c], rising)
+        if found > k and not most >= t.threshold[found - 1]:
+            found = not_reached(t.threshold, k, found - 1, most)
+        k = found
         if last and k == s.end[c]:
             left = 0
     return left, k
-
-
-def comes_first(t: Tables, s: State, left: int, k: int, rising: int, output: Any) -> bool:
-    """Whether the drive's limit comes before `output` in the place that was found."""
-    limit = t.limits[DRIVE_MAX if rising else DRIVE_MIN]
-    if left > 0 and not past(activation(t, s, left - 1, t.threshold[k], rising), limit, rising):
-        return False
-    return past(output, s.real[HINT_ANCHOR_OUTPUT] + (limit - s.real[HINT_ANCHOR]) * t.slope[k], rising)
 
 
 # ---------------------------------------------------------------- corners_solve.c
@@ -468,7 +461,7 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
     """Input that gives `output` when plays 0 .. k-1 follow and `depth` corners hold the others.
 
     Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
-    Where the drive's limit comes first, the place is that of the limit, and the input lies beyond any.
+    Where the drive's limit comes first, the place is that of the limit, and the input lies beyond it.
     """
     within = may_be_limited(t, s, depth, rising, output)
     if within:
@@ -476,9 +469,9 @@ def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output:
     else:
         left, k = corners_find(t, s, s.counts[START], depth, k, rising, output, s.output, t.start_level)
     hint(t, s, left, k, rising)
-    if within and comes_first(t, s, left, k, rising, output):
-        return t.limits[REAL_MAX] if rising else -t.limits[REAL_MAX]
     w = s.real[HINT_ANCHOR] + (output - s.real[HINT_ANCHOR_OUTPUT]) * t.inverse_slope[k]
+    if within and past(w, t.limits[DRIVE_MAX if rising else DRIVE_MIN], rising):
+        return w
     if left > 0:
         last = activation(t, s, left - 1, t.threshold[k], rising)
         if past(w, last, rising):
@@ -883,8 +876,7 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
-    turns, corners_absorb, hint, corners_foretell, may_be_limited, taken, corners_find_within, comes_first,
-    corners_locate, corners_solve,
+    turns, corners_absorb, hint, corners_foretell, may_be_limited, taken, corners_find_within, corners_locate, corners_solve,
     loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
     front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, foretell, finite,
     forward_step, answer, clamp_drive, fits, choose_branch, tells_limit, inverse_step, inverse_commit, reset, run,
