@@ -74,16 +74,22 @@ static bool hystgen_taken(const hystgen_tables_t *t, const hystgen_corner_t *c, 
     return x >= level && hystgen_reached(limit, hystgen_activation(t, c, c->end - 1u, rising), rising);
 }
 
-/* First of the plays k .. high-1 that such a move does not take along, or high: by the way of its output, and where
-   that leads beyond the limit by the way to there. */
+/* First of the plays k .. high-1 that such a move does not take along, by the way of its output or by that to the limit,
+   or high. */
 HYSTGEN_COPIES unsigned int hystgen_play_not_taken(const hystgen_tables_t *t, unsigned int k, unsigned int high,
                                                    hystgen_real_t way, hystgen_real_t most)
 {
-    const unsigned int found = hystgen_step_not_reached(t->start_level, k, high, way);
-    if (found > k && !(most >= t->threshold[found - 1])) {
-        return hystgen_step_not_reached(t->threshold, k, found - 1, most);
+    const hystgen_real_t *level = t->start_level;
+    const hystgen_real_t *threshold = t->threshold;
+    while (k < high) {
+        const unsigned int middle = (k + high) / 2;
+        if (most >= threshold[middle] && way >= level[middle]) {
+            k = middle + 1;
+        } else {
+            high = middle;
+        }
     }
-    return found;
+    return k;
 }
 
 /* Where such a move leads that leaves no corners but those of the start: as below. */
@@ -137,10 +143,13 @@ HYSTGEN_COPIES unsigned int hystgen_corners_find_within(const hystgen_tables_t *
     }
     if (depth > start) {
         const hystgen_corner_t *c = &corner[start];
-        if (!hystgen_taken(t, c, x, c->pass[rising], limit, rising)) {
-            if (rising ? c->side > 0 : c->side < 0) {
-                *k = hystgen_play_not_taken(t, *k, c->end - 1u, hystgen_half(x + c->pass[!rising]),
-                                            hystgen_half(rising ? limit - c->extremum : c->extremum - limit));
+        const unsigned int high = c->end - 1u;
+        const bool by_output = x >= c->pass[rising];
+        if (!by_output || !hystgen_reached(limit, hystgen_activation(t, c, high, rising), rising)) {
+            if (rising ? c->side > 0 : c->side < 0) { /* it lets go of its plays one by one */
+                const hystgen_real_t most = hystgen_half(rising ? limit - c->extremum : c->extremum - limit);
+                *k = by_output ? hystgen_step_not_reached(t->threshold, *k, high, most)
+                               : hystgen_play_not_taken(t, *k, high, hystgen_half(x + c->pass[!rising]), most);
             }
             return start + 1u;
         }

@@ -473,13 +473,18 @@ class Cascade:
         """The output at either end of `input_range` after the other end: inside `output_range`, or right at its ends.
 
         References between an end of that and this need a drive out of range, once the drive has been at the other end.
+        Where plays that begin at 0, as after a reset, need it for more references, theirs count.
         """
         low, high = self.play_range
-        return self._after(high, low), self._after(low, high)
+        starts = (self.pi.start, (0.0,) * (self.pi.n + 1))
+        return (
+            max(self._after(high, low, start=start) for start in starts),
+            min(self._after(low, high, start=start) for start in starts),
+        )
 
-    def _after(self, *drives: float) -> float:
+    def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
         """The output when the plays have been led from their start memory to inputs, one after the other."""
-        states = list(self.pi.start)
+        states = list(self.pi.start if start is None else start)
         for w in drives:
             states = [min(max(s, w - r), w + r) for s, r in zip(states, self.pi.thresholds, strict=True)]
             states[0] = w

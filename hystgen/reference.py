@@ -444,11 +444,10 @@ def corners_find_within(t: Tables, s: State, depth: int, k: int, rising: int, ou
     if left > 0 and opposite(s.side[c], rising):
         last = left == 1 and start > 0
         high = s.end[c] if last else s.end[c] - 1
-        found = not_reached(t.start_level, k, high, way(t, output, s.output[c], s.side[c], rising))
-        most = way(t, limit, s.extremum[c], s.side[c], rising)
-        if found > k and not most >= t.threshold[found - 1]:
-            found = not_reached(t.threshold, k, found - 1, most)
-        k = found
+        most = not_reached(t.threshold, k, high, way(t, limit, s.extremum[c], s.side[c], rising))
+        if left <= start or not reached(output, level(t, s, c, high, rising), rising):
+            most = not_reached(t.start_level, k, most, way(t, output, s.output[c], s.side[c], rising))
+        k = most
         if last and k == s.end[c]:
             left = 0
     return left, k
