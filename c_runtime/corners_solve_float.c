@@ -16,7 +16,8 @@ static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output
 /* Where a rising move to `output` ends, of which k plays follow and `left` corners hold the others, `end`
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
-   where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
+   where it is too narrow for that. It may lead back to the w before, or behind it, which the caller looks at. `within`:
+   a w beyond the input `limit` of the plays has a place that ends there at the latest. */
 HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
                                              unsigned int end, hystgen_real_t output, bool within,
@@ -76,9 +77,6 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
             level = output;
             *room = !(least > next);
         }
-    }
-    if (!(w > m->w)) {
-        return m->w;
     }
     hystgen_write_place(&m->there, level, next_level, first, next, k, left, true);
     return w;
@@ -144,9 +142,6 @@ HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen
             level = output;
             *room = !(least < next);
         }
-    }
-    if (!(w < m->w)) {
-        return m->w;
     }
     hystgen_write_place(&m->there, level, next_level, first, next, k, left, false);
     return w;
@@ -247,7 +242,11 @@ HYSTGEN_API hystgen_real_t hystgen_corners_solve(const hystgen_tables_t *t, hyst
     if (!hystgen_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    m->there.k = 0;
-    return rising ? hystgen_corners_rise(t, m, corner, depth, k, output, &room)
-                  : hystgen_corners_fall(t, m, corner, depth, k, output, &room);
+    w = rising ? hystgen_corners_rise(t, m, corner, depth, k, output, &room)
+               : hystgen_corners_fall(t, m, corner, depth, k, output, &room);
+    if (!hystgen_past(w, m->w, rising)) { /* rounding is kept from leading back */
+        m->there.k = 0;
+        return m->w;
+    }
+    return w;
 }

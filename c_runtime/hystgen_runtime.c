@@ -26,7 +26,6 @@
 #include "corners_absorb.c"
 #include "corners_find_float.c"
 #include "corners_solve_float.c"
-#include "corners_limit_float.c"
 #include "loop_absorb.c"
 #include "loop_solve.c"
 #endif
