@@ -83,7 +83,11 @@ HYSTGEN_COPIES unsigned int hystgen_play_not_taken(const hystgen_tables_t *t, un
     const hystgen_real_t *threshold = t->threshold;
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
-        if (most >= threshold[middle] && way >= level[middle]) {
+        if (most < threshold[middle]) {
+            high = middle;
+            continue;
+        }
+        if (way >= level[middle]) {
             k = middle + 1;
         } else {
             high = middle;
@@ -93,10 +97,9 @@ HYSTGEN_COPIES unsigned int hystgen_play_not_taken(const hystgen_tables_t *t, un
 }
 
 /* Where such a move leads that leaves no corners but those of the start: as below. */
-HYSTGEN_NOINLINE static unsigned int hystgen_corners_find_start(const hystgen_tables_t *t,
-                                                                const hystgen_corner_t *corner, unsigned int left,
-                                                                unsigned int *k, unsigned int *end, hystgen_real_t x,
-                                                                hystgen_real_t limit, bool rising)
+HYSTGEN_COPIES unsigned int hystgen_corners_find_start(const hystgen_tables_t *t, const hystgen_corner_t *corner,
+                                                       unsigned int left, unsigned int *k, unsigned int *end,
+                                                       hystgen_real_t x, hystgen_real_t limit, bool rising)
 {
     unsigned int low = 1;
     const hystgen_corner_t *c;

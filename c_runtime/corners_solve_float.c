@@ -17,11 +17,11 @@ static void hystgen_write_place(hystgen_place_t *p, hystgen_real_t anchor_output
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
    where it is too narrow for that. It may lead back to the w before, or behind it, which the caller looks at. `within`:
-   a w beyond the input `limit` of the plays has a place that ends there at the latest. */
+   a w beyond the input `limit` of the plays has a place that ends there at the latest, and *limited tells of it. */
 HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
                                              unsigned int end, hystgen_real_t output, bool within,
-                                             hystgen_real_t limit, bool *room)
+                                             hystgen_real_t limit, bool *room, bool *limited)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -62,6 +62,7 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
     w = first + (output - level) * t->inverse_slope[k];
     if (within && w > limit) {
         hystgen_write_place(&m->there, level, next_level, first, next < limit ? limit : next, k, left, true);
+        *limited = true;
         return w;
     }
     if (w > next) {
@@ -86,7 +87,7 @@ HYSTGEN_COPIES hystgen_real_t hystgen_rise_to(const hystgen_tables_t *t, hystgen
 HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen_memory_t *m,
                                              const hystgen_corner_t *corner, unsigned int left, unsigned int k,
                                              unsigned int end, hystgen_real_t output, bool within,
-                                             hystgen_real_t limit, bool *room)
+                                             hystgen_real_t limit, bool *room, bool *limited)
 {
     hystgen_real_t w;
     hystgen_real_t first;
@@ -127,6 +128,7 @@ HYSTGEN_COPIES hystgen_real_t hystgen_fall_to(const hystgen_tables_t *t, hystgen
     w = first + (output - level) * t->inverse_slope[k];
     if (within && w < limit) {
         hystgen_write_place(&m->there, level, next_level, first, next > limit ? limit : next, k, left, false);
+        *limited = true;
         return w;
     }
     if (w < next) {
@@ -152,9 +154,10 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, hystg
                                                 const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
                                                 hystgen_real_t output, bool *room)
 {
+    bool limited = false; /* stays so */
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, m, corner, left, k, end, output, false, 0, room);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, 0, room, &limited);
 }
 
 /* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
@@ -162,43 +165,45 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystg
                                                 const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
                                                 hystgen_real_t output, bool *room)
 {
+    bool limited = false; /* stays so */
     unsigned int end;
     const unsigned int left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, m, corner, left, k, end, output, false, 0, room);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, 0, room, &limited);
 }
 
 /* The same where it may lead to the input `limit` of the plays, that of a limit of the drive, which comes first only
-   where `output` lies beyond `beyond`. A w beyond the limit has the limit's place. */
+   where `output` lies beyond `beyond`. Then the place is the limit's, and *limited, which is false before, tells so. Else
+   a w beyond the limit is so by rounding alone. */
 HYSTGEN_API hystgen_real_t hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                        const hystgen_corner_t *corner, unsigned int depth,
                                                        unsigned int k, hystgen_real_t output, hystgen_real_t beyond,
-                                                       hystgen_real_t limit, bool *room)
+                                                       hystgen_real_t limit, bool *room, bool *limited)
 {
     unsigned int end;
     const unsigned int most = m->start + 1u;
     unsigned int left;
     if (output > beyond && (depth <= most || output >= corner[most].pass[1])) {
         left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, output, limit, true);
-        return hystgen_rise_to(t, m, corner, left, k, end, output, true, limit, room);
+        return hystgen_rise_to(t, m, corner, left, k, end, output, true, limit, room, limited);
     }
     left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, m, corner, left, k, end, output, false, limit, room);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, limit, room, limited);
 }
 
 HYSTGEN_API hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
                                                        const hystgen_corner_t *corner, unsigned int depth,
                                                        unsigned int k, hystgen_real_t output, hystgen_real_t beyond,
-                                                       hystgen_real_t limit, bool *room)
+                                                       hystgen_real_t limit, bool *room, bool *limited)
 {
     unsigned int end;
     const unsigned int most = m->start + 1u;
     unsigned int left;
     if (output < beyond && (depth <= most || -output >= corner[most].pass[0])) {
         left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, -output, limit, false);
-        return hystgen_fall_to(t, m, corner, left, k, end, output, true, limit, room);
+        return hystgen_fall_to(t, m, corner, left, k, end, output, true, limit, room, limited);
     }
     left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, m, corner, left, k, end, output, false, limit, room);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, limit, room, limited);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;

@@ -70,11 +70,11 @@ hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystgen_memory_t 
 hystgen_real_t hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m,
                                            const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
                                            hystgen_real_t output, hystgen_real_t beyond, hystgen_real_t limit,
-                                           bool *room);
+                                           bool *room, bool *limited);
 hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
                                            const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
                                            hystgen_real_t output, hystgen_real_t beyond, hystgen_real_t limit,
-                                           bool *room);
+                                           bool *room, bool *limited);
 #endif
 
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);

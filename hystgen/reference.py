@@ -396,7 +396,7 @@ def corners_foretell(t: PlayTables, s: State, w: Any) -> None:
         s.counts[HINT_K] = 0  # a move that goes on as it was
 
 
-# ---------------------------------------------------------------- corners_limit.c
+# ---------------------------------------------------------------- corners_solve.c
 
 
 def may_be_limited(t: Tables, s: State, depth: int, rising: int, output: Any) -> bool:
@@ -451,9 +451,6 @@ def corners_find_within(t: Tables, s: State, depth: int, k: int, rising: int, ou
         if last and k == s.end[c]:
             left = 0
     return left, k
-
-
-# ---------------------------------------------------------------- corners_solve.c
 
 
 def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> Any:
@@ -875,10 +872,11 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
-    turns, corners_absorb, hint, corners_foretell, may_be_limited, taken, corners_find_within, corners_locate, corners_solve,
-    loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward, envelope_inverse, dead_zone,
-    front_forward, front_inverse, rest, absorb, output, solve, begin, init, see_drive, foretell, finite,
-    forward_step, answer, clamp_drive, fits, choose_branch, tells_limit, inverse_step, inverse_commit, reset, run,
+    turns, corners_absorb, hint, corners_foretell, may_be_limited, taken, corners_find_within, corners_locate,
+    corners_solve, loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward,
+    envelope_inverse, dead_zone, front_forward, front_inverse, rest, absorb, output, solve, begin, init,
+    see_drive, foretell, finite, forward_step, answer, clamp_drive, fits, choose_branch, tells_limit,
+    inverse_step, inverse_commit, reset, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through

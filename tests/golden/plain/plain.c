@@ -382,13 +382,13 @@ static void plain_corners_foretell(const plain_tables_t *t, plain_memory_t *m, p
     }
 }
 
-/* First of the start levels k .. high-1 that a way x has not reached, or high. */
-static unsigned int plain_level_not_reached(const plain_real_t *level, unsigned int k, unsigned int high,
-                                              plain_real_t x)
+/* First of the rising steps k .. high-1, thresholds or start levels, that a way x has not reached, or high. */
+static unsigned int plain_step_not_reached(const plain_real_t *step, unsigned int k, unsigned int high,
+                                             plain_real_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
-        if (x >= level[middle]) {
+        if (x >= step[middle]) {
             k = middle + 1;
         } else {
             high = middle;
@@ -436,13 +436,13 @@ PLAIN_COPIES unsigned int plain_corners_find(const plain_tables_t *t, const plai
         const plain_corner_t *c = &corner[left - 1];
         if (c->side == 0) {
             const unsigned int high = left == 1 ? c->end : c->end - 1u;
-            *k = plain_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
+            *k = plain_step_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
             if (*k == c->end) { /* the last one too */
                 left = 0;
                 *end = *k;
             }
         } else if (c->side != (rising ? -1 : 1)) {
-            *k = plain_level_not_reached(t->start_level, *k, c->end - 1u, plain_half(x + c->pass[!rising]));
+            *k = plain_step_not_reached(t->start_level, *k, c->end - 1u, plain_half(x + c->pass[!rising]));
         }
     }
     return left;
@@ -464,10 +464,12 @@ static void plain_write_place(plain_place_t *p, plain_real_t anchor_output, plai
 /* Where a rising move to `output` ends, of which k plays follow and `left` corners hold the others, `end`
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
-   where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
+   where it is too narrow for that. It may lead back to the w before, or behind it, which the caller looks at. `within`:
+   a w beyond the input `limit` of the plays has a place that ends there at the latest, and *limited tells of it. */
 PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, plain_memory_t *m,
                                              const plain_corner_t *corner, unsigned int left, unsigned int k,
-                                             unsigned int end, plain_real_t output, bool *room)
+                                             unsigned int end, plain_real_t output, bool within,
+                                             plain_real_t limit, bool *room, bool *limited)
 {
     plain_real_t w;
     plain_real_t first;
@@ -506,6 +508,11 @@ PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, plain_memory_t 
         next_level = FLT_MAX;
     }
     w = first + (output - level) * t->inverse_slope[k];
+    if (within && w > limit) {
+        plain_write_place(&m->there, level, next_level, first, next < limit ? limit : next, k, left, true);
+        *limited = true;
+        return w;
+    }
     if (w > next) {
         w = next;
     } else {
@@ -520,9 +527,6 @@ PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, plain_memory_t 
             *room = !(least > next);
         }
     }
-    if (!(w > m->w)) {
-        return m->w;
-    }
     plain_write_place(&m->there, level, next_level, first, next, k, left, true);
     return w;
 }
@@ -530,7 +534,8 @@ PLAIN_COPIES plain_real_t plain_rise_to(const plain_tables_t *t, plain_memory_t 
 /* The same for a falling move. */
 PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, plain_memory_t *m,
                                              const plain_corner_t *corner, unsigned int left, unsigned int k,
-                                             unsigned int end, plain_real_t output, bool *room)
+                                             unsigned int end, plain_real_t output, bool within,
+                                             plain_real_t limit, bool *room, bool *limited)
 {
     plain_real_t w;
     plain_real_t first;
@@ -569,6 +574,11 @@ PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, plain_memory_t 
         next_level = -FLT_MAX;
     }
     w = first + (output - level) * t->inverse_slope[k];
+    if (within && w < limit) {
+        plain_write_place(&m->there, level, next_level, first, next > limit ? limit : next, k, left, false);
+        *limited = true;
+        return w;
+    }
     if (w < next) {
         w = next;
     } else {
@@ -583,9 +593,6 @@ PLAIN_COPIES plain_real_t plain_fall_to(const plain_tables_t *t, plain_memory_t 
             *room = !(least < next);
         }
     }
-    if (!(w < m->w)) {
-        return m->w;
-    }
     plain_write_place(&m->there, level, next_level, first, next, k, left, false);
     return w;
 }
@@ -595,9 +602,10 @@ static plain_real_t plain_corners_rise(const plain_tables_t *t, plain_memory_t *
                                                 const plain_corner_t *corner, unsigned int depth, unsigned int k,
                                                 plain_real_t output, bool *room)
 {
+    bool limited = false; /* stays so */
     unsigned int end;
     const unsigned int left = plain_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return plain_rise_to(t, m, corner, left, k, end, output, room);
+    return plain_rise_to(t, m, corner, left, k, end, output, false, 0, room, &limited);
 }
 
 /* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
@@ -605,9 +613,10 @@ static plain_real_t plain_corners_fall(const plain_tables_t *t, plain_memory_t *
                                                 const plain_corner_t *corner, unsigned int depth, unsigned int k,
                                                 plain_real_t output, bool *room)
 {
+    bool limited = false; /* stays so */
     unsigned int end;
     const unsigned int left = plain_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return plain_fall_to(t, m, corner, left, k, end, output, room);
+    return plain_fall_to(t, m, corner, left, k, end, output, false, 0, room, &limited);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
@@ -798,8 +807,13 @@ static plain_real_t plain_inverse_hold(plain_inverse_t *self)
    beyond the one that it gives, by a little more than rounding can be, can get nothing else. */
 static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
 {
-    const plain_place_t *p = &self->memory.there;
-    plain_real_t edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
+    plain_memory_t *m = &self->memory;
+    const plain_place_t *p = &m->there;
+    plain_real_t edge;
+    if (!(v < m->w || v > m->w)) { /* the drive is there already */
+        plain_copy_place(&m->there, &m->here);
+    }
+    edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
     self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
     edge = self->falling ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
     self->edge[0] = edge;
@@ -816,9 +830,6 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 {
     const plain_real_t inside = plain_clamp_drive(v);
     if (inside < v || inside > v) {
-        plain_memory_t *m = &self->memory;
-        plain_copy_place(&m->there, &m->here);
-        plain_corners_go(&plain_tables, &self->memory, self->corner, inside, &m->there);
         return plain_inverse_limit(self, inside);
     }
     self->repeat = true;
@@ -828,29 +839,30 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 }
 
 /* A move by so little that rounding leaves the drive where it is, which may lie a little off the line that is followed:
-   the next step goes on from there, unless it asks for the same again. The place that is known is that of the memory,
-   but for the number of its plays. */
+   the next step goes on from there, unless it asks for the same again. */
 static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
-    m->there.k = m->here.k;
+    plain_copy_place(&m->there, &m->here);
     plain_inverse_expect(self, m->w);
     self->fast = PLAIN_FAST_REST;
     self->repeat = true;
     return plain_inverse_answer(self, m->w);
 }
 
-/* Where a move has ended, at v: from there samples are fast up to the reference at which another play follows, so that
-   they need not look; a little short of it, by more than rounding can be. */
-PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_t v, bool rising)
+/* Where a move has ended, at v, which may be known to lie inside the range: from there samples are fast up to the
+   reference at which another play follows, so that they need not look; a little short of it, by more than rounding
+   can be. */
+PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_t v, bool rising,
+    bool inside)
 {
     const plain_place_t *p = &self->memory.there;
     const plain_real_t end = rising ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN;
     const plain_real_t most = rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN;
     plain_real_t edge = p->next_output;
     if (rising ? p->next > end : p->next < end) { /* the range ends before the next play */
-        if (rising ? v > end : v < end) {
-            return plain_inverse_stay(self, v);
+        if (!inside && (rising ? v > end : v < end)) {
+            return plain_inverse_limit(self, end);
         }
         edge = p->anchor_output + (end - p->anchor) * plain_slope[p->k];
     }
@@ -864,7 +876,9 @@ PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_
     self->fast = PLAIN_FAST_MOVE;
     self->pending = v;
     return v;
-}/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
+}
+
+/* A rising move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that shorter ways save no registers for it */
 #endif
@@ -879,7 +893,7 @@ static plain_real_t plain_inverse_rise(plain_inverse_t *self, unsigned int depth
     if (!room) {
         return plain_inverse_stay(self, v);
     }
-    return plain_inverse_enter(self, v, true);
+    return plain_inverse_enter(self, v, true, false);
 }
 
 /* A falling move to u once what begins it is known: k plays follow, `depth` corners hold the others. */
@@ -897,7 +911,7 @@ static plain_real_t plain_inverse_fall(plain_inverse_t *self, unsigned int depth
     if (!room) {
         return plain_inverse_stay(self, v);
     }
-    return plain_inverse_enter(self, v, false);
+    return plain_inverse_enter(self, v, false, false);
 }
 
 /* A move that takes no more plays along, and is fast from there on. */
@@ -907,7 +921,7 @@ static plain_real_t plain_inverse_along(plain_inverse_t *self, plain_real_t v, b
         return plain_inverse_rest(self);
     }
     plain_copy_place(&self->memory.there, &self->memory.here);
-    return plain_inverse_enter(self, v, rising);
+    return plain_inverse_enter(self, v, rising, false);
 }
 
 /* A move to u, which is what is asked for but for the limits, from where the memory is. */
@@ -1067,7 +1081,7 @@ PLAIN_COPIES bool plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_
             p->next_output = z;
             p->k = (uint_least16_t)k;
             plain_inverse_ask(self, u, 0);
-            *v = plain_inverse_enter(self, *v, rising);
+            *v = plain_inverse_enter(self, *v, rising, true);
             return true;
         }
     }

@@ -663,13 +663,13 @@ static void two_branches_corners_foretell(const two_branches_tables_t *t, two_br
     }
 }
 
-/* First of the start levels k .. high-1 that a way x has not reached, or high. */
-static unsigned int two_branches_level_not_reached(const two_branches_real_t *level, unsigned int k, unsigned int high,
-                                              two_branches_real_t x)
+/* First of the rising steps k .. high-1, thresholds or start levels, that a way x has not reached, or high. */
+static unsigned int two_branches_step_not_reached(const two_branches_real_t *step, unsigned int k, unsigned int high,
+                                             two_branches_real_t x)
 {
     while (k < high) {
         const unsigned int middle = (k + high) / 2;
-        if (x >= level[middle]) {
+        if (x >= step[middle]) {
             k = middle + 1;
         } else {
             high = middle;
@@ -717,13 +717,13 @@ TWO_BRANCHES_COPIES unsigned int two_branches_corners_find(const two_branches_ta
         const two_branches_corner_t *c = &corner[left - 1];
         if (c->side == 0) {
             const unsigned int high = left == 1 ? c->end : c->end - 1u;
-            *k = two_branches_level_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
+            *k = two_branches_step_not_reached(t->start_level, *k, high, x + c->pass[!rising]);
             if (*k == c->end) { /* the last one too */
                 left = 0;
                 *end = *k;
             }
         } else if (c->side != (rising ? -1 : 1)) {
-            *k = two_branches_level_not_reached(t->start_level, *k, c->end - 1u, two_branches_half(x + c->pass[!rising]));
+            *k = two_branches_step_not_reached(t->start_level, *k, c->end - 1u, two_branches_half(x + c->pass[!rising]));
         }
     }
     return left;
@@ -745,10 +745,12 @@ static void two_branches_write_place(two_branches_place_t *p, two_branches_real_
 /* Where a rising move to `output` ends, of which k plays follow and `left` corners hold the others, `end`
    being the first play beyond what was left, if any was: fills in the place, and returns the input of the plays there.
    Rounding is kept from leading out of that place: then the plays that follow are those that will; *room is false
-   where it is too narrow for that. And from leading back: then the w before is returned, and nothing filled in. */
+   where it is too narrow for that. It may lead back to the w before, or behind it, which the caller looks at. `within`:
+   a w beyond the input `limit` of the plays has a place that ends there at the latest, and *limited tells of it. */
 TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_tables_t *t, two_branches_memory_t *m,
                                              const two_branches_corner_t *corner, unsigned int left, unsigned int k,
-                                             unsigned int end, two_branches_real_t output, bool *room)
+                                             unsigned int end, two_branches_real_t output, bool within,
+                                             two_branches_real_t limit, bool *room, bool *limited)
 {
     two_branches_real_t w;
     two_branches_real_t first;
@@ -787,6 +789,11 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_
         next_level = FLT_MAX;
     }
     w = first + (output - level) * t->inverse_slope[k];
+    if (within && w > limit) {
+        two_branches_write_place(&m->there, level, next_level, first, next < limit ? limit : next, k, left, true);
+        *limited = true;
+        return w;
+    }
     if (w > next) {
         w = next;
     } else {
@@ -801,9 +808,6 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_
             *room = !(least > next);
         }
     }
-    if (!(w > m->w)) {
-        return m->w;
-    }
     two_branches_write_place(&m->there, level, next_level, first, next, k, left, true);
     return w;
 }
@@ -811,7 +815,8 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_rise_to(const two_branches_
 /* The same for a falling move. */
 TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_tables_t *t, two_branches_memory_t *m,
                                              const two_branches_corner_t *corner, unsigned int left, unsigned int k,
-                                             unsigned int end, two_branches_real_t output, bool *room)
+                                             unsigned int end, two_branches_real_t output, bool within,
+                                             two_branches_real_t limit, bool *room, bool *limited)
 {
     two_branches_real_t w;
     two_branches_real_t first;
@@ -850,6 +855,11 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_
         next_level = -FLT_MAX;
     }
     w = first + (output - level) * t->inverse_slope[k];
+    if (within && w < limit) {
+        two_branches_write_place(&m->there, level, next_level, first, next > limit ? limit : next, k, left, false);
+        *limited = true;
+        return w;
+    }
     if (w < next) {
         w = next;
     } else {
@@ -864,9 +874,6 @@ TWO_BRANCHES_COPIES two_branches_real_t two_branches_fall_to(const two_branches_
             *room = !(least < next);
         }
     }
-    if (!(w < m->w)) {
-        return m->w;
-    }
     two_branches_write_place(&m->there, level, next_level, first, next, k, left, false);
     return w;
 }
@@ -876,9 +883,10 @@ static two_branches_real_t two_branches_corners_rise(const two_branches_tables_t
                                                 const two_branches_corner_t *corner, unsigned int depth, unsigned int k,
                                                 two_branches_real_t output, bool *room)
 {
+    bool limited = false; /* stays so */
     unsigned int end;
     const unsigned int left = two_branches_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return two_branches_rise_to(t, m, corner, left, k, end, output, room);
+    return two_branches_rise_to(t, m, corner, left, k, end, output, false, 0, room, &limited);
 }
 
 /* A falling move to `output`, of which k plays are known to follow and `depth` corners hold the others: fills in the place where it ends, and returns the input of the plays there. */
@@ -886,9 +894,10 @@ static two_branches_real_t two_branches_corners_fall(const two_branches_tables_t
                                                 const two_branches_corner_t *corner, unsigned int depth, unsigned int k,
                                                 two_branches_real_t output, bool *room)
 {
+    bool limited = false; /* stays so */
     unsigned int end;
     const unsigned int left = two_branches_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return two_branches_fall_to(t, m, corner, left, k, end, output, room);
+    return two_branches_fall_to(t, m, corner, left, k, end, output, false, 0, room, &limited);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
@@ -932,9 +941,13 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
     if (!two_branches_corners_begin(t, m, corner, output, &depth, &k, &rising, &w)) {
         return w;
     }
-    m->there.k = 0;
-    return rising ? two_branches_corners_rise(t, m, corner, depth, k, output, &room)
-                  : two_branches_corners_fall(t, m, corner, depth, k, output, &room);
+    w = rising ? two_branches_corners_rise(t, m, corner, depth, k, output, &room)
+               : two_branches_corners_fall(t, m, corner, depth, k, output, &room);
+    if (!two_branches_past(w, m->w, rising)) { /* rounding is kept from leading back */
+        m->there.k = 0;
+        return m->w;
+    }
+    return w;
 }
 
 static const two_branches_real_t two_branches_threshold[7] = {
