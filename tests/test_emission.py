@@ -14,11 +14,12 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen.api import Model
+from hystgen import reference
+from hystgen.api import Model, emit_options
 from hystgen.models import PI, Cascade, DeadZone
 from hystgen.params import parse_parameters
 from hystgen.tables import choose_engine
-from hystgen.verification import compilers, signals
+from hystgen.verification import comparison, compilers, host, signals, sources
 from hystgen.verification.comparison import REALS
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -69,6 +70,43 @@ def test_bits_equal_where_corners_end_at_the_same_drive(name: str, arithmetic: s
     one = Model(parse_parameters(text, "round.yaml"))
     report = hystgen.verify(one, arithmetic=arithmetic, engine="corners", compiler=["gcc"], length=400_000)
     assert report.ok, report.table()
+
+
+def beside_limits(one: Model, length: int) -> signals.Calls:
+    """Moves that end near a limit of the drive, and again within a few units in the last place of where they did."""
+    rng = np.random.default_rng(17)
+    low, high = one.parameters.input_range
+    least, most = one.cascade.output_range
+    op = rng.choice([reference.OP_STEP, reference.OP_COMMIT, reference.OP_RESET], length, p=[0.88, 0.08, 0.04])
+    x = np.empty(length, np.float32)
+    for i in range(length):
+        before = x[rng.integers(max(0, i - 20), i)] if i else np.float32(0)
+        kind = rng.random()
+        if op[i] == reference.OP_COMMIT:
+            x[i] = rng.choice([low, high, rng.uniform(low, high)])
+        elif kind < 0.4:
+            x[i] = before + int(rng.integers(-16, 17)) * np.spacing(before)
+        elif kind < 0.98:
+            end = rng.choice([*one.cascade.swung, least, most])
+            x[i] = end + rng.normal() * 10 ** rng.uniform(-4, 0) * (most - least)
+        else:
+            x[i] = rng.choice([np.nan, np.inf, -np.inf])
+    return "beside limits", op.astype(np.uint8), x.astype(np.float64)
+
+
+@pytest.mark.parametrize("ends", [(0, 20), (-20, 0), (-10, 10), (-3, 13), (2.5, 20), (1e-3, 9)])
+def test_bits_equal_where_rounding_decides_on_a_limit(ends: tuple[float, float], tmp_path: Path) -> None:
+    thresholds = np.linspace(0, 9, 17)
+    weights = np.append(0.7, 0.15 * np.exp(-thresholds[1:] / 5))
+    pi = f"{{thresholds: {thresholds.tolist()}, weights: {weights.tolist()}}}"
+    text = f"hystgen: 1\nname: ends\ninput_range: {list(ends)}\nmodel:\n  pi: {pi}\n"
+    one = Model(parse_parameters(text, "ends.yaml"))
+    real = REALS["float32"]
+    calls = beside_limits(one, 60_000)
+    record = comparison.expected_record(one.tables("float32", "corners"), real, True, calls)
+    files = sources.write(tmp_path, one, emit_options(one, "inverse", "float32", "corners"))
+    rows = list(host.rows(files, lambda _: [record], real, ["gcc"], tmp_path, lambda _: None))
+    assert [(row.build, row.samples, row.different) for row in rows] == [(build, 60_000, 0) for build, _ in host.BUILDS]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS[1:])
