@@ -826,6 +826,9 @@ static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
 }
 
 /* A drive that is not what solving gave, or that is no move. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
 static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 {
     const plain_real_t inside = plain_clamp_drive(v);
@@ -840,6 +843,9 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 
 /* A move by so little that rounding leaves the drive where it is, which may lie a little off the line that is followed:
    the next step goes on from there, unless it asks for the same again. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
 static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
