@@ -23,10 +23,13 @@
    long. */
 #if !defined(__GNUC__)
 #define PLAIN_COPIES static inline
+#define PLAIN_APART static
 #elif (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)
 #define PLAIN_COPIES __attribute__((noinline)) static
+#define PLAIN_APART __attribute__((noinline)) static
 #else
 #define PLAIN_COPIES __attribute__((always_inline)) static inline
+#define PLAIN_APART static
 #endif
 
 /* The constant tables of one model in floating point. */
@@ -826,10 +829,7 @@ static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
 }
 
 /* A drive that is not what solving gave, or that is no move. */
-#if defined(__GNUC__)
-__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
-#endif
-static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
+PLAIN_APART plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 {
     const plain_real_t inside = plain_clamp_drive(v);
     if (inside < v || inside > v) {
@@ -843,10 +843,7 @@ static plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t v)
 
 /* A move by so little that rounding leaves the drive where it is, which may lie a little off the line that is followed:
    the next step goes on from there, unless it asks for the same again. */
-#if defined(__GNUC__)
-__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
-#endif
-static plain_real_t plain_inverse_rest(plain_inverse_t *self)
+PLAIN_APART plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
     plain_copy_place(&m->there, &m->here);

@@ -146,10 +146,13 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
    long. */
 #if !defined(__GNUC__)
 #define TWO_BRANCHES_COPIES static inline
+#define TWO_BRANCHES_APART static
 #elif (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)
 #define TWO_BRANCHES_COPIES __attribute__((noinline)) static
+#define TWO_BRANCHES_APART __attribute__((noinline)) static
 #else
 #define TWO_BRANCHES_COPIES __attribute__((always_inline)) static inline
+#define TWO_BRANCHES_APART static
 #endif
 
 /* The constant tables of one model in floating point. */
