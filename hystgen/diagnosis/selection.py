@@ -137,8 +137,8 @@ def _step(
 
 
 def _explained(step: _Step, records: Records) -> bool:
-    """Whether hardly more than noise is left: no other first effect can do better, and beside this one `_exchanged` asks
-    for each that does as well."""
+    """Whether hardly more than noise is left: no other first effect can do better beside it, and `_exchanged` asks for
+    each that does as well."""
     return step.merit is not None and step.best.held_out <= decisions.AT_FLOOR * records.noise
 
 
