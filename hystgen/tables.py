@@ -198,6 +198,10 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     if cascade.branches_differ and not cascade.inverse_problems():
         limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits[reference.REAL_MAX] = largest
+    if max(map(abs, limits)) > largest:
+        reached = max(map(abs, limits))
+        message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
+        raise FormatError((("model",), message))
     limits[reference.LIMITED_LOW], limits[reference.LIMITED_HIGH] = -largest, largest
     if bounded and not cascade.stages and not cascade.inverse_problems():
         below, above = limited(cascade, arithmetic)
@@ -205,10 +209,6 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
             limits[reference.LIMITED_LOW] = float(upward(below - cascade.output_offset, dtype))
         if above is not None:
             limits[reference.LIMITED_HIGH] = -float(upward(cascade.output_offset - above, dtype))
-    if max(map(abs, limits)) > largest:
-        reached = max(map(abs, limits))
-        message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
-        raise FormatError((("model",), message))
 
     tables = Tables(
         threshold=reals(pi.thresholds, "thresholds", "pi", "thresholds"),

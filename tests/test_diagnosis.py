@@ -214,8 +214,10 @@ def test_the_sentence_is_about_what_is_most_of_the_error(
     assert "a line at 50 Hz" in said
 
 
-def test_one_loop_supports_one_name(tmp_path: Path) -> None:
-    """A lag and a bent sensor behind one sine, again and again: one is named, and the report says what to record."""
+@pytest.mark.parametrize(("bent", "names"), [(2e-4, 1), (2e-3, 0)])
+def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> None:
+    """A lag and a bent sensor behind one sine, again and again: one is named, unless the other leaves so much that it
+    may as well be a wrong one, and the report says what to record."""
     t = np.arange(3000) * 1e-3
     v = 50.0 - 50.0 * np.cos(2 * np.pi * 4.0 * t)
     decay = np.exp(-1e-3 / 0.004)
@@ -224,9 +226,9 @@ def test_one_loop_supports_one_name(tmp_path: Path) -> None:
         w = lfilter([1.0 - decay], [1.0, -decay], v)
         x = brute_output(w, (0.0, 5.0, 12.0, 25.0), (0.1, 0.02, 0.02, 0.02), 0.0)
         noise = np.random.default_rng(seed).normal(0.0, 0.003, len(x))
-        records.append(Record(f"r{seed}", t, v, x + 2e-3 * (x - 6.0) ** 2 + noise))
+        records.append(Record(f"r{seed}", t, v, x + bent * (x - 6.0) ** 2 + noise))
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:])
-    assert len(found.content["effects"]) == 1
+    assert len(found.content["effects"]) == names
     assert told.ONE_LOOP in found.content["advice"]
     found.write(tmp_path / "out")
     assert told.ONE_LOOP.capitalize() in (tmp_path / "out" / "report.html").read_text()

@@ -175,7 +175,7 @@ def diagnose(
             return ready, noise, records, selection.select(records, refitted)
 
         ready, noise, compared, found = searched(before)
-        wrong = starts.contradicted([*ready.to_fit, *ready.held], found.fitted)
+        wrong = starts.contradicted(ready.to_fit, found.fitted)
         if wrong is not None:
             odd.append(wrong)
             try:

@@ -16,6 +16,7 @@ from hystgen.identification.remarks import STARTS, UNLIKE
 def contradicted(items: Sequence[Item], fitted: Fitted) -> dict[str, Any] | None:
     """What `diagnosis.json` says where the starts, which depend on the history, are off by far more than the rest.
 
+    `items`: those that were fitted; held-out ones decide nothing about a fit, and may go where it is a guess.
     Of a session only the first record begins behind the history. None where nothing contradicts it, or nothing tells.
     """
     first, later = [], []

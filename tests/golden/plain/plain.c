@@ -843,7 +843,10 @@ PLAIN_APART plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t 
 
 /* A move by so little that rounding leaves the drive where it is, which may lie a little off the line that is followed:
    the next step goes on from there, unless it asks for the same again. */
-PLAIN_APART plain_real_t plain_inverse_rest(plain_inverse_t *self)
+#if defined(__GNUC__)
+__attribute__((noinline)) /* as rare as it is long */
+#endif
+static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
     plain_copy_place(&m->there, &m->here);
