@@ -181,11 +181,13 @@ HYSTGEN_API hystgen_real_t hystgen_corners_rise_within(const hystgen_tables_t *t
 {
     unsigned int end;
     const unsigned int most = m->start + 1u;
-    const bool within = output > beyond && (depth <= most || output >= corner[most].pass[1]);
-    const unsigned int left =
-        within ? hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, output, limit, true)
-               : hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
-    return hystgen_rise_to(t, m, corner, left, k, end, output, within, limit, room, limited);
+    unsigned int left;
+    if (output > beyond && (depth <= most || output >= corner[most].pass[1])) {
+        left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, output, limit, true);
+        return hystgen_rise_to(t, m, corner, left, k, end, output, true, limit, room, limited);
+    }
+    left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, output, true);
+    return hystgen_rise_to(t, m, corner, left, k, end, output, false, limit, room, limited);
 }
 
 HYSTGEN_API hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
@@ -195,11 +197,13 @@ HYSTGEN_API hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t
 {
     unsigned int end;
     const unsigned int most = m->start + 1u;
-    const bool within = output < beyond && (depth <= most || -output >= corner[most].pass[0]);
-    const unsigned int left =
-        within ? hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, -output, limit, false)
-               : hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
-    return hystgen_fall_to(t, m, corner, left, k, end, output, within, limit, room, limited);
+    unsigned int left;
+    if (output < beyond && (depth <= most || -output >= corner[most].pass[0])) {
+        left = hystgen_corners_find_within(t, corner, m->start, depth, &k, &end, -output, limit, false);
+        return hystgen_fall_to(t, m, corner, left, k, end, output, true, limit, room, limited);
+    }
+    left = hystgen_corners_find(t, corner, m->start, depth, &k, &end, -output, false);
+    return hystgen_fall_to(t, m, corner, left, k, end, output, false, limit, room, limited);
 }
 
 /* How a move to `output` begins: with *k plays that follow and *depth corners that hold the others, *rising or falling;
