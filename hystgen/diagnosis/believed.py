@@ -28,6 +28,7 @@ PLAYS = 32
 """With half as many, what the steps between thresholds leave is up to 1.4 times the noise in effect-free records, and
 takes part in every comparison of effects; more leave no less."""
 
+
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
     """The believed front as a family around it, and the shape that it has in that family."""
     if not stages:
