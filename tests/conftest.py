@@ -17,7 +17,11 @@ settings.load_profile("hystgen")
 MEASURED = Path(os.environ.get("HYSTGEN_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
 """Folder of the measured records, which the project does not ship: not all of them may be passed on."""
 
-LEFT_OUT = pytest.StashKey[int]()
+WHOLE = bool(os.environ.get("HYSTGEN_WHOLE"))
+"""Whether tests marked `slow` are to run with all their cases."""
+
+NO_DATA, SHORTENED = "marked data", "marked slow"
+LEFT_OUT = pytest.StashKey[dict[str, int]]()
 
 
 @pytest.fixture(scope="session")
@@ -45,19 +49,41 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.stash[LEFT_OUT] = 0
+    config.stash[LEFT_OUT] = {NO_DATA: 0, SHORTENED: 0}
     if os.environ.get("HYSTGEN_REQUIRE_DATA") and not MEASURED.is_dir():
         raise pytest.UsageError(f"HYSTGEN_REQUIRE_DATA is set, but there is no folder {MEASURED}; set HYSTGEN_DATA")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect what cannot run without the measured records: neither passed nor skipped, but counted."""
-    if MEASURED.is_dir():
-        return
-    left_out = [item for item in items if item.get_closest_marker("data")]
-    items[:] = [item for item in items if item not in left_out]
-    config.hook.pytest_deselected(items=left_out)
-    config.stash[LEFT_OUT] = len(left_out)
+    """Deselect what cannot run without the measured records and most of what is slow: not passed, but counted."""
+    for reason, beside in (
+        (NO_DATA, lambda item: not MEASURED.is_dir() and item.get_closest_marker("data") is not None),
+        (SHORTENED, lambda item: not WHOLE and not in_short_form(item)),
+    ):
+        left_out = [item for item in items if beside(item)]
+        items[:] = [item for item in items if not beside(item)]
+        config.hook.pytest_deselected(items=left_out)
+        config.stash[LEFT_OUT][reason] = len(left_out)
+
+
+def in_short_form(item: pytest.Item) -> bool:
+    """Whether a case of a slow test runs in any case: one of `one_in`, none without that number.
+
+    Which ones, the places of its parameters in their lists decide by their sum: where there are several lists, each
+    value of the one comes up with one in so many of another.
+    """
+    slow = item.get_closest_marker("slow")
+    if slow is None:
+        return True
+    if "one_in" not in slow.kwargs:
+        return False
+    assert isinstance(item, pytest.Function)
+    places = 0
+    for mark in item.iter_markers("parametrize"):
+        names, values = mark.args
+        case = item.callspec.params[names] if isinstance(names, str) else tuple(map(item.callspec.params.get, names))
+        places += list(values).index(case)
+    return places % slow.kwargs["one_in"] == 0
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -68,15 +94,17 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:
-    counted = getattr(node, "workeroutput", {}).get("left_out", 0)
-    node.config.stash[LEFT_OUT] = max(node.config.stash[LEFT_OUT], counted)
+    counted = getattr(node, "workeroutput", {}).get("left_out", {})
+    for reason, number in counted.items():
+        node.config.stash[LEFT_OUT][reason] = max(node.config.stash[LEFT_OUT][reason], number)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    number = config.stash[LEFT_OUT]
-    if number:
-        terminalreporter.write_line(
-            f"{number} test{'' if number == 1 else 's'} deselected: marked data, and there is no folder {MEASURED} "
-            "of measured records; HYSTGEN_DATA names another",
-            yellow=True,
-        )
+    what_to_do = {
+        NO_DATA: f"and there is no folder {MEASURED} of measured records; HYSTGEN_DATA names another",
+        SHORTENED: "whose other cases stand for them; HYSTGEN_WHOLE=1 runs all",
+    }
+    for reason, number in config.stash[LEFT_OUT].items():
+        if number:
+            counted = f"{number} test{'' if number == 1 else 's'} deselected"
+            terminalreporter.write_line(f"{counted}: {reason}, {what_to_do[reason]}", yellow=reason == NO_DATA)

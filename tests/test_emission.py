@@ -47,6 +47,7 @@ def check_codegen(name: str, **options: str) -> None:
     assert {row.operator for row in report.rows} == {"forward", "inverse"}
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
@@ -170,6 +171,7 @@ ALONE = [
 """Every layout with both operators, every operator in one layout; all of them together of two models."""
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(("name", "operator", "layout"), ALONE)
 def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_path: Path) -> None:
     arithmetic = {"bent": "float64", "curved": "float64", "mixed": "q31", "listed": "q15"}.get(name, "float32")

@@ -37,7 +37,6 @@ def fuzz(folder: Path, seconds: float, *module: str, change: Callable[[str], str
 
 
 @needs_clang
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [

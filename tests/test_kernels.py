@@ -438,7 +438,6 @@ def test_literals_in_c_are_those_of_python(name: str, kernel: str) -> None:
     assert left == {"bound", "one"} | (set() if kernel == "tanh" else {"half_log2", "power", "number"})
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize("name", FORMATS)
 def test_stated_error_is_no_more_than_rounding_can_do(name: str, kernel: str) -> None:

@@ -360,9 +360,9 @@ def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
             for arithmetic in ("float32", "q31", "q15")
             for operator in ("forward", "inverse")
         ),
-        pytest.param("cortex-m4f", 16, "float32", "forward", marks=pytest.mark.slow),
-        pytest.param("cortex-m4f", 16, "float32", "inverse", marks=pytest.mark.slow),
-        pytest.param("cortex-m4f", 64, "q31", "inverse", marks=pytest.mark.slow),
+        ("cortex-m4f", 16, "float32", "forward"),
+        ("cortex-m4f", 16, "float32", "inverse"),
+        ("cortex-m4f", 64, "q31", "inverse"),
     ],
 )
 def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(
