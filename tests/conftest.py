@@ -20,7 +20,8 @@ MEASURED = Path(os.environ.get("HYSTGEN_DATA") or Path(__file__).resolve().paren
 WHOLE = bool(os.environ.get("HYSTGEN_WHOLE"))
 """Whether tests marked `slow` are to run with all their cases."""
 
-NO_DATA, SHORTENED = "marked data", "marked slow"
+NO_DATA = f"marked data, and there is no folder {MEASURED} of measured records; HYSTGEN_DATA names another"
+SHORTENED = "marked slow; HYSTGEN_WHOLE=1 runs all"
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
 
 
@@ -55,19 +56,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect what cannot run without the measured records and most of what is slow: not passed, but counted."""
-    for reason, beside in (
-        (NO_DATA, lambda item: not MEASURED.is_dir() and item.get_closest_marker("data") is not None),
-        (SHORTENED, lambda item: not WHOLE and not in_short_form(item)),
+    """Deselect what cannot run without the measured records, and part of what is slow: neither passed nor skipped."""
+    for reason, runs in (
+        (NO_DATA, lambda item: MEASURED.is_dir() or item.get_closest_marker("data") is None),
+        (SHORTENED, lambda item: WHOLE or in_short_form(item)),
     ):
-        left_out = [item for item in items if beside(item)]
-        items[:] = [item for item in items if not beside(item)]
+        left_out = [item for item in items if not runs(item)]
+        items[:] = [item for item in items if runs(item)]
         config.hook.pytest_deselected(items=left_out)
         config.stash[LEFT_OUT][reason] = len(left_out)
 
 
 def in_short_form(item: pytest.Item) -> bool:
-    """Whether a case of a slow test runs in any case: one of `one_in`, none without that number.
+    """Whether a test runs without HYSTGEN_WHOLE: of a slow one a case in `one_in`, and none without that number.
 
     Which ones, the places of its parameters in their lists decide by their sum: where there are several lists, each
     value of the one comes up with one in so many of another.
@@ -100,11 +101,7 @@ def pytest_testnodedown(node: Any) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    what_to_do = {
-        NO_DATA: f"and there is no folder {MEASURED} of measured records; HYSTGEN_DATA names another",
-        SHORTENED: "whose other cases stand for them; HYSTGEN_WHOLE=1 runs all",
-    }
     for reason, number in config.stash[LEFT_OUT].items():
         if number:
             counted = f"{number} test{'' if number == 1 else 's'} deselected"
-            terminalreporter.write_line(f"{counted}: {reason}, {what_to_do[reason]}", yellow=reason == NO_DATA)
+            terminalreporter.write_line(f"{counted}: {reason}", yellow=True)

@@ -5,7 +5,6 @@ What is expected is computed here, by loops and relays that share no code with t
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -40,7 +39,6 @@ Array = NDArray[np.float64]
 Run = Callable[..., tuple[int, str, str]]
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-CONFTEST = Path(__file__).with_name("conftest.py")
 
 THRESHOLDS = (0.0, 4.0, 9.0, 17.0, 30.0, 38.0)
 WEIGHTS = (0.05, 0.02, 0.04, 0.01, 0.03, 0.02)
@@ -773,50 +771,3 @@ class TestRefused:
                 hystgen.identify(Record("made", np.arange(400.0), v, y))
         with pytest.raises(ValueError, match="there is no record to fit"):
             hystgen.identify([])
-
-
-# -- the mark that these tests carry -----------------------------------------------------------------------------------
-
-
-class TestDataMark:
-    TESTS = (
-        "import pytest\n"
-        "@pytest.mark.data\n@pytest.mark.parametrize('k', [1, 2])\n"
-        "def test_measured(measured, k):\n    assert measured.is_dir()\n"
-        "def test_plain():\n    pass\n"
-    )
-
-    def call(self, folder: Path, *options: str, **environment: str) -> tuple[int, str]:
-        (folder / "conftest.py").write_text(CONFTEST.read_text())
-        (folder / "pytest.ini").write_text("[pytest]\nmarkers = data: needs records\n")
-        (folder / "test_few.py").write_text(self.TESTS)
-        kept = {k: x for k, x in os.environ.items() if k not in ("CI", "HYSTGEN_REQUIRE_DATA", "PYTEST_ADDOPTS")}
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options, str(folder)]
-        done = subprocess.run(
-            command, cwd=folder, env={**kept, **environment}, capture_output=True, text=True, check=False
-        )
-        return done.returncode, done.stdout + done.stderr
-
-    @pytest.mark.parametrize("options", [(), ("-n", "1")], ids=["one process", "xdist"])
-    @pytest.mark.parametrize("ci", [{}, {"CI": "true"}], ids=["here", "CI"])
-    def test_deselected_with_a_count_and_a_reason(
-        self, options: tuple[str, ...], ci: dict[str, str], tmp_path: Path
-    ) -> None:
-        code, text = self.call(tmp_path, *options, HYSTGEN_DATA=str(tmp_path / "none"), **ci)
-        assert code == 0, text
-        assert f"2 tests deselected: marked data, and there is no folder {tmp_path / 'none'} of measured" in text
-        assert "1 passed" in text
-        assert "skipped" not in text
-
-    def test_run_where_there_are_records(self, tmp_path: Path) -> None:
-        code, text = self.call(tmp_path, HYSTGEN_DATA=str(tmp_path))
-        assert code == 0, text
-        assert "3 passed" in text
-        assert "deselected" not in text
-
-    @pytest.mark.parametrize("ci", [{}, {"CI": "true"}], ids=["here", "CI"])
-    def test_an_error_where_they_are_required(self, ci: dict[str, str], tmp_path: Path) -> None:
-        code, text = self.call(tmp_path, HYSTGEN_DATA=str(tmp_path / "none"), HYSTGEN_REQUIRE_DATA="1", **ci)
-        assert code == pytest.ExitCode.USAGE_ERROR
-        assert "HYSTGEN_REQUIRE_DATA is set, but there is no folder" in text
-        assert "passed" not in text

@@ -1,0 +1,90 @@
+"""The marks of the tests: what is left out where, and that it is counted."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CONFTEST = Path(__file__).with_name("conftest.py")
+OWN = ("CI", "HYSTGEN_REQUIRE_DATA", "HYSTGEN_WHOLE", "PYTEST_ADDOPTS")
+ONE_PROCESS_AND_XDIST = pytest.mark.parametrize("options", [(), ("-n", "1")], ids=["one process", "xdist"])
+
+
+def call(folder: Path, tests: str, *options: str, **environment: str) -> tuple[int, str]:
+    """Run these tests under the settings of the suite: exit code and what was printed."""
+    (folder / "conftest.py").write_text(CONFTEST.read_text())
+    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n  data: needs records\n  slow: long\n")
+    (folder / "test_few.py").write_text(tests)
+    kept = {k: x for k, x in os.environ.items() if k not in OWN}
+    command = [sys.executable, "-m", "pytest", "-v", "-p", "no:cacheprovider", *options, str(folder)]
+    done = subprocess.run(command, cwd=folder, env={**kept, **environment}, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+class TestData:
+    TESTS = (
+        "import pytest\n"
+        "@pytest.mark.data\n@pytest.mark.parametrize('k', [1, 2])\n"
+        "def test_measured(measured, k):\n    assert measured.is_dir()\n"
+        "def test_plain():\n    pass\n"
+    )
+
+    @ONE_PROCESS_AND_XDIST
+    @pytest.mark.parametrize("ci", [{}, {"CI": "true"}], ids=["here", "CI"])
+    def test_deselected_with_a_count_and_a_reason(
+        self, options: tuple[str, ...], ci: dict[str, str], tmp_path: Path
+    ) -> None:
+        code, text = call(tmp_path, self.TESTS, *options, HYSTGEN_DATA=str(tmp_path / "none"), **ci)
+        assert code == 0, text
+        assert f"2 tests deselected: marked data, and there is no folder {tmp_path / 'none'} of measured" in text
+        assert "1 passed" in text
+        assert "skipped" not in text
+
+    def test_run_where_there_are_records(self, tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, HYSTGEN_DATA=str(tmp_path))
+        assert code == 0, text
+        assert "3 passed" in text
+        assert "deselected" not in text
+
+    @pytest.mark.parametrize("ci", [{}, {"CI": "true"}], ids=["here", "CI"])
+    def test_an_error_where_they_are_required(self, ci: dict[str, str], tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, HYSTGEN_DATA=str(tmp_path / "none"), HYSTGEN_REQUIRE_DATA="1", **ci)
+        assert code == pytest.ExitCode.USAGE_ERROR
+        assert "HYSTGEN_REQUIRE_DATA is set, but there is no folder" in text
+        assert "passed" not in text
+
+
+class TestSlow:
+    TESTS = (
+        "import pytest\n"
+        "@pytest.mark.slow(one_in=2)\n"
+        "@pytest.mark.parametrize('engine', ['p', 'q'])\n@pytest.mark.parametrize('name', ['a', 'b', 'c'])\n"
+        "def test_two_lists(name, engine):\n    pass\n"
+        "@pytest.mark.slow(one_in=3)\n"
+        "@pytest.mark.parametrize(('name', 'k'), [('a', 0), ('a', 1), ('b', 0), ('b', 1), ('c', 0)])\n"
+        "def test_one_list(name, k):\n    pass\n"
+        "@pytest.mark.slow\ndef test_exhaustive():\n    pass\n"
+        "def test_plain():\n    pass\n"
+    )
+
+    @ONE_PROCESS_AND_XDIST
+    def test_some_cases_run_and_the_others_are_counted(self, options: tuple[str, ...], tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, *options, HYSTGEN_DATA=str(tmp_path))
+        assert code == 0, text
+        two_lists = {"test_two_lists[a-p]", "test_two_lists[b-q]", "test_two_lists[c-p]"}
+        assert set(re.findall(r"::(test_\w+(?:\[.*?\])?)", text)) == {
+            *two_lists, "test_one_list[a-0]", "test_one_list[b-1]", "test_plain",
+        }  # fmt: skip
+        assert "6 passed" in text
+        assert "7 tests deselected: marked slow; HYSTGEN_WHOLE=1 runs all" in text
+
+    def test_all_run_where_that_is_asked_for(self, tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, HYSTGEN_DATA=str(tmp_path), HYSTGEN_WHOLE="1")
+        assert code == 0, text
+        assert "13 passed" in text
+        assert "deselected" not in text
