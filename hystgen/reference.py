@@ -832,7 +832,7 @@ def inverse_commit(t: Tables, s: State, applied: Any) -> None:
     if not finite(t, applied):
         s.counts[STATUS] |= HELD
         return
-    v = clamp_drive(t, applied)
+    v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if v != applied:
         s.counts[STATUS] |= INPUT_CLAMPED
     if s.counts[TOLD]:  # where the limit leads says nothing of another drive

@@ -73,6 +73,78 @@ def test_bits_equal_where_corners_end_at_the_same_drive(name: str, arithmetic: s
     assert report.ok, report.table()
 
 
+# What was answered with other bits once: a range, thresholds, weights, more of the model, and calls
+TIES: dict[str, tuple[tuple[float, float], list[float], list[float], str, str]] = {
+    "a commit leads beyond what may be asked for": (
+        (-10, 10),
+        [0.5 * k for k in range(17)],
+        [0.7, *(0.2 / k for k in range(1, 17))],
+        "",
+        "commit -10 step -14.593748 step -12.064165 commit -7 step -12.161457061767578 step -11.18854 commit -10 "
+        "step -12.161458015441895 step 12.064165 commit 2.5 step 12.161458",
+    ),
+    "a reset to what gets a limit of the drive, then the same again": (
+        (0.9, 2.7),
+        [0, 0.3, 0.6, 0.9],
+        [0.05, 1, 0.5, 0],
+        "output_offset: -0.9083760373456218",
+        "reset -0.39237603545188904 step -0.39237603545188904 step 1.0866239070892334",
+    ),
+    "a drive of minus zero": (
+        (0, 18),
+        [0.3 * k for k in range(25)],
+        [0.05] + 24 * [0.1],
+        "initial_state: 14.805759137171366",
+        "step 36.47 commit 3.5514087677001953 step 36.14939498901367 commit -0.0 step -0.0 step 36.44397735595703",
+    ),
+    "the next play follows by the output and not by the way to the limit": (
+        (0, 7.2),
+        [0.3 * k for k in range(7)],
+        [0.7] + 6 * [0.1],
+        "",
+        "reset -0.8729999661445618 step 1.0499999523162842 step 4.364999771118164 commit 0.8999999761581421 "
+        "step 0.6299999952316284 step 6.389999866485596",
+    ),
+    "a commit behind what the limit of references gives": (
+        (1.2, 3.6),
+        [0, 0.3, 0.6, 0.9, 1.2],
+        [0.7, 0.2549066344143579, 0.22261852499022095, 0.7862042206858755, 0.21670804472704908],
+        "",
+        "reset 0.9155434370040894 commit 1.2000000476837158 step 3.794201135635376 step 3.794200897216797",
+    ),
+    "the same behind that answer sent twice": (
+        (2, 6),
+        [0, 0.25, 0.5, 0.75, 1],
+        [1, 0.890760003471881, 0.46941214252315566, 0.8374753991494686, 0.7138028196989812],
+        "",
+        "reset 9.62220573425293 step 9.62220573425293 commit 6 commit 2.75 step 9.62220573425293",
+    ),
+}
+OPERATIONS = {"step": reference.OP_STEP, "commit": reference.OP_COMMIT, "reset": reference.OP_RESET}
+
+
+def differing(one: Model, calls: signals.Calls, folder: Path) -> list[tuple[str, int, int]]:
+    """Builds for this machine, samples of each and how many have other bits than the reference."""
+    real = REALS["float32"]
+    record = comparison.expected_record(one.tables("float32", "corners"), real, True, calls)
+    files = sources.write(folder, one, emit_options(one, "inverse", "float32", "corners"))
+    rows = host.rows(files, lambda _: [record], real, ["gcc"], folder, lambda _: None)
+    return [(row.build, row.samples, row.different) for row in rows]
+
+
+@pytest.mark.parametrize("name", TIES)
+def test_bits_equal_where_rounding_once_decided_otherwise(name: str, tmp_path: Path) -> None:
+    ends, thresholds, weights, more, words = TIES[name]
+    pi = f"{{thresholds: {thresholds}, weights: {weights}{', ' + more if 'state' in more else ''}}}"
+    offset = f"  {more}\n" if "offset" in more else ""
+    text = f"hystgen: 1\nname: tie\ninput_range: {list(ends)}\nmodel:\n  pi: {pi}\n{offset}"
+    calls = words.split()
+    op = np.array([OPERATIONS[word] for word in calls[::2]], dtype=np.uint8)
+    x = np.array([float(word) for word in calls[1::2]], dtype=np.float32).astype(np.float64)
+    made = differing(Model(parse_parameters(text, "tie.yaml")), ("tie", op, x), tmp_path)
+    assert made == [(build, len(op), 0) for build, _ in host.BUILDS]
+
+
 def beside_limits(one: Model, length: int) -> signals.Calls:
     """Moves that end near a limit of the drive, and again within a few units in the last place of where they did."""
     rng = np.random.default_rng(17)
@@ -87,6 +159,9 @@ def beside_limits(one: Model, length: int) -> signals.Calls:
             x[i] = rng.choice([low, high, rng.uniform(low, high)])
         elif kind < 0.4:
             x[i] = before + int(rng.integers(-16, 17)) * np.spacing(before)
+        elif kind < 0.5:  # which a commit to an end of the range may lead beyond, by rounding
+            end = np.float32(rng.choice([least, most]))
+            x[i] = end + int(rng.integers(-3, 4)) * np.spacing(end)
         elif kind < 0.98:
             end = rng.choice([*one.cascade.swung, least, most])
             x[i] = end + rng.normal() * 10 ** rng.uniform(-4, 0) * (most - least)
@@ -102,12 +177,8 @@ def test_bits_equal_where_rounding_decides_on_a_limit(ends: tuple[float, float],
     pi = f"{{thresholds: {thresholds.tolist()}, weights: {weights.tolist()}}}"
     text = f"hystgen: 1\nname: ends\ninput_range: {list(ends)}\nmodel:\n  pi: {pi}\n"
     one = Model(parse_parameters(text, "ends.yaml"))
-    real = REALS["float32"]
-    calls = beside_limits(one, 60_000)
-    record = comparison.expected_record(one.tables("float32", "corners"), real, True, calls)
-    files = sources.write(tmp_path, one, emit_options(one, "inverse", "float32", "corners"))
-    rows = list(host.rows(files, lambda _: [record], real, ["gcc"], tmp_path, lambda _: None))
-    assert [(row.build, row.samples, row.different) for row in rows] == [(build, 60_000, 0) for build, _ in host.BUILDS]
+    made = differing(one, beside_limits(one, 60_000), tmp_path)
+    assert made == [(build, 60_000, 0) for build, _ in host.BUILDS]
 
 
 @pytest.mark.parametrize("layout", LAYOUTS[1:])

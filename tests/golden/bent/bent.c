@@ -360,7 +360,7 @@ void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied)
         self->status |= BENT_STATUS_HELD;
         return;
     }
-    v = bent_clamp_drive(applied);
+    v = bent_clamp_drive(applied) + 0; /* no drive is -0 */
     if (v < applied || v > applied) {
         self->status |= BENT_STATUS_INPUT_CLAMPED;
     }

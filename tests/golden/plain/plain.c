@@ -677,7 +677,7 @@ static const plain_tables_t plain_tables = {
 #define PLAIN_FAST_MOVE 1  /* between the edges it goes on with the present move */
 #define PLAIN_FAST_PLACE 2 /* where `pending` leads is known, and nothing of the move */
 #define PLAIN_FAST_LIMIT 3 /* `pending` is a limit of the drive */
-#define PLAIN_FAST_REST 4  /* `pending` is where rounding has left the drive */
+#define PLAIN_FAST_REST 4  /* `pending` answers `reference` alone: where rounding has left the drive, or what the limit of references gives */
 
 PLAIN_COPIES bool plain_finite(plain_real_t x)
 {
@@ -784,6 +784,9 @@ static void plain_inverse_expect(plain_inverse_t *self, plain_real_t v)
 
 /* The last answer once more where the actuator has come to something else; the place that is known is that of the
    memory, but for the number of its plays. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
 static plain_real_t plain_inverse_return(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
@@ -841,6 +844,18 @@ PLAIN_APART plain_real_t plain_inverse_stay(plain_inverse_t *self, plain_real_t 
     return plain_inverse_send(self, inside);
 }
 
+/* Answers with v, whose place is known; the same reference gets it again, any other one may turn there or go on. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_settle(plain_inverse_t *self, plain_real_t v)
+{
+    plain_inverse_expect(self, v);
+    self->fast = PLAIN_FAST_REST;
+    self->repeat = true;
+    return plain_inverse_answer(self, v);
+}
+
 /* A move by so little that rounding leaves the drive where it is, which may lie a little off the line that is followed:
    the next step goes on from there, unless it asks for the same again. */
 #if defined(__GNUC__)
@@ -850,10 +865,7 @@ static plain_real_t plain_inverse_rest(plain_inverse_t *self)
 {
     plain_memory_t *m = &self->memory;
     plain_copy_place(&m->there, &m->here);
-    plain_inverse_expect(self, m->w);
-    self->fast = PLAIN_FAST_REST;
-    self->repeat = true;
-    return plain_inverse_answer(self, m->w);
+    return plain_inverse_settle(self, m->w);
 }
 
 /* Where a move has ended, at v, which may be known to lie inside the range: from there samples are fast up to the
@@ -930,6 +942,39 @@ static plain_real_t plain_inverse_along(plain_inverse_t *self, plain_real_t v, b
     return plain_inverse_enter(self, v, rising, false);
 }
 
+#if !((defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)) /* where each operation is a call, this would cost as much as the search */
+/* Whether a move that turns, which has left its corner, ends before another play follows, as where a commit to a limit
+   of the drive has led beyond what may be asked for by rounding alone: then it is made, to *v, and no search is needed. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static bool plain_inverse_back(plain_inverse_t *self, unsigned int depth, bool rising, plain_real_t output,
+    plain_real_t *v)
+{
+    plain_memory_t *m = &self->memory;
+    plain_place_t *p = &m->there;
+    const plain_corner_t *c = &self->corner[depth - 1];
+    const plain_real_t r = plain_threshold[1] + plain_threshold[1];
+    const plain_real_t y = c->pass[!rising]; /* where it rises with its sign changed */
+    const plain_real_t z = plain_start_level[1] + plain_start_level[1] - y;
+    const plain_real_t x = rising ? output : -output;
+    const plain_real_t way = (x + y) * plain_reciprocal[1];
+    const plain_real_t w = rising ? c->extremum + way : c->extremum - way;
+    if (c->side != (rising ? 1 : -1) || !(x < z - 2.2984315e-05f && way < r && w >= PLAIN_DRIVE_MIN && w <= PLAIN_DRIVE_MAX)) {
+        return false;
+    }
+    p->anchor = c->extremum;
+    p->anchor_output = rising ? 0 - y : y;
+    p->next = rising ? c->extremum + r : c->extremum - r;
+    p->next_output = rising ? z : -z;
+    p->k = 1;
+    p->depth = (uint_least16_t)depth;
+    p->rising = rising;
+    *v = (rising ? w > m->w : w < m->w) ? plain_inverse_settle(self, w) : plain_inverse_rest(self);
+    return true;
+}
+#endif
+
 /* A move to u, which is what is asked for but for the limits, from where the memory is. */
 static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked, plain_real_t u)
 {
@@ -940,12 +985,18 @@ static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked
     plain_inverse_ask(self, asked, asked < u || asked > u ? PLAIN_STATUS_INPUT_CLAMPED : 0);
     self->status |= self->bits;
     if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
+#if !((defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__))
+        if (k == 1 && depth > 0 && (rising ? asked < u : asked > u)
+            && plain_inverse_back(self, depth, rising, u, &v)) {
+            return v;
+        }
+#endif
         v = rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
     } else {
         v = plain_inverse_along(self, v, rising);
     }
     if (self->fast == PLAIN_FAST_MOVE && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
-        plain_inverse_leave_fast(self);
+        return plain_inverse_settle(self, v);
     }
     return v;
 }
@@ -964,14 +1015,17 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
         if (self->has_pending) { /* what was sent last is what the actuator has seen */
             plain_inverse_see(self, self->pending);
         }
-        plain_copy_place(&self->memory.there, &self->memory.here);
         self->memory.there.k = 0;
     }
     self->has_pending = false;
     if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
         if (!plain_finite(u)) {
             self->status |= PLAIN_STATUS_HELD;
-            return self->repeat ? self->answer : plain_inverse_return(self);
+            if (self->repeat) {
+                return self->answer;
+            }
+            plain_copy_place(&self->memory.there, &self->memory.here);
+            return plain_inverse_return(self);
         }
         u = plain_clamp_reference(u);
     }
@@ -994,6 +1048,9 @@ static plain_real_t plain_inverse_odd_behind(plain_inverse_t *self)
 }
 
 /* What is no number, within a fast move. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
 static plain_real_t plain_inverse_odd(plain_inverse_t *self)
 {
     self->status |= PLAIN_STATUS_HELD;
@@ -1121,6 +1178,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
 {
     const plain_real_t output = u;
     const plain_place_t *p = &self->memory.there;
+    unsigned int depth;
     plain_real_t last;
     plain_real_t v;
     bool beyond;
@@ -1141,7 +1199,10 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         }
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v < self->pending) {
-            const unsigned int depth = plain_inverse_turn(self, u, 0, true);
+            if (u > PLAIN_OUTPUT_MAX) { /* a commit has led further still: what it is clamped to lies behind */
+                return plain_inverse_beyond(self, u);
+            }
+            depth = plain_inverse_turn(self, u, 0, true);
             return plain_inverse_fall(self, depth, 1, u);
         }
     } else {
@@ -1161,7 +1222,10 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         }
         v = p->anchor + (output - p->anchor_output) * self->gain;
         if (v > self->pending) {
-            const unsigned int depth = plain_inverse_turn(self, u, 0, false);
+            if (u < PLAIN_OUTPUT_MIN) { /* a commit has led further still: what it is clamped to lies behind */
+                return plain_inverse_beyond(self, u);
+            }
+            depth = plain_inverse_turn(self, u, 0, false);
             return plain_inverse_rise(self, depth, 1, u);
         }
     }
@@ -1194,8 +1258,7 @@ static plain_real_t plain_inverse_at_limit(plain_inverse_t *self, plain_real_t u
         const plain_real_t inside = plain_clamp_reference(u);
         const unsigned int bits = inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u;
         if (!(self->falling ? inside < self->edge[0] : inside > self->edge[0])) {
-            plain_inverse_expect(self, self->pending); /* mostly where rounding has led beyond */
-            return plain_inverse_look(self, u);
+            return plain_inverse_look(self, u); /* mostly where rounding has led beyond */
         }
         if (u < self->reference || u > self->reference) {
             plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED | bits);
@@ -1226,6 +1289,8 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         }
         if (self->fast == PLAIN_FAST_REST && u >= self->reference && u <= self->reference) {
             self->status |= self->bits;
+            plain_copy_place(&self->memory.here, &self->memory.there); /* the drive has come to it */
+            self->memory.w = self->pending;
             return self->pending;
         }
         if (!plain_finite(u)) {
@@ -1251,10 +1316,11 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
             self->memory.there.k = 0; /* it found nothing new */
         }
     }
-    if (self->fast > PLAIN_FAST_PLACE) {
+    if (self->fast == PLAIN_FAST_LIMIT || (self->fast == PLAIN_FAST_REST
+        && self->memory.there.k == self->memory.here.k && self->memory.there.rising == self->memory.here.rising)) {
         self->memory.there.k = 0; /* where a limit leads, or no move, says nothing of another drive */
     }
-    v = plain_clamp_drive(applied);
+    v = plain_clamp_drive(applied) + 0; /* no drive is -0 */
     if (v < applied || v > applied) {
         self->status |= PLAIN_STATUS_INPUT_CLAMPED;
     }

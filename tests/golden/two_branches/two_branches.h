@@ -1154,7 +1154,7 @@ void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real
         self->status |= TWO_BRANCHES_STATUS_HELD;
         return;
     }
-    v = two_branches_clamp_drive(applied);
+    v = two_branches_clamp_drive(applied) + 0; /* no drive is -0 */
     if (v < applied || v > applied) {
         self->status |= TWO_BRANCHES_STATUS_INPUT_CLAMPED;
     }
