@@ -782,24 +782,6 @@ static void plain_inverse_expect(plain_inverse_t *self, plain_real_t v)
     self->pending = v;
 }
 
-/* The last answer once more where the actuator has come to something else; the place that is known is that of the
-   memory, but for the number of its plays. */
-#if defined(__GNUC__)
-__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
-#endif
-static plain_real_t plain_inverse_return(plain_inverse_t *self)
-{
-    plain_memory_t *m = &self->memory;
-    if (!self->stepped) {
-        self->answer = plain_clamp_drive(self->applied);
-        self->stepped = true;
-    }
-    m->there.k = m->here.k;
-    plain_corners_go(&plain_tables, &self->memory, self->corner, self->answer, &m->there);
-    plain_inverse_expect(self, self->answer);
-    return self->answer;
-}
-
 /* Repeats the drive of a fast step, which the actuator has come to; the last reference still stands. */
 static plain_real_t plain_inverse_hold(plain_inverse_t *self)
 {
@@ -1001,6 +983,26 @@ static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked
     return v;
 }
 
+/* What is no number where the actuator has come to something else than the last answer, whose place is known: the last
+   answer once more. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_odd_behind(plain_inverse_t *self)
+{
+    plain_memory_t *m = &self->memory;
+    self->status |= PLAIN_STATUS_HELD;
+    plain_copy_place(&m->here, &m->there);
+    m->w = self->pending;
+    if (!self->stepped) {
+        self->answer = plain_clamp_drive(self->applied);
+        self->stepped = true;
+    }
+    plain_corners_go(&plain_tables, &self->memory, self->corner, self->answer, &m->there);
+    plain_inverse_expect(self, self->answer);
+    return self->answer;
+}
+
 /* Any sample, limits and what is no number included. */
 #if defined(__GNUC__)
 __attribute__((noinline))
@@ -1020,12 +1022,13 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
     self->has_pending = false;
     if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
         if (!plain_finite(u)) {
-            self->status |= PLAIN_STATUS_HELD;
             if (self->repeat) {
+                self->status |= PLAIN_STATUS_HELD;
                 return self->answer;
             }
             plain_copy_place(&self->memory.there, &self->memory.here);
-            return plain_inverse_return(self);
+            self->pending = self->memory.w;
+            return plain_inverse_odd_behind(self);
         }
         u = plain_clamp_reference(u);
     }
@@ -1034,17 +1037,6 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
         return plain_inverse_send(self, self->answer);
     }
     return plain_inverse_move(self, asked, u);
-}
-
-/* What is no number behind a commit. */
-#if defined(__GNUC__)
-__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
-#endif
-static plain_real_t plain_inverse_odd_behind(plain_inverse_t *self)
-{
-    self->status |= PLAIN_STATUS_HELD;
-    plain_inverse_take(self, self->pending);
-    return plain_inverse_return(self);
 }
 
 /* What is no number, within a fast move. */
