@@ -677,7 +677,7 @@ static const plain_tables_t plain_tables = {
 #define PLAIN_FAST_MOVE 1  /* between the edges it goes on with the present move */
 #define PLAIN_FAST_PLACE 2 /* where `pending` leads is known, and nothing of the move */
 #define PLAIN_FAST_LIMIT 3 /* `pending` is a limit of the drive */
-#define PLAIN_FAST_REST 4  /* `pending` answers `reference` alone: where rounding has left the drive, or what the limit of references gives */
+#define PLAIN_FAST_REST 4  /* `pending` answers `reference` alone, as where rounding has left the drive */
 
 PLAIN_COPIES bool plain_finite(plain_real_t x)
 {
