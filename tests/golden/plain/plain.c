@@ -792,7 +792,8 @@ static plain_real_t plain_inverse_hold(plain_inverse_t *self)
 }
 
 /* Answers with v, a limit of the drive whose place is known, so that the step behind it makes one move. References
-   beyond the one that it gives, by a little more than rounding can be, can get nothing else. */
+   beyond the one that it gives, by a little more than rounding can be, can get nothing else, and those that are as much
+   short of it something else: the edge. */
 static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
 {
     plain_memory_t *m = &self->memory;
@@ -803,7 +804,7 @@ static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
     }
     edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
     self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
-    edge = self->falling ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
+    edge = self->falling ? edge + 2.2984315e-05f : edge - 2.2984315e-05f;
     self->edge[0] = edge;
     self->edge[1] = edge;
     self->fast = PLAIN_FAST_LIMIT;
@@ -1249,8 +1250,12 @@ static plain_real_t plain_inverse_at_limit(plain_inverse_t *self, plain_real_t u
     } else {
         const plain_real_t inside = plain_clamp_reference(u);
         const unsigned int bits = inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u;
-        if (!(self->falling ? inside < self->edge[0] : inside > self->edge[0])) {
-            return plain_inverse_look(self, u); /* mostly where rounding has led beyond */
+        bool other = !(self->falling ? inside < self->edge[0] : inside > self->edge[0]);
+        if (!other && !(self->falling ? inside < self->edge[0] - 3 * 2.2984315e-05f : inside > self->edge[0] + 3 * 2.2984315e-05f)) {
+            other = u < self->reference || u > self->reference; /* rounding decides, unless it is the same again */
+        }
+        if (other) {
+            return plain_inverse_look(self, u);
         }
         if (u < self->reference || u > self->reference) {
             plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED | bits);
