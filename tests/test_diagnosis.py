@@ -473,6 +473,34 @@ def test_every_other_threshold_leaves_hardly_more(plays: int, curve: float | Non
     assert structure.rms(rough.errors([item])) < (0.02 if plays > 1 else 1e-9) * np.ptp(item.y)
 
 
+def _bent(folder: Path, codes: float, metres: float) -> dict[str, Any]:
+    """What a bent front leaves, of a drive and an output in other units than V and um."""
+    records = []
+    for number in range(1, 6):
+        v = wander(number, turns=40)
+        y = noisy(brute_output(100.0 * np.tanh(0.01 * v), (0.0, 10.0, 25.0), (1.0, 0.5, 0.3), 0.0), 0.05, number)
+        records.append(record(v * codes, y * metres, f"record {number}"))
+    (folder / "stage.yaml").write_text(
+        f"hystgen: 1\nname: stage\ninput_range: [0, {100.0 * codes}]\nmodel:\n  pi:\n"
+        f"    thresholds: [0, {10.0 * codes}, {25.0 * codes}]\n"
+        f"    weights: [{metres / codes}, {0.5 * metres / codes}, {0.3 * metres / codes}]\n"
+    )
+    content: dict[str, Any] = hystgen.diagnose(
+        folder / "stage.yaml", records[:3], holdout=records[3:], history=[0.0]
+    ).content
+    return content
+
+
+@pytest.mark.parametrize(("codes", "metres"), [(436.9, 1e-6), (1e-6, 1e6)])
+def test_units_do_not_matter(codes: float, metres: float, tmp_path: Path) -> None:
+    """A drive in codes of a converter and an output in metres hide nothing that V and um show."""
+    plain, other = _bent(tmp_path, 1.0, 1.0), _bent(tmp_path, codes, metres)
+    assert [effect["name"] for effect in other["effects"]] == [effect["name"] for effect in plain["effects"]]
+    assert [effect["name"] for effect in other["effects"]] == ["asymmetry"]
+    # what a search of either ends with can still be lowered by 1e-5 of itself, or by a share of one sample
+    assert other["gap"]["after"]["holdout"] == pytest.approx(plain["gap"]["after"]["holdout"] * metres, rel=1e-3)
+
+
 def test_stops_that_are_not_centred_and_give(tmp_path: Path) -> None:
     """Met from one side on, behind the plays: no front and no limit that is the same at both ends explains it."""
     lower, upper, give = -5.0, 118.0, 0.3

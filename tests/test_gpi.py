@@ -185,6 +185,22 @@ class TestTanh:
         assert report.ok, report.table()
 
 
+@pytest.mark.parametrize(("volts", "metres"), [(436.9, 1e-6), (1e6, 1e-9), (1e-6, 1e6)])
+@pytest.mark.parametrize(("front", "kind"), [(bent, "gpi-deadzone"), (branched, "gpi-tanh")])
+def test_units_do_not_matter(
+    front: Callable[[Array], Array], kind: str, volts: float, metres: float
+) -> None:
+    """A drive in codes of a converter and an output in metres are as good as V and um.
+
+    The sum of squares is flat about its minimum, so that an error tells whether it was found: a search ends where the
+    last step lowered it by less than a noise that is 0.1 % of the output can show.
+    """
+    v, y = plant(front, 3)
+    plain, other = (hystgen.identify(r, model=kind) for r in (record(v, y), record(v * volts, y * metres)))
+    assert len(other.parameters.model.pi.thresholds) == len(plain.parameters.model.pi.thresholds)
+    assert [x.rms_percent for x in other.rows] == pytest.approx([x.rms_percent for x in plain.rows], rel=5e-3)
+
+
 class TestAuto:
     @pytest.mark.parametrize(
         ("front", "kind"),

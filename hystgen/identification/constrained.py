@@ -17,7 +17,7 @@ RIDGE = 1e-7
 """Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
 
 STILL = 1e-9
-"""A column of less than this share of the longest one is rounding and nothing else."""
+"""A column of less than this share of the longest one, in the same unit, is rounding and nothing else."""
 
 INFEASIBLE = 1e-10
 
@@ -26,18 +26,22 @@ class InfeasibleError(ValueError):
     """The inequalities contradict each other."""
 
 
-def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array) -> Array:
+def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, plays: int = 0) -> Array:
     """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
 
-    `matrix`: (rows, k); `bounds`: (inequalities, k). Where the matrix does not determine x the shortest one, in the
-    measure of its columns, is taken. Raises InfeasibleError.
+    `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: the first so many columns have a unit of their own, the
+    others that of the target. Where the matrix does not determine x the shortest one, in the measure of its columns, is
+    taken. Raises InfeasibleError.
     """
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
 
     k = matrix.shape[1]
     size = np.linalg.norm(matrix, axis=0)
-    idle = size <= STILL * np.max(size)
+    alike, reach = size.copy(), float(np.linalg.norm(target))
+    if reach > 0.0 and np.any(size[:plays]):
+        alike[:plays] *= reach / np.max(size[:plays])
+    idle = alike <= STILL * np.max(alike)
     size[idle] = 1.0
     stacked = np.concatenate([np.where(idle, 0.0, matrix / size), RIDGE * np.eye(k)])
     q, triangle = np.linalg.qr(stacked)

@@ -209,7 +209,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     bounds.append(np.concatenate([np.zeros(k), -length[:-1] / length[-1]]))
     limits.append(least - (high - low) / length[-1])
     try:
-        solution = constrained.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits))
+        solution = constrained.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
     except constrained.InfeasibleError:
         return None
     slopes = np.append(solution[k:], ((high - low) - float(length[:-1] @ solution[k:])) / length[-1])

@@ -225,7 +225,7 @@ def solve_linear(
     matrix, target = system[:, :-1], system[:, -1]
     tied = np.zeros((m, k + m))
     size = np.linalg.norm(matrix[:, k:], axis=0)
-    tied[:, k:] = np.diag(np.sqrt(damping) * np.maximum(size, 1e-12))
+    tied[:, k:] = np.diag(np.sqrt(damping) * np.maximum(size, 1e-12 * float(np.linalg.norm(target))))
     low, high = limits.bounds
     bounds, least = constrained.at_least(
         np.concatenate([np.zeros(k), low - shape]), np.concatenate([np.full(k, np.inf), high - shape])
@@ -240,6 +240,6 @@ def solve_linear(
         bounds = np.concatenate([bounds, np.concatenate([np.zeros((len(slack), k)), slope], axis=1)])
         least = np.concatenate([least, np.minimum(-slack, 0.0)])
     solution = constrained.least_squares(
-        np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least
+        np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least, k
     )
     return solution[k:], solution[:k]
