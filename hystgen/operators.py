@@ -19,37 +19,54 @@ from hystgen.checks import samples
 Array = NDArray[np.float64]
 
 
+def _followed(state: float, x: float, r: float) -> float:
+    low = x - r
+    high = x + r
+    if state > high:
+        state = high
+    if state < low:
+        state = low
+    return state
+
+
 def _play_into(v: Array, r: float, state: float, out: Array) -> float:
     for k in range(len(v)):
-        low = v[k] - r
-        high = v[k] + r
-        if state > high:
-            state = high
-        if state < low:
-            state = low
+        state = _followed(state, v[k], r)
         out[k] = state
     return state
 
 
 def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
-    for i in range(len(r)):
+    # Four side by side, since each by itself waits for its own last sample
+    fours = len(r) // 4 * 4
+    for i in range(0, fours, 4):
+        r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
+        s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
+        for k in range(len(v)):
+            s0, s1 = _followed(s0, v[k], r0), _followed(s1, v[k], r1)
+            s2, s3 = _followed(s2, v[k], r2), _followed(s3, v[k], r3)
+            out[i, k], out[i + 1, k], out[i + 2, k], out[i + 3, k] = s0, s1, s2, s3
+    for i in range(fours, len(r)):
         _play_into(v, r[i], states[i], out[i])
 
 
 def _play_sum_into(v: Array, r: Array, states: Array, p: Array, out: Array) -> None:
     for k in range(len(v)):
         out[k] = 0.0
-    for i in range(len(r)):
-        if p[i] != 0.0:
-            state = states[i]
-            for k in range(len(v)):
-                low = v[k] - r[i]
-                high = v[k] + r[i]
-                if state > high:
-                    state = high
-                if state < low:
-                    state = low
-                out[k] += p[i] * state
+    fours = len(r) // 4 * 4
+    for i in range(0, fours, 4):
+        r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
+        s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
+        p0, p1, p2, p3 = p[i], p[i + 1], p[i + 2], p[i + 3]
+        for k in range(len(v)):
+            s0, s1 = _followed(s0, v[k], r0), _followed(s1, v[k], r1)
+            s2, s3 = _followed(s2, v[k], r2), _followed(s3, v[k], r3)
+            out[k] = out[k] + p0 * s0 + p1 * s1 + p2 * s2 + p3 * s3
+    for i in range(fours, len(r)):
+        state = states[i]
+        for k in range(len(v)):
+            state = _followed(state, v[k], r[i])
+            out[k] += p[i] * state
 
 
 def _weighted_into(p: Array, rows: Array, out: Array) -> None:
@@ -72,7 +89,7 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED: list[Callable[..., Any]] = [_play_into, _plays_into, _play_sum_into, _weighted_into, _stop_into]
+COMPILED: list[Callable[..., Any]] = [_followed, _play_into, _plays_into, _play_sum_into, _weighted_into, _stop_into]
 
 
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
@@ -108,7 +125,8 @@ def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array
     """`weights @ plays(v, thresholds, start)`, without the plays of weight 0."""
     signal = samples(v)
     out = np.empty_like(signal)
-    compiled.operators()._play_sum_into(signal, thresholds, start, weights, out)
+    some = np.flatnonzero(weights)
+    compiled.operators()._play_sum_into(signal, thresholds[some], start[some], weights[some], out)
     return out
 
 

@@ -74,7 +74,13 @@ def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -
         return np.full(len(thresholds), v[0])
     if not history:
         return np.zeros(len(thresholds))
-    return np.ascontiguousarray(operators.plays(history, thresholds, 0.0)[:, -1])
+    return _behind(tuple(history), thresholds.tobytes()).copy()
+
+
+@functools.lru_cache(maxsize=256)
+def _behind(history: tuple[float, ...], thresholds: bytes) -> Array:
+    """Virgin plays behind a history; a search asks for those of the same few again and again."""
+    return operators.plays(history, np.frombuffer(thresholds), 0.0)[:, -1]
 
 
 def settled(v: Array, reach: float) -> int:
