@@ -248,11 +248,15 @@ HYSTGEN_COPIES void hystgen_corners_turn(const hystgen_tables_t *t, hystgen_memo
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
+    bool far;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         hystgen_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
+        far = hystgen_past(w, (hystgen_reach_t)hystgen_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+    } else {
+        far = depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising)) {
+    if (far) {
         k = 2; /* right at its activation it would not follow yet */
         depth = hystgen_find_by_input(t, corner, depth, &k, w, rising, false);
     }

@@ -341,11 +341,15 @@ static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
+    bool far;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         curved_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
+        far = curved_past(w, (curved_reach_t)curved_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+    } else {
+        far = depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising)) {
+    if (far) {
         k = 2; /* right at its activation it would not follow yet */
         depth = curved_find_by_input(t, corner, depth, &k, w, rising, false);
     }

@@ -316,11 +316,15 @@ PLAIN_COPIES void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m,
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
+    bool far;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         plain_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
+        far = plain_past(w, plain_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+    } else {
+        far = depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising)) {
+    if (far) {
         k = 2; /* right at its activation it would not follow yet */
         depth = plain_find_by_input(t, corner, depth, &k, w, rising, false);
     }

@@ -597,11 +597,15 @@ TWO_BRANCHES_COPIES void two_branches_corners_turn(const two_branches_tables_t *
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
+    bool far;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         two_branches_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
+        far = two_branches_past(w, two_branches_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+    } else {
+        far = depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising)) {
+    if (far) {
         k = 2; /* right at its activation it would not follow yet */
         depth = two_branches_find_by_input(t, corner, depth, &k, w, rising, false);
     }
