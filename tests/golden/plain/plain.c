@@ -786,18 +786,27 @@ static void plain_inverse_expect(plain_inverse_t *self, plain_real_t v)
     self->pending = v;
 }
 
-/* Repeats the drive of a fast step, which the actuator has come to; the last reference still stands. */
-static plain_real_t plain_inverse_hold(plain_inverse_t *self)
+/* The last answer once more, which the actuator has come to, and the status it has. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_again(plain_inverse_t *self, unsigned int bits)
 {
     plain_copy_place(&self->memory.here, &self->memory.there);
     self->memory.w = self->pending;
-    self->reference = self->edge[self->falling];
+    self->status |= bits;
     return self->pending;
 }
 
+/* The same of a fast step; the last reference still stands. */
+static plain_real_t plain_inverse_hold(plain_inverse_t *self, unsigned int bits)
+{
+    self->reference = self->edge[self->falling];
+    return plain_inverse_again(self, bits);
+}
+
 /* Answers with v, a limit of the drive whose place is known, so that the step behind it makes one move. References
-   beyond the one that it gives, by a little more than rounding can be, can get nothing else, and those that are as much
-   short of it something else: the edge. */
+   beyond the one that it gives, by a little more than rounding can be, can get nothing else: the edge. */
 static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
 {
     plain_memory_t *m = &self->memory;
@@ -808,7 +817,7 @@ static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
     }
     edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
     self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
-    edge = self->falling ? edge + 2.2984315e-05f : edge - 2.2984315e-05f;
+    edge = self->falling ? edge - 2 * 2.2984315e-05f : edge + 2 * 2.2984315e-05f;
     self->edge[0] = edge;
     self->edge[1] = edge;
     self->fast = PLAIN_FAST_LIMIT;
@@ -930,17 +939,19 @@ static plain_real_t plain_inverse_along(plain_inverse_t *self, plain_real_t v, b
 }
 
 #if !((defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)) /* where each operation is a call, this would cost as much as the search */
-/* Whether a move that turns, which has left its corner, ends before another play follows, as where a commit to a limit
-   of the drive has led beyond what may be asked for by rounding alone: then it is made, to *v, and no search is needed. */
+/* A move that turns, which has left its corner, for what is asked for beyond u. Mostly it ends before another play
+   follows, as where a commit to a limit of the drive has led beyond what may be asked for by rounding alone: then no
+   search is needed. */
 #if defined(__GNUC__)
 __attribute__((noinline)) /* so that not all that it needs is on the stack at once */
 #endif
-static bool plain_inverse_back(plain_inverse_t *self, unsigned int depth, bool rising, plain_real_t output,
-    plain_real_t *v)
+static plain_real_t plain_inverse_back(plain_inverse_t *self, unsigned int depth, bool rising,
+    plain_real_t u)
 {
     plain_memory_t *m = &self->memory;
     plain_place_t *p = &m->there;
     const plain_corner_t *c = &self->corner[depth - 1];
+    const plain_real_t output = u;
     const plain_real_t r = plain_threshold[1] + plain_threshold[1];
     const plain_real_t y = c->pass[!rising]; /* where it rises with its sign changed */
     const plain_real_t z = plain_start_level[1] + plain_start_level[1] - y;
@@ -948,7 +959,7 @@ static bool plain_inverse_back(plain_inverse_t *self, unsigned int depth, bool r
     const plain_real_t way = (x + y) * plain_reciprocal[1];
     const plain_real_t w = rising ? c->extremum + way : c->extremum - way;
     if (c->side != (rising ? 1 : -1) || !(x < z - 2.2984315e-05f && way < r && w >= PLAIN_DRIVE_MIN && w <= PLAIN_DRIVE_MAX)) {
-        return false;
+        return rising ? plain_inverse_rise(self, depth, 1, u) : plain_inverse_fall(self, depth, 1, u);
     }
     p->anchor = c->extremum;
     p->anchor_output = rising ? 0 - y : y;
@@ -957,31 +968,42 @@ static bool plain_inverse_back(plain_inverse_t *self, unsigned int depth, bool r
     p->k = 1;
     p->depth = (uint_least16_t)depth;
     p->rising = rising;
-    *v = (rising ? w > m->w : w < m->w) ? plain_inverse_settle(self, w) : plain_inverse_rest(self);
-    return true;
+    return (rising ? w > m->w : w < m->w) ? plain_inverse_settle(self, w) : plain_inverse_rest(self);
 }
 #endif
 
-/* A move to u, which is what is asked for but for the limits, from where the memory is. */
-static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t asked, plain_real_t u)
+/* A move to u from where the memory is; what is asked for is the reference, which may lie beyond u. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_move(plain_inverse_t *self, plain_real_t u)
 {
     unsigned int depth;
     unsigned int k;
     bool rising;
     plain_real_t v;
-    plain_inverse_ask(self, asked, asked < u || asked > u ? PLAIN_STATUS_INPUT_CLAMPED : 0);
-    self->status |= self->bits;
-    if (plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
-#if !((defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__))
-        if (k == 1 && depth > 0 && (rising ? asked < u : asked > u)
-            && plain_inverse_back(self, depth, rising, u, &v)) {
-            return v;
-        }
-#endif
-        v = rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
-    } else {
-        v = plain_inverse_along(self, v, rising);
+    if (!plain_corners_begin(&plain_tables, &self->memory, self->corner, u, &depth, &k, &rising, &v)) {
+        return plain_inverse_along(self, v, rising);
     }
+#if !((defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__))
+    if (k == 1 && depth > 0 && (rising ? self->reference < u : self->reference > u)) {
+        return plain_inverse_back(self, depth, rising, u);
+    }
+#endif
+    return rising ? plain_inverse_rise(self, depth, k, u) : plain_inverse_fall(self, depth, k, u);
+}
+
+/* A move for a reference beyond the range, which leads to the end u of what may be asked for. */
+#if defined(__GNUC__)
+__attribute__((noinline)) /* so that not all that it needs is on the stack at once */
+#endif
+static plain_real_t plain_inverse_move_beyond(plain_inverse_t *self, plain_real_t asked,
+    plain_real_t u)
+{
+    plain_real_t v;
+    plain_inverse_ask(self, asked, PLAIN_STATUS_INPUT_CLAMPED);
+    self->status |= PLAIN_STATUS_INPUT_CLAMPED;
+    v = plain_inverse_move(self, u);
     if (self->fast == PLAIN_FAST_MOVE && (self->falling ? asked > u : asked < u)) { /* what is asked for lies behind */
         return plain_inverse_settle(self, v);
     }
@@ -1014,7 +1036,6 @@ __attribute__((noinline))
 #endif
 static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
 {
-    const plain_real_t asked = u;
     if (self->fast != PLAIN_FAST_NOTHING) {
         plain_inverse_leave_fast(self);
         plain_inverse_take(self, self->pending);
@@ -1025,23 +1046,24 @@ static plain_real_t plain_inverse_look(plain_inverse_t *self, plain_real_t u)
         self->memory.there.k = 0;
     }
     self->has_pending = false;
-    if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
-        if (!plain_finite(u)) {
-            if (self->repeat) {
-                self->status |= PLAIN_STATUS_HELD;
-                return self->answer;
-            }
-            plain_copy_place(&self->memory.there, &self->memory.here);
-            self->pending = self->memory.w;
-            return plain_inverse_odd_behind(self);
-        }
-        u = plain_clamp_reference(u);
-    }
-    if (self->repeat && !(asked < self->reference) && !(asked > self->reference)) {
+    if (self->repeat && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
         return plain_inverse_send(self, self->answer);
     }
-    return plain_inverse_move(self, asked, u);
+    if (u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX) {
+        plain_inverse_ask(self, u, 0);
+        return plain_inverse_move(self, u);
+    }
+    if (plain_finite(u)) {
+        return plain_inverse_move_beyond(self, u, plain_clamp_reference(u));
+    }
+    if (self->repeat) {
+        self->status |= PLAIN_STATUS_HELD;
+        return self->answer;
+    }
+    plain_copy_place(&self->memory.there, &self->memory.here);
+    self->pending = self->memory.w;
+    return plain_inverse_odd_behind(self);
 }
 
 /* What is no number, within a fast move. */
@@ -1050,8 +1072,7 @@ __attribute__((noinline)) /* so that not all that it needs is on the stack at on
 #endif
 static plain_real_t plain_inverse_odd(plain_inverse_t *self)
 {
-    self->status |= PLAIN_STATUS_HELD;
-    return plain_inverse_hold(self);
+    return plain_inverse_hold(self, PLAIN_STATUS_HELD);
 }
 
 /* Where a fast move, which was rising or not, turns back for what is asked: leaves its corner, and returns how many hold
@@ -1102,7 +1123,7 @@ PLAIN_COPIES plain_real_t plain_inverse_turn_beyond(plain_inverse_t *self, plain
 static plain_real_t plain_inverse_beyond(plain_inverse_t *self, plain_real_t u)
 {
     plain_inverse_take(self, self->pending);
-    return plain_inverse_move(self, u, self->memory.here.rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
+    return plain_inverse_move_beyond(self, u, self->memory.here.rising ? PLAIN_OUTPUT_MAX : PLAIN_OUTPUT_MIN);
 }
 
 /* Where a fast move goes on to `output` and takes just one more play of the same corner along, as it mostly does: the
@@ -1236,8 +1257,7 @@ static plain_real_t plain_inverse_next(plain_inverse_t *self, plain_real_t u)
         : last < PLAIN_OUTPUT_MIN && PLAIN_OUTPUT_MIN > p->next_output))) {
         /* the last answer once more, for the same reference or one with the same limit; the drive has come to it */
         self->edge[self->falling] = u;
-        self->status |= self->bits;
-        return plain_inverse_hold(self);
+        return plain_inverse_hold(self, self->bits);
     }
     return beyond ? plain_inverse_beyond(self, u) : plain_inverse_look(self, u);
 }
@@ -1248,27 +1268,33 @@ __attribute__((noinline)) /* so that not all that it needs is on the stack at on
 #endif
 static plain_real_t plain_inverse_at_limit(plain_inverse_t *self, plain_real_t u)
 {
-    plain_memory_t *m = &self->memory;
+    plain_real_t inside = u;
+    unsigned int bits = 0;
     if (!plain_finite(u)) {
-        self->status |= PLAIN_STATUS_HELD;
-    } else {
-        const plain_real_t inside = plain_clamp_reference(u);
-        const unsigned int bits = inside < u || inside > u ? PLAIN_STATUS_INPUT_CLAMPED : 0u;
-        bool other = !(self->falling ? inside < self->edge[0] : inside > self->edge[0]);
-        if (!other && !(self->falling ? inside < self->edge[0] - 3 * 2.2984315e-05f : inside > self->edge[0] + 3 * 2.2984315e-05f)) {
-            other = u < self->reference || u > self->reference; /* rounding decides, unless it is the same again */
-        }
-        if (other) {
-            return plain_inverse_look(self, u);
-        }
-        if (u < self->reference || u > self->reference) {
-            plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED | bits);
-        }
-        self->status |= self->bits;
+        return plain_inverse_again(self, PLAIN_STATUS_HELD);
     }
-    plain_copy_place(&m->here, &m->there); /* the drive has come to the limit, and stays there */
-    m->w = self->pending;
-    return self->pending;
+    if (u < PLAIN_OUTPUT_MIN) {
+        inside = PLAIN_OUTPUT_MIN;
+        bits = PLAIN_STATUS_INPUT_CLAMPED;
+    } else if (u > PLAIN_OUTPUT_MAX) {
+        inside = PLAIN_OUTPUT_MAX;
+        bits = PLAIN_STATUS_INPUT_CLAMPED;
+    } else {
+        /* as it is */
+    }
+    if (self->falling ? inside < self->edge[0] : inside > self->edge[0]) {
+        plain_inverse_ask(self, u, PLAIN_STATUS_OUTPUT_CLAMPED | bits);
+        return plain_inverse_again(self, self->bits);
+    }
+    if (u >= self->reference && u <= self->reference) { /* near the edge rounding decides about any other */
+        return plain_inverse_again(self, self->bits);
+    }
+    plain_inverse_take(self, self->pending);
+    if (bits != 0) {
+        return plain_inverse_move_beyond(self, u, inside);
+    }
+    plain_inverse_ask(self, u, 0);
+    return plain_inverse_move(self, u);
 }
 
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
