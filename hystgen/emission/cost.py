@@ -40,7 +40,10 @@ _STRUCTS = {"dead_zone_t": 28}  # of pointers and counts
 def _constants(text: str, real: int, fixed: bool) -> int:
     """Bytes of the constants that the C text defines, alignment left out."""
     total = 0
-    for kind, size in re.findall(r"^static const (\w+) \w+(?:\[(\d+)\])? = ", text, flags=re.MULTILINE):
+    found = re.findall(r"^static const (\w+) \w+(?:\[(\d+)\])? = ", text, flags=re.MULTILINE)
+    for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
+        found += re.findall(r"^    (\w+) \w+\[(\d+)\];", members, flags=re.MULTILINE)
+    for kind, size in found:
         own = next((width for ending, width in _STRUCTS.items() if kind.endswith(ending)), None)
         if kind.endswith("envelope_t"):
             own = 7 * real

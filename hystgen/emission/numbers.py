@@ -10,7 +10,7 @@ import numpy as np
 
 from hystgen import fixed, fixed_tables, reference, tables
 from hystgen.bounds import error_bounds, straight_margin
-from hystgen.emission.text import literal, operand, table
+from hystgen.emission.text import literal, operand, structure, table
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
 from hystgen.params import Parameters
@@ -50,7 +50,7 @@ def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
 
 
 def _arrays(
-    numbers: Tables | FixedTables, name: str, columns: Sequence[tuple[str, str, str, bool]]
+    numbers: FixedTables, name: str, columns: Sequence[tuple[str, str, str, bool]]
 ) -> tuple[list[str], list[str]]:
     """Tables as text, and the pointers to them: NULL for those that nothing reads."""
     arrays, pointers = [], []
@@ -67,18 +67,20 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     numbers = tables.build_float(cascade, options.arithmetic, options.engine, True, True)
     dtype = numbers.threshold.dtype.type
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
-    arrays, pointers = _arrays(
-        numbers,
-        name,
-        [
-            ("threshold", "threshold", real_t, True),
-            ("weight", "weight", real_t, not corners),
-            ("slope", "slope", real_t, corners),
-            ("lift", "lift", real_t, options.inverse and not corners),
-            ("start_level", "start_level", real_t, corners),
-            ("inverse_slope", "reciprocal", real_t, options.inverse),
-        ],
-    )
+    # what a search reads first: of long tables those behind are farther from the first than an instruction reaches
+    columns: list[tuple[str, str, bool]] = [
+        ("threshold", "threshold", True),
+        ("start_level", "start_level", corners),
+        ("inverse_slope", "reciprocal", options.inverse),
+        ("slope", "slope", corners),
+        ("weight", "weight", not corners),
+        ("lift", "lift", options.inverse and not corners),
+    ]
+    used = {field: own for field, own, wanted in columns if wanted}
+    members = [(own, list(getattr(numbers, field))) for field, own in used.items()]
+    arrays = [structure(real_t, f"{name}_play", members)]
+    fields = ("threshold", "weight", "slope", "lift", "start_level", "inverse_slope")
+    pointers = [f"{name}_play.{used[field]}" if field in used else "NULL" for field in fields]
     pointers.append(literal(numbers.lift[-1]))
     if len(numbers.start) > 1:
         arrays.append(table(real_t, f"{name}_start", list(numbers.start)))

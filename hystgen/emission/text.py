@@ -25,12 +25,28 @@ def operand(x: Any) -> str:
     return f"({text})" if text.startswith("-") else text
 
 
+def _wrapped(values: Sequence[Any], suffix: str, indent: str) -> list[str]:
+    """Lines of literals."""
+    lines = [indent]
+    for i, value in enumerate(values):
+        item = " " + literal(value) + suffix + ("," if i + 1 < len(values) else "")
+        if len(lines[-1]) + len(item) > WIDTH:
+            lines.append(indent)
+        lines[-1] += item
+    return lines
+
+
 def table(kind: str, name: str, values: Sequence[Any]) -> str:
     """A constant array of literals."""
-    lines = [f"static const {kind} {name}[{len(values)}] = {{", "   "]
-    for i, value in enumerate(values):
-        item = " " + literal(value) + ("u" if kind == "uint32_t" else "") + ("," if i + 1 < len(values) else "")
-        if len(lines[-1]) + len(item) > WIDTH:
-            lines.append("   ")
-        lines[-1] += item
-    return "\n".join([*lines, "};"]) + "\n"
+    lines = _wrapped(values, "u" if kind == "uint32_t" else "", "   ")
+    return "\n".join([f"static const {kind} {name}[{len(values)}] = {{", *lines, "};"]) + "\n"
+
+
+def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Any]]]) -> str:
+    """Constant arrays of literals in one structure, so that compilers reach all of them from one address."""
+    members = [f"    {kind} {own}[{len(values)}];" for own, values in columns]
+    lines = []
+    for i, (own, values) in enumerate(columns):
+        end = "    }" + ("," if i + 1 < len(columns) else "")
+        lines += [f"    {{ /* {own} */", *_wrapped(values, "", "       "), end]
+    return "\n".join(["static const struct {", *members, f"}} {name} = {{", *lines, "};"]) + "\n"

@@ -137,27 +137,31 @@ static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *pl
     return (output - tail) * t->inverse_slope[1];
 }
 
-static const bent_real_t bent_threshold[7] = {
-    0.0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7
-};
-
-static const bent_real_t bent_weight[7] = {
-    0.72, 0.6, 0.48, 0.36, 0.24, 0.12, 0.012
-};
-
-static const bent_real_t bent_lift[8] = {
-    0.0, 0.0, 0.27, 0.702, 1.188, 1.62, 1.8900000000000001, 1.9224
-};
-
-static const bent_real_t bent_reciprocal[8] = {
-    0.0, 1.3888888888888888, 0.7575757575757577, 0.5555555555555556, 0.4629629629629629, 0.4166666666666667,
-    0.3968253968253968, 0.3949447077409163
+static const struct {
+    bent_real_t threshold[7];
+    bent_real_t reciprocal[8];
+    bent_real_t weight[7];
+    bent_real_t lift[8];
+} bent_play = {
+    { /* threshold */
+        0.0, 0.45, 0.9, 1.35, 1.8, 2.25, 2.7
+    },
+    { /* reciprocal */
+        0.0, 1.3888888888888888, 0.7575757575757577, 0.5555555555555556, 0.4629629629629629,
+        0.4166666666666667, 0.3968253968253968, 0.3949447077409163
+    },
+    { /* weight */
+        0.72, 0.6, 0.48, 0.36, 0.24, 0.12, 0.012
+    },
+    { /* lift */
+        0.0, 0.0, 0.27, 0.702, 1.188, 1.62, 1.8900000000000001, 1.9224
+    }
 };
 
 /* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; the
    whole sum of weight times threshold; plays without r_0 */
 static const bent_tables_t bent_tables = {
-    bent_threshold, bent_weight, NULL, bent_lift, NULL, bent_reciprocal, 1.9224, 6
+    bent_play.threshold, bent_play.weight, NULL, bent_play.lift, NULL, bent_play.reciprocal, 1.9224, 6
 };
 
 /* the straight pieces of the dead-zone sum */

@@ -654,26 +654,30 @@ static bool plain_corners_begin(const plain_tables_t *t, plain_memory_t *m, plai
     return true;
 }
 
-static const plain_real_t plain_threshold[7] = {
-    0.0f, 0.45f, 0.9f, 1.35f, 1.8f, 2.25f, 2.7f
-};
-
-static const plain_real_t plain_slope[8] = {
-    0.0f, 0.72f, 1.32f, 1.8f, 2.16f, 2.4f, 2.52f, 2.532f
-};
-
-static const plain_real_t plain_start_level[7] = {
-    0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
-};
-
-static const plain_real_t plain_reciprocal[8] = {
-    0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
+static const struct {
+    plain_real_t threshold[7];
+    plain_real_t start_level[7];
+    plain_real_t reciprocal[8];
+    plain_real_t slope[8];
+} plain_play = {
+    { /* threshold */
+        0.0f, 0.45f, 0.9f, 1.35f, 1.8f, 2.25f, 2.7f
+    },
+    { /* start_level */
+        0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
+    },
+    { /* reciprocal */
+        0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
+    },
+    { /* slope */
+        0.0f, 0.72f, 1.32f, 1.8f, 2.16f, 2.4f, 2.52f, 2.532f
+    }
 };
 
 /* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; the
    whole sum of weight times threshold; plays without r_0 */
 static const plain_tables_t plain_tables = {
-    plain_threshold, NULL, plain_slope, NULL, plain_start_level, plain_reciprocal, 1.9224f, 6
+    plain_play.threshold, NULL, plain_play.slope, NULL, plain_play.start_level, plain_play.reciprocal, 1.9224f, 6
 };
 
 /* What `fast` of an inverse says of the next sample. */
@@ -781,7 +785,7 @@ static void plain_inverse_expect(plain_inverse_t *self, plain_real_t v)
     self->falling = !p->rising;
     self->edge[0] = self->falling ? FLT_MAX : -FLT_MAX; /* no sample is the usual one */
     self->edge[1] = self->edge[0];
-    self->gain = plain_reciprocal[p->k];
+    self->gain = plain_play.reciprocal[p->k];
     self->fast = PLAIN_FAST_PLACE;
     self->pending = v;
 }
@@ -815,7 +819,7 @@ static plain_real_t plain_inverse_limit(plain_inverse_t *self, plain_real_t v)
     if (!(v < m->w || v > m->w)) { /* the drive is there already */
         plain_copy_place(&m->there, &m->here);
     }
-    edge = p->anchor_output + (v - p->anchor) * plain_slope[p->k];
+    edge = p->anchor_output + (v - p->anchor) * plain_play.slope[p->k];
     self->falling = !(v > PLAIN_DRIVE_MIN); /* to the lower limit */
     edge = self->falling ? edge - 2 * 2.2984315e-05f : edge + 2 * 2.2984315e-05f;
     self->edge[0] = edge;
@@ -878,14 +882,14 @@ PLAIN_COPIES plain_real_t plain_inverse_enter(plain_inverse_t *self, plain_real_
         if (!inside && (rising ? v > end : v < end)) {
             return plain_inverse_limit(self, end);
         }
-        edge = p->anchor_output + (end - p->anchor) * plain_slope[p->k];
+        edge = p->anchor_output + (end - p->anchor) * plain_play.slope[p->k];
     }
     if (rising ? edge > most : edge < most) {
         edge = most;
     }
     self->edge[!rising] = self->reference;
     self->edge[rising] = rising ? edge - 2.2984315e-05f : edge + 2.2984315e-05f;
-    self->gain = plain_reciprocal[p->k];
+    self->gain = plain_play.reciprocal[p->k];
     self->falling = !rising;
     self->fast = PLAIN_FAST_MOVE;
     self->pending = v;
@@ -952,11 +956,11 @@ static plain_real_t plain_inverse_back(plain_inverse_t *self, unsigned int depth
     plain_place_t *p = &m->there;
     const plain_corner_t *c = &self->corner[depth - 1];
     const plain_real_t output = u;
-    const plain_real_t r = plain_threshold[1] + plain_threshold[1];
+    const plain_real_t r = plain_play.threshold[1] + plain_play.threshold[1];
     const plain_real_t y = c->pass[!rising]; /* where it rises with its sign changed */
-    const plain_real_t z = plain_start_level[1] + plain_start_level[1] - y;
+    const plain_real_t z = plain_play.start_level[1] + plain_play.start_level[1] - y;
     const plain_real_t x = rising ? output : -output;
-    const plain_real_t way = (x + y) * plain_reciprocal[1];
+    const plain_real_t way = (x + y) * plain_play.reciprocal[1];
     const plain_real_t w = rising ? c->extremum + way : c->extremum - way;
     if (c->side != (rising ? 1 : -1) || !(x < z - 2.2984315e-05f && way < r && w >= PLAIN_DRIVE_MIN && w <= PLAIN_DRIVE_MAX)) {
         return rising ? plain_inverse_rise(self, depth, 1, u) : plain_inverse_fall(self, depth, 1, u);
@@ -1087,8 +1091,8 @@ PLAIN_COPIES unsigned int plain_inverse_turn(plain_inverse_t *self, plain_real_t
     self->status |= bits;
     if (m->here.k > 1) {
         plain_corner_t *c = &self->corner[depth];
-        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_slope[m->here.k];
-        const plain_real_t z = plain_start_level[m->here.k - 1];
+        const plain_real_t y = m->here.anchor_output + (m->w - m->here.anchor) * plain_play.slope[m->here.k];
+        const plain_real_t z = plain_play.start_level[m->here.k - 1];
         if (m->start > depth) {
             m->start = (uint_least16_t)depth;
         }
@@ -1137,15 +1141,15 @@ PLAIN_COPIES bool plain_inverse_on(plain_inverse_t *self, plain_real_t u, plain_
     const unsigned int k = p->k + 1u;
     if (k < c->end && !(rising ? c->side < 0 : c->side > 0)) {
         const plain_real_t y = rising ? c->pass[0] : c->pass[1]; /* where it rises with its sign changed */
-        plain_real_t r = plain_threshold[k];
-        plain_real_t z = plain_start_level[k];
+        plain_real_t r = plain_play.threshold[k];
+        plain_real_t z = plain_play.start_level[k];
         if (c->side != 0) {
             r = r + r;
             z = z + z;
         }
         r = rising ? c->extremum + r : c->extremum - r;
         z = rising ? z - y : y - z;
-        *v = p->next + (output - p->next_output) * plain_reciprocal[k];
+        *v = p->next + (output - p->next_output) * plain_play.reciprocal[k];
         if (rising ? output < z - 2.2984315e-05f && *v < r && *v <= PLAIN_DRIVE_MAX
                    : output > z + 2.2984315e-05f && *v > r && *v >= PLAIN_DRIVE_MIN) {
             if (!(rising ? *v > self->pending : *v < self->pending)) {

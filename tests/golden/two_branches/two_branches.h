@@ -957,26 +957,30 @@ static two_branches_real_t two_branches_corners_solve(const two_branches_tables_
     return w;
 }
 
-static const two_branches_real_t two_branches_threshold[7] = {
-    0.0f, 0.45f, 0.9f, 1.35f, 1.8f, 2.25f, 2.7f
-};
-
-static const two_branches_real_t two_branches_slope[8] = {
-    0.0f, 0.72f, 1.32f, 1.8f, 2.16f, 2.4f, 2.52f, 2.532f
-};
-
-static const two_branches_real_t two_branches_start_level[7] = {
-    0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
-};
-
-static const two_branches_real_t two_branches_reciprocal[8] = {
-    0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
+static const struct {
+    two_branches_real_t threshold[7];
+    two_branches_real_t start_level[7];
+    two_branches_real_t reciprocal[8];
+    two_branches_real_t slope[8];
+} two_branches_play = {
+    { /* threshold */
+        0.0f, 0.45f, 0.9f, 1.35f, 1.8f, 2.25f, 2.7f
+    },
+    { /* start_level */
+        0.0f, 0.324f, 0.918f, 1.728f, 2.7f, 3.78f, 4.914f
+    },
+    { /* reciprocal */
+        0.0f, 1.3888888f, 0.75757575f, 0.5555556f, 0.46296296f, 0.41666666f, 0.3968254f, 0.3949447f
+    },
+    { /* slope */
+        0.0f, 0.72f, 1.32f, 1.8f, 2.16f, 2.4f, 2.52f, 2.532f
+    }
 };
 
 /* thresholds, weights, sums of weights, sums of weight times threshold, inverse thresholds, 1 / sums of weights; the
    whole sum of weight times threshold; plays without r_0 */
 static const two_branches_tables_t two_branches_tables = {
-    two_branches_threshold, NULL, two_branches_slope, NULL, two_branches_start_level, two_branches_reciprocal, 1.9224f, 6
+    two_branches_play.threshold, NULL, two_branches_play.slope, NULL, two_branches_play.start_level, two_branches_play.reciprocal, 1.9224f, 6
 };
 
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
