@@ -379,6 +379,28 @@ def test_no_ordinary_record_is_dearer_than_the_constructed_worst_case(
         assert core_after.counts.max() <= worst
 
 
+@pytest.mark.parametrize(("step", "low"), [(0.5, 0), (0.25, 0), (0.5, -10)])
+def test_round_numbers_are_no_dearer_than_the_textbook_loop(
+    step: float, low: int, bench: ModuleType, tmp_path: Path
+) -> None:
+    """Records of `verify` turn right where plays start to follow; with round thresholds that is where moves end too."""
+    thresholds = step * np.arange(17)
+    weights = [0.7, *(0.15 * np.exp(-thresholds[1:] / 5)).tolist()]
+    (tmp_path / "round.yaml").write_text(
+        f"hystgen: 1\nname: round\ninput_range: [{low}, 10]\nmodel:\n  pi:\n"
+        f"    thresholds: {thresholds.tolist()}\n    weights: {weights}\n"
+    )
+    report = hystgen.verify(
+        tmp_path / "round.yaml", operator="inverse", arithmetic="float32", engine="corners", targets=["cortex-m4f"],
+        compiler=["zig"], target_length=20_000,
+    )  # fmt: skip
+    assert report.ok, report.table()
+    dearest = max(row.max_instructions or 0 for row in report.rows)
+    case = bench.Case(targets.find("cortex-m4f"), "zig", 16, "inverse", "float32")
+    textbook = bench.Bench(tmp_path).textbook(case, bench.RANGE * bench.multisine(bench.SAMPLES))
+    assert 200 < dearest <= textbook.max
+
+
 @pytest.mark.parametrize(("n", "move", "dearest"), [(16, 285, 360), (128, 320, 400)])
 def test_at_a_limit_of_the_drive(n: int, move: int, dearest: int, bench: ModuleType, tmp_path: Path) -> None:
     """A range from 0 on, as piezo drives have: once it has been up, references below what the plays leave at 0 get 0.
