@@ -80,7 +80,8 @@ def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -
 @functools.lru_cache(maxsize=256)
 def _behind(history: tuple[float, ...], thresholds: bytes) -> Array:
     """Virgin plays behind a history; a search asks for those of the same few again and again."""
-    return operators.plays(history, np.frombuffer(thresholds), 0.0)[:, -1]
+    r = np.frombuffer(thresholds).copy()  # writable like all others, or the plays are compiled for it once more
+    return operators.plays(history, r, 0.0)[:, -1]
 
 
 def settled(v: Array, reach: float) -> int:
