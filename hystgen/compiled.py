@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 announce: Callable[[], None] | None = None
 
 # The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
-OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False, "nogil": True}
 
 
 def bind_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNamespace:
@@ -44,7 +44,7 @@ def compile_together(
     import numba
 
     _listen()
-    sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions)
+    sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions) + repr(OPTIONS)
     mark = hashlib.sha256(sources.encode()).hexdigest()[:12]
 
     def compiled(function: Callable[..., Any], twin: types.FunctionType) -> Any:

@@ -1,4 +1,4 @@
-"""The same work on several things, in processes that are copies of this one.
+"""The same work on several things, in processes that are copies of this one, or in threads of it.
 
 A copy (fork) sees all that this process has, so that nothing but results is sent, and they are those of a plain loop
 whatever the processes' order. Where processes cannot be copied safely it is a plain loop.
@@ -36,7 +36,12 @@ def cores() -> int:
 
     if sys.platform != "linux" or threading.active_count() > 1 or multiprocessing.current_process().daemon:
         return 1
-    return min(len(os.sched_getaffinity(0)), MOST)
+    return _cores()
+
+
+def _cores() -> int:
+    available = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    return min(available, MOST)
 
 
 def each(
@@ -55,6 +60,18 @@ def each(
             results.append(work(item))
             tick()
     return results
+
+
+def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
+    """`work(item)` for all items, in threads that are gone when it is done; compiled work runs side by side there.
+
+    Of use where a core has nothing else to do, as when the last of several processes is left with a long task.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(max(1, min(len(items), _cores()))) as pool:
+        for _ in pool.map(work, items):
+            pass
 
 
 def _elsewhere(work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None]) -> dict[int, R]:

@@ -7,7 +7,7 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from pathlib import Path
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import integrate, interpolate, signal, special
 
 import hystgen
-from hystgen import effects
+from hystgen import effects, parallel
 from hystgen.effects import About, Chain, Effect, Place, Run, recursions
 from hystgen.effects.base import Compensated
 from hystgen.effects.chain import VISIT, in_order, join
@@ -554,6 +554,27 @@ def test_any_relaxation_against_an_ode_solver(part: int) -> None:
         effect = make("rate_dependence", shape="relaxation", time_constant=tau, exponent=m)
         found = effect.plays(w, Run(t, w), np.array([0.0, 1.0]), np.zeros(2))[1]
         assert np.max(np.abs(found - expected)) < 1e-5, (tau, m, w)
+
+
+def test_relaxing_plays_that_threads_share_are_those_computed_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    t = np.arange(3000) * 1e-3
+    w, thresholds = 3.0 * np.sin(40.0 * t) * np.exp(-t), np.arange(12) / 10.0
+    in_threads, shared = parallel.in_threads, []
+
+    def seen(work: Callable[[slice], None], parts: Sequence[slice]) -> None:
+        shared.extend(parts)
+        in_threads(work, parts)
+
+    monkeypatch.setattr(parallel, "in_threads", seen)
+    effect = make("rate_dependence", shape="relaxation", time_constant=4e-3, exponent=1.4)
+    found = effect.plays(w, Run(t, w), thresholds, np.zeros(12))
+    assert len(shared) > 1
+    for i in range(1, 12):
+        expected = np.empty((1, 3000))
+        recursions.code().relaxing_plays(
+            w, np.diff(t), thresholds[i : i + 1], 4e-3, 1.4, float(thresholds[-1]), np.zeros(1), expected
+        )
+        assert np.array_equal(found[i], expected[0])
 
 
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 3.0])

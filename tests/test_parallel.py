@@ -90,6 +90,21 @@ class TestEach:
                 os.kill(process, 0)
 
 
+class TestThreads:
+    def test_all_is_done_and_no_thread_is_left(self) -> None:
+        done: list[int] = []
+        parallel.in_threads(done.append, range(20))
+        assert sorted(done) == list(range(20))
+        assert threading.active_count() == 1
+
+    def test_nothing_to_do(self) -> None:
+        parallel.in_threads(lambda _: pytest.fail("called"), [])
+
+    def test_a_failure_is_raised(self) -> None:
+        with pytest.raises(ZeroDivisionError):
+            parallel.in_threads(lambda k: 1 // k, [1, 0, 2])
+
+
 class TestInterrupt:
     @pytest.mark.parametrize("to_all", [True, False])
     def test_ends_all_processes_and_is_told_once(self, to_all: bool) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from hystgen import operators
+from hystgen import operators, parallel
 from hystgen.effects.base import (
     About,
     Array,
@@ -28,6 +28,9 @@ from hystgen.effects.recursions import code
 from hystgen.param_models import MAX_PLAYS, NotNegative, Positive
 
 Places = NDArray[np.intp]
+
+LARGE, TOGETHER = 10_000, 4
+"""Samples of plays with a nonlinear dashpot from which on threads share them, and plays that one takes at a time."""
 
 
 class _RateDependence(Effect):
@@ -144,7 +147,15 @@ class RelaxingPlays(_RateDependence):
             out[:] = operators.plays(w, thresholds[chosen], start[chosen])
             return
         about = (self.time_constant, self.exponent, float(thresholds[-1]))
-        code().relaxing_plays(w, run.steps, thresholds[chosen], *about, start[chosen], out)
+        starts = start[chosen]
+
+        def move(some: slice) -> None:
+            code().relaxing_plays(w, run.steps, thresholds[chosen[some]], *about, starts[some], out[some])
+
+        if self.exponent == 1.0 or out.size < LARGE:
+            move(slice(None))
+        else:
+            parallel.in_threads(move, [slice(k, k + TOGETHER) for k in range(0, len(chosen), TOGETHER)])
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
