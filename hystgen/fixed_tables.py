@@ -19,6 +19,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context, Decimal
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -31,6 +32,7 @@ from hystgen.fixed import FixedTables
 from hystgen.models import Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import Path
 from hystgen.tables import FormatError
+from hystgen.words import counted
 
 CODE_BITS = {"q31": 31, "q15": 15}
 PLAY_BITS = 30  # of the input of the plays, where it is not the drive code itself
@@ -97,12 +99,18 @@ def lsbs(
             refused.append((
                 ("emit", key),
                 f"{given:g} is too small: {what} reaches {float(largest):.6g}, which takes at least "
-                f"{float(finest):.6g}; raise it or leave it out",
+                f"{_rounded_up(finest)}; raise it or leave it out",
             ))
         found.append(lsb)
     if refused:
         raise FormatError(*refused)
     return found[0], found[1]
+
+
+def _rounded_up(x: Fraction) -> str:
+    """Six digits of a number that is positive, not less than it is."""
+    up = Context(prec=6, rounding=ROUND_CEILING)
+    return f"{float(up.divide(Decimal(x.numerator), Decimal(x.denominator))):.6g}"
 
 
 def decimal(x: float) -> Fraction:
@@ -119,6 +127,7 @@ class _Builder:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
         self.code_max = 2 ** CODE_BITS[arithmetic] - 1
         self.drive_lsb, self.output_lsb = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
+        self.given = {"drive_lsb": drive_lsb is not None, "output_lsb": output_lsb is not None}
         self.invertible = not cascade.inverse_problems()
         self.refused: list[tuple[Path, str]] = []
 
@@ -135,12 +144,24 @@ class _Builder:
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (Fraction(end) / self.output_lsb for end in self.cascade.output_range)
         self.output = (math.ceil(low), math.floor(high))
-        for (first, last), key in ((self.drive, "drive_lsb"), (self.output, "output_lsb")):
+        for (first, last), key, far in (
+            (self.drive, "drive_lsb", ("input_range",)),
+            (self.output, "output_lsb", ("model", "output_offset")),
+        ):
             if last - first < 2:
-                left = max(last - first + 1, 0)
-                self.refused.append((("emit", key), f"leaves {left} codes in range; make it smaller"))
+                left = counted(max(last - first + 1, 0), "code")
+                advice = "move it nearer to 0 or use a finer arithmetic"
+                self.refused.append(
+                    (("emit", key), f"leaves {left} in range; make it smaller")
+                    if self.given[key]
+                    else (far, f"lies so far from 0 that {self.arithmetic} has {left} for the range; {advice}")
+                )
         if self.refused:
             raise FormatError(*self.refused)
+
+    def _finer(self, key: str) -> str:
+        """What helps where codes are too coarse; those that nobody asked for are as fine as they can be."""
+        return f"use {f'a smaller emit.{key} or ' if self.given[key] else ''}a finer arithmetic"
 
     # ------------------------------------------------------------ the input of the plays
 
@@ -168,6 +189,7 @@ class _Builder:
                 message = f"{pi.thresholds[needed]:g} does not fit {self.arithmetic}; use a larger emit.drive_lsb"
                 raise FormatError((("model", "pi", "thresholds", needed), message))
         narrow = self.drive_lsb * Fraction(c.front_slopes[0]) if c.stages and self.invertible else self.drive_lsb
+        finer = self._finer("drive_lsb")
         for i, (a, b) in enumerate(itertools.pairwise(self.threshold), 1):
             if b < cap and (a == b or Fraction(pi.thresholds[i]) < (narrow if not c.stages else self.step)):
                 self.refused.append((
@@ -175,7 +197,7 @@ class _Builder:
                     f"{pi.thresholds[i]:g} is "
                     + (f"not above thresholds[{i - 1}]" if i > 1 and a == b else "narrower than one code")
                     + f" in {self.arithmetic} with {float(self.drive_lsb):.6g} a drive code; "
-                    "use a smaller emit.drive_lsb, a finer arithmetic, or leave this play out",
+                    f"{finer}, or leave this play out",
                 ))
         states = [nearest(Fraction(s) / self.step) for s in pi.start]
         for i in range(2, len(states)):
@@ -245,12 +267,13 @@ class _Builder:
         offset = Fraction(self.cascade.output_offset) / self.output_lsb
         largest = max(*(abs(w) for w in self.play), *(abs(s) for s in self.start)) + 1
         travel = self.play[1] - self.play[0]
+        finer = self._finer("output_lsb")
         for i, g in enumerate(gain):
             if g > 0 and g * travel < Fraction(1, 2):
                 self.refused.append((
                     ("model", "pi", "weights", i),
                     f"{pi.weights[i]:g} moves the output by less than half a code of {float(self.output_lsb):.6g}; "
-                    "leave the play out, use a smaller emit.output_lsb or a finer arithmetic",
+                    f"{finer}, or leave the play out",
                 ))
         if self.refused:
             raise FormatError(*self.refused)

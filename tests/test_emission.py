@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from elftools.elf.elffile import ELFFile
 from modelfiles import FILES
 
 import hystgen
@@ -317,6 +318,64 @@ def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path
     header = hystgen.api.emitted_files(model("curved"), arithmetic="float32")["curved.h"]
     for words in ("flush denormal", "to nearest", "-fassociative-math", "-ffp-contract=fast"):
         assert words in header
+
+
+def test_constants_in_single_precision_are_refused(tmp_path: Path) -> None:
+    """Where numbers are double: gcc's flag would round them; others have no such flag."""
+    gcc = next(compiler for compiler in required_compilers() if compiler.name == "gcc")
+    for arithmetic in ("float32", "float64"):
+        folder = tmp_path / arithmetic
+        hystgen.emit(model("curved"), folder, operator="both", layout="shared-runtime", arithmetic=arithmetic)
+        for source in ("curved.c", f"hystgen_runtime_f{arithmetic[-2:]}.c"):
+            run = ["-c", "-fsingle-precision-constant", "-o", tmp_path / "one.o", folder / source]
+            if arithmetic == "float32":
+                gcc.run(run)
+                continue
+            with pytest.raises(compilers.CompileError, match="constants_are_double"):
+                gcc.run(run)
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+def test_no_word_of_a_parameter_file_gets_out_of_its_comment(arithmetic: str, tmp_path: Path) -> None:
+    words = "*/ int evil; /* \\ ??/"
+    units = f'units: {{input: "{words}", output: "µm"}}\ndescription: "{words}"'
+    text = FILES["curved"].replace("units: {input: V, output: um}", units)
+    assert "evil" in text
+    hystgen.emit(Model(parse_parameters(text, "curved.yaml")), tmp_path, operator="both", arithmetic=arithmetic)
+    for compiler in required_compilers():
+        for source in tmp_path.glob("*.c"):
+            compiler.run(["-c", "-std=c99", *compilers.C_WARNINGS, "-o", tmp_path / "one.o", source])
+    for file in tmp_path.glob("*.[hc]"):
+        assert "evil" not in re.sub(r"/\*.*?\*/", "", file.read_text(encoding="ascii"), flags=re.DOTALL)
+    assert " um" in (tmp_path / "curved.h").read_text(encoding="ascii")
+
+
+@pytest.mark.parametrize(
+    ("name", "layout"),
+    [("plain", "self-contained"), ("bent", "self-contained"), ("mixed", "self-contained"), ("mixed", "shared-runtime")],
+)
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+def test_constant_tables_take_no_more_than_the_banner_says(
+    name: str, arithmetic: str, layout: str, tmp_path: Path
+) -> None:
+    """As object files of a 32-bit target have them."""
+    zig = next((compiler for compiler in required_compilers() if compiler.name == "zig"), None)
+    assert zig
+    hystgen.emit(model(name), tmp_path, operator="both", arithmetic=arithmetic, layout=layout)
+    said = re.search(r"constant tables +(\d+) bytes", (tmp_path / f"{name}.h").read_text())
+    assert said
+    taken = 0
+    for source in tmp_path.glob("*.c"):
+        if source.stem == f"{name}_selftest":
+            continue
+        output = tmp_path / "one.o"
+        core = ["-target", "thumb-freestanding-eabi", "-mcpu=cortex_m0plus"]
+        zig.run(["-c", "-O2", "-fdata-sections", *core, "-o", output, source])
+        with output.open("rb") as file:
+            for section in ELFFile(file).iter_sections():
+                if section.name.startswith(".rodata"):
+                    taken += section["sh_size"]
+    assert 0.5 * int(said[1]) < taken <= int(said[1])
 
 
 @pytest.mark.parametrize("name", FILES)

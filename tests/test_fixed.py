@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -240,6 +241,11 @@ def test_converter_formats_are_honoured() -> None:
         ("q15", ([0, 1e-3], [1, 1]), (0, 100), (None, None), "model.pi.thresholds[1]: 0.001 is narrower than one code"),
         ("q15", ([0, 1, 2], [1, 1e-7, 1]), (0, 100), (None, None), "model.pi.weights[1]: 1e-07 moves the output by"),
         ("q15", ([0], [1]), (0, 100), (80, None), "emit.drive_lsb: leaves 2 codes in range; make it smaller"),
+        ("q15", ([0, 1e-3], [1, 1]), (0, 100), (None, None), "model.pi.thresholds[1]: 0.001 is narrower than one code "
+         "in q15 with 0.00305185 a drive code; use a finer arithmetic, or leave"),
+        ("q15", ([0, 4], [1, 1]), (0, 100), (5, None), "model.pi.thresholds[1]: 4 is narrower than one code in q15 "
+         "with 5 a drive code; use a smaller emit.drive_lsb or a finer arithmetic, or leave"),
+        ("q15", ([0], [1]), (1e9, 1e9 + 100), (None, None), "input_range: lies so far from 0 that q15 has 1 code for "),
     ],
 )
 def test_formats_that_cannot_be_are_refused(
@@ -250,6 +256,17 @@ def test_formats_that_cannot_be_are_refused(
     with pytest.raises(FormatError) as caught:
         fixed_tables.build(model, arithmetic, "corners", *lsb)
     assert str(caught.value).startswith(message)
+
+
+def test_the_least_lsb_that_is_told_is_enough() -> None:
+    for arithmetic in ("q15", "q31"):
+        for high in (100.0, 4.0, 0.7, 12345.678, 3e-9):
+            model = Cascade(PI([0, high / 4], [1, 1]), (), 0.0, (0.0, high))
+            with pytest.raises(FormatError) as caught:
+                fixed_tables.build(model, arithmetic, "corners", high * 1e-12, high * 1e-12)
+            told = [float(x) for x in re.findall(r"at least ([\d.e+-]+);", str(caught.value))]
+            assert len(told) == 2
+            fixed_tables.build(model, arithmetic, "corners", *told)
 
 
 NARROW = """hystgen: 1
@@ -277,7 +294,7 @@ emit: {arithmetic: q15}
         ]),
         (("q15", "q15, drive_lsb: 80, output_lsb: 300"), [
             "8:36: error: emit.drive_lsb: leaves 2 codes in range",
-            "8:52: error: emit.output_lsb: leaves 1 codes in range",
+            "8:52: error: emit.output_lsb: leaves 1 code in range",
         ]),
         (("thresholds: [0, 0.001, 0.002, 1]", "density: {formula: '1', p0: 1, r_max: 0.002, n: 2}"), [
             "6:5: error: model.pi.thresholds[1]: 0.00", "6:5: error: model.pi.thresholds[2]: 0.00",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -40,10 +41,10 @@ _STRUCTS = {"dead_zone_t": 28}  # of pointers and counts
 def _constants(text: str, real: int, fixed: bool) -> int:
     """Bytes of the constants that the C text defines, alignment left out."""
     total = 0
-    found = re.findall(r"^static const (\w+) \w+(?:\[(\d+)\])? = ", text, flags=re.MULTILINE)
+    found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
     for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
-        found += re.findall(r"^    (\w+) \w+\[(\d+)\];", members, flags=re.MULTILINE)
-    for kind, size in found:
+        found += re.findall(r"^    (\w+) \w+(\[\d+\]);", members, flags=re.MULTILINE)
+    for kind, sizes in found:
         own = next((width for ending, width in _STRUCTS.items() if kind.endswith(ending)), None)
         if kind.endswith("envelope_t"):
             own = 7 * real
@@ -54,12 +55,12 @@ def _constants(text: str, real: int, fixed: bool) -> int:
         elif own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
-        total += own * int(size or 1)
+        total += own * math.prod(map(int, re.findall(r"\d+", sizes)))
     return total
 
 
 def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | FixedTables, text: str) -> Cost:
-    """Cost of the emitted model whose implementation is `text`."""
+    """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs."""
     n = cascade.pi.n
     fixed = isinstance(numbers, FixedTables)
     real = {"float32": 4, "float64": 8, "q31": 4, "q15": 2}[options.arithmetic]

@@ -188,8 +188,9 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
     if corners and not shared:
         headers = values.family.states
         values.state_types = "\n".join(runtime.types(header, (), prefix, values.family) for header in headers)
-    values.kernels = _kernels(values, options)
-    values.details = _details(parameters, cascade, options, values)
+    kernels = _kernels(values, options)
+    values.kernels = "" if shared else kernels
+    values.details = _details(parameters, cascade, options, values, kernels)
     return values
 
 
@@ -211,8 +212,7 @@ def _units(parameters: Parameters) -> SimpleNamespace:
 
 
 def _kernels(values: SimpleNamespace, options: Options) -> str:
-    if values.shared:
-        return ""
+    """What the model needs of the run time, for a file of its own."""
     family: runtime.Family = values.family
     engine = options.engine
     roots = {f"hystgen_{engine}_rest", f"hystgen_{engine}_absorb"}
@@ -252,11 +252,14 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     )
 
 
-def _details(parameters: Parameters, cascade: Cascade, options: Options, values: SimpleNamespace) -> list[str]:
+def _details(
+    parameters: Parameters, cascade: Cascade, options: Options, values: SimpleNamespace, kernels: str
+) -> list[str]:
     about = comment_text(parameters.description)
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in cascade.stages]
     model = f"{cascade.pi.n} plays" + (f" behind {', '.join(kinds)}" if kinds else "")
-    estimate = cost.estimate(cascade, options, values.numbers, render("step.c.j2", values, tables=_tables(values)))
+    text = render("step.c.j2", values, tables=_tables(values)) + (kernels if values.shared else "")
+    estimate = cost.estimate(cascade, options, values.numbers, text)
     rounding = "" if values.fixed else (
         " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "
         "reorder sums (-fassociative-math) or contract products whatever the source says (clang's "

@@ -13,6 +13,7 @@ from hystgen.bounds import error_bounds, straight_margin
 from hystgen.emission.text import literal, operand, structure, table
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
+from hystgen.names import comment_text
 from hystgen.params import Parameters
 from hystgen.reference import Tables
 
@@ -165,8 +166,8 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     ends = (limits[fixed.PLAY_MIN] - margin, limits[fixed.PLAY_MAX] + margin)
     pointers += [literal(number) for number in (numbers.lift[-1], *ends)]
     fine = int(limits[fixed.FINE])
-    units = parameters.units
-    drive, output = (f" {unit}" if unit else "" for unit in (units.input, units.output))
+    units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
+    drive, output = (f" {unit}" if unit else "" for unit in units)
     precision = [
         f"Precision: a drive code is {float(form.drive_lsb):.6g}{drive}, an output code {float(form.output_lsb):.6g}"
         f"{output}; against the exact model",

@@ -29,9 +29,9 @@ def rows(
     Where the core has an FPU also as a user builds it who passes nothing, which lets compilers contract a product and a
     sum, with a row for the self-test; where qemu is installed also the self-test as a whole firmware.
     """
-    missing = cross.missing_wheels()
-    if missing:
-        yield Row(target.name, "-", "-", "-", error=f"{', '.join(missing)} not installed: {cross.WHEELS}")
+    problem = cross.wheel_problem()
+    if problem:
+        yield Row(target.name, "-", "-", "-", error=problem)
         return
     for name in cross.chosen(target, compiler):
         try:

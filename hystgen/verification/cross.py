@@ -110,7 +110,15 @@ def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
     return NAMES if shutil.which(target.gcc) else NAMES[:1]
 
 
-def missing_wheels() -> list[str]:
-    """The wheels of the emulator that are not installed."""
+def wheel_problem() -> str:
+    """Why the wheels of the emulator cannot be used; empty where they can."""
     wheels = {"unicorn": "unicorn", "elftools": "pyelftools"}
-    return [wheel for package, wheel in wheels.items() if importlib.util.find_spec(package) is None]
+    missing = [wheel for package, wheel in wheels.items() if importlib.util.find_spec(package) is None]
+    if missing:
+        return f"{', '.join(missing)} not installed: {WHEELS}"
+    for package, wheel in wheels.items():
+        try:
+            importlib.import_module(package)
+        except Exception as error:
+            return f"{wheel} cannot be loaded: {type(error).__name__}: {error}"
+    return ""

@@ -37,7 +37,10 @@ def build(
 
 
 def run(machine: Machine, image: Path) -> int:
-    """The self-test's result (0, or 1 + first failing index, at most 254). Raises EmulatorError."""
+    """The self-test's result (0, or 1 + first failing index, at most 253). Raises EmulatorError.
+
+    The exit code is one more: 0 would be that of an emulator that ran nothing.
+    """
     command = [
         QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",
         "-semihosting-config", "enable=on,target=native", "-icount", "shift=6", "-kernel", str(image),
@@ -52,4 +55,6 @@ def run(machine: Machine, image: Path) -> int:
         raise EmulatorError(f"{QEMU} -M {machine.name} failed ({done.returncode}):\n{done.stderr.strip()}")
     if done.returncode == FAULT:
         raise EmulatorError(f"{QEMU} -M {machine.name}: the firmware ended in a fault")
-    return done.returncode
+    if done.returncode == 0:
+        raise EmulatorError(f"{QEMU} -M {machine.name} ended without the self-test's result")
+    return done.returncode - 1

@@ -18,6 +18,9 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
+/* With -fsingle-precision-constant the numbers below would not be those of the model. */
+typedef char bent_constants_are_double[sizeof(1.0) == sizeof(double) ? 1 : -1];
+
 /* The constant tables of one model in floating point. */
 
 /* Play operators; n + 1 thresholds and weights, n + 2 sums. */

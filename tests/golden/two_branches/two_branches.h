@@ -9,7 +9,7 @@
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout single-header
  *
  * Cost, derived from the model (32-bit target):
- *     constant tables   364 bytes
+ *     constant tables   748 bytes
  *     inverse instance  184 bytes of RAM
  *     inverse step, worst case: 12 multiplications, 61 comparisons (49 + 4 b, b = 3 the bits of n), 1 tanh, 2 atanh
  *
