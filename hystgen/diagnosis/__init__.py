@@ -170,7 +170,7 @@ def diagnose(
             ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
             noise = floor.noise_floor([*ready.to_fit, *ready.held])
             base, start = believed.structure_of(model.cascade, given, ready)
-            refitted = selection.refit(base, ready.to_fit, start)
+            refitted = selection.refit(base, ready.to_fit, start, believed.believed_weights(model.cascade, base))
             records = Records.of(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
             return ready, noise, records, selection.select(records, refitted)
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis import bad_samples, held_out
-from hystgen.diagnosis.structure import Actuator, Item, Structure, kept
+from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import chain
-from hystgen.effects.base import Effect, Run
+from hystgen.effects.base import Candidate, Effect, Run
 from hystgen.identification import faults, pi, prepared, thresholds
 from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh
 from hystgen.identification.pi import IdentificationError
@@ -23,6 +23,12 @@ from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
+
+WIDE = float(np.log(3.0))
+"""Numbers of believed effects are sought up to three times as large and as small."""
+
+SINGLY = 4
+"""Numbers of a longer list change by a factor that they have in common."""
 
 PLAYS = 32
 """With half as many, what the steps between thresholds leave is up to 1.4 times the noise in effect-free records, and
@@ -182,10 +188,63 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
 
 
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
-    """The believed model with its weights, thresholds and front free, and where a search starts."""
+    """The believed model with its weights, thresholds, front and effects' numbers free, and where a search starts."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
-    return Structure(places, front, tuple(map(kept, given))), shape
+    parts = tuple(Part(effect.name, _near(effect)) for effect in given)
+    return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
+
+
+def believed_weights(cascade: Cascade, structure: Structure) -> Array | None:
+    """The believed weights at the structure's thresholds next to their own; None behind a front, which has a scale."""
+    if cascade.stages:
+        return None
+    p, places = np.zeros(len(structure.thresholds)), structure.thresholds
+    for r, weight in zip(cascade.pi.thresholds, cascade.pi.weights, strict=True):
+        p[int(np.argmin(np.abs(places - r)))] += weight
+    return p
+
+
+def _near(effect: Effect) -> Candidate:
+    """The effect with its numbers free, by factors: what is 0 stays that, and signs are kept."""
+    sizes = {key: _size(value) for key, value in effect if key not in effect.settled}
+    free = {key: size for key, size in sizes.items() if size}
+    number = sum(free.values())
+
+    def build(x: Array) -> Effect:
+        if not np.any(x):
+            return effect
+        at, changed = 0, {}
+        for key, size in free.items():
+            changed[key] = _times(getattr(effect, key), np.exp(x[at : at + size]).tolist(), effect, key)
+            at += size
+        return effect.model_copy(update=changed)
+
+    zeros = np.zeros(number)
+    return Candidate("as it is, or nearly", zeros - WIDE, zeros + WIDE, zeros, build)
+
+
+def _size(value: object) -> int:
+    """How many factors the numbers of a key have."""
+    if isinstance(value, float):
+        return int(value != 0.0)
+    if not isinstance(value, tuple) or not any(map(_size, value)):
+        return 0
+    return len(value) if len(value) <= SINGLY and all(isinstance(each, float) for each in value) else 1
+
+
+def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> Any:
+    """The numbers times their factors, kept within what the key may be."""
+    if isinstance(value, tuple):
+        each = factors if len(factors) == len(value) else list(factors) * len(value)
+        return tuple(_times(one, [factor], effect, key) for one, factor in zip(value, each, strict=True))
+    changed = value * factors[0]
+    for limit in type(effect).model_fields[key].metadata:
+        changed = max(changed, getattr(limit, "ge", changed))
+        changed = min(changed, getattr(limit, "le", changed))
+        if getattr(limit, "gt", -math.inf) >= changed:
+            changed = float(np.nextafter(limit.gt, math.inf))
+    return changed
 
 
 def _through(places: Array, believed: Sequence[float]) -> Array:

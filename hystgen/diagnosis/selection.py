@@ -53,10 +53,18 @@ class Outcome:
     rankings: tuple[tuple[Tried, ...], ...]
 
 
-def refit(base: Structure, to_fit: Sequence[Item], start: Array) -> Fitted:
-    """The believed structure with its weights and the shape of its front, sought from `start`, fitted anew."""
+def refit(base: Structure, to_fit: Sequence[Item], start: Array, believed: Array | None = None) -> Fitted:
+    """The believed structure with its weights, the shape of its front and its effects' numbers, fitted anew.
+
+    Sought from `start`, and where an output map bends the weights' part also from the `believed` ones: beyond a limit
+    no sample tells how far off others are.
+    """
     (quick,) = thinned([to_fit], joint.COMPARED, everything([to_fit]))
-    return fits.fit(base, quick, start, _first_weights(base, quick, start))
+    starts = [_first_weights(base, quick, start)]
+    if believed is not None and base.actuator(start).bends:
+        starts.append(believed)
+    found = [fits.fit(base, quick, start, p) for p in starts]
+    return min(found, key=lambda each: fits.rms(each.errors(quick)))
 
 
 def select(records: Records, refitted: Fitted) -> Outcome:
@@ -208,7 +216,8 @@ def _found(step: _Step, records: Records) -> Found:
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
     """Those without the effects, which is linear, then with them: a sensor's curve far from where it was found leads on
     to anywhere."""
-    near = fits.begun(replace(base, parts=()), to_fit, start, np.ones(len(base.thresholds))).now.best
+    alone, front = replace(base, parts=()), base.pieces(start)[0]
+    near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
 
 

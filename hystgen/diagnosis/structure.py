@@ -193,7 +193,10 @@ class Actuator:
     thresholds: Array
     stages: tuple[Stage, ...]
     effects: tuple[Effect, ...]
-    gains: dict[tuple[int, int], tuple[Array, Array]] = field(default_factory=dict, compare=False, repr=False)
+    gains: dict[tuple[int, int], tuple[Effect, Run, Array, Array]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    """Gain and offset over a run, which is kept along with its effect: the `id` of what is gone may be another's."""
 
     def at(self, place: Place) -> Sequence[Effect]:
         """The effects at one place of the chain, in its order."""
@@ -219,9 +222,10 @@ class Actuator:
         now = item.compared if self._needed <= _FILTERED else ALL
         whole = item.session or run
         for effect in self.at(Place.GAIN):
-            if (id(effect), id(whole)) not in self.gains:
-                self.gains[id(effect), id(whole)] = effect.gain(whole), effect.offset(whole)
-            gain, offset = (values[item.part][now] for values in self.gains[id(effect), id(whole)])
+            key = id(effect), id(whole)
+            if key not in self.gains:
+                self.gains[key] = effect, whole, effect.gain(whole), effect.offset(whole)
+            gain, offset = (values[item.part][now] for values in self.gains[key][2:])
             rows, constant = rows * gain, constant * gain + offset
         for effect in self.at(Place.LINEAR):
             if effect.order > 0:
@@ -388,6 +392,7 @@ class Actuator:
     def nuisances(self, item: Item, offset: Array | None = None) -> Array:
         """(k, N) what is free in every record, of the compared samples: its offset, responses to an unknown start.
 
+        A history says what the plays remember, and not when the drive was there, which slow effects depend on.
         `offset`: what the offset does to the output, where a map lies between them.
         """
         free = self._free(item)[:, item.compared]
@@ -396,16 +401,13 @@ class Actuator:
     def _free(self, item: Item) -> Array:
         """The same of all samples."""
         free = [np.ones((1, len(item.run.t)))]
-        if item.history is None:
-            free += [found for effect in self.effects if len(found := effect.transients(item.run))]
+        free += [found for effect in self.effects if len(found := effect.transients(item.run))]
         return np.concatenate(free)
 
     def largest(self, item: Item, p: Array) -> Array:
         """(k,) how large the factors of `nuisances` may be: an effect of little weight has little left from a start."""
         span = FAR * float(np.sum(p)) * float(np.ptp((item.session or item.run).v))
-        limits = [np.full(1, np.inf)]
-        if item.history is None:
-            limits += [span * effect.largest(item.run) for effect in self.effects]
+        limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self.effects)]
         return np.concatenate(limits)
 
     def error(self, item: Item, p: Array, like: Fitted | None = None) -> Array:

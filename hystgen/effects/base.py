@@ -209,6 +209,8 @@ class Effect(BaseModel):
     """whether `bent` or `mapped` makes of a sample what depends on that sample alone, and needs nothing of the run"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
+    settled: ClassVar[tuple[str, ...]] = ()
+    """keys of conventions, and of numbers that a fit cannot tell from others: a refit leaves them as they are"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"

@@ -124,6 +124,8 @@ class LogarithmicCreep(_Creep):
     t_min: Positive = Field(default=1e-3, description="shortest time constant, s")
     t_max: Positive = Field(default=1e3, description="longest time constant, s")
 
+    settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
+
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """t_min < t_max, and not more decades than states can be spent on."""
         if not self.t_min < self.t_max:

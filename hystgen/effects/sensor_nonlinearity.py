@@ -25,6 +25,8 @@ class SensorPolynomial(Effect):
     )
     scale: Positive = Field(description="output at which xi = 1, output units", examples=[50.0])
 
+    settled: ClassVar[tuple[str, ...]] = ("scale",)
+
     place: ClassVar[Place] = Place.OUTPUT
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False

@@ -34,6 +34,8 @@ class _Thermal(Effect):
     offset_per_degree: Number = Field(default=0.0, description="change of offset, output units/K")
     reference: Number = Field(default=20.0, description="temperature at which nothing changes, degC")
 
+    settled: ClassVar[tuple[str, ...]] = ("reference", "heating")
+
     @abstractmethod
     def above(self, run: Run) -> Array:
         """Temperature above the reference (N,), K."""
