@@ -24,6 +24,7 @@ from hystgen import parallel
 from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, told, trials
 from hystgen.diagnosis.held_out import set_aside
 from hystgen.diagnosis.structure import Item
+from hystgen.effects.ageing import ExponentialAgeing
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep import ExponentialCreep
 from hystgen.effects.drift import LinearDrift
@@ -677,10 +678,91 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     item = dataclasses.replace(item, y=predicted)
     fitted = structure.Fitted(form, np.empty(0), weights, 0.0)
     ready = believed.Prepared([item], [item], [], [], (0.0, 100.0), places)
-    extended = hystgen.Model(_extended(hystgen.load(_model(tmp_path)).parameters, fitted, ready, ()))
+    given = hystgen.load(_model(tmp_path))
+    extended = hystgen.Model(_extended(given.parameters, given.cascade, fitted, ready, ()))
     (found,) = extended.chain.simulate([run], [0.0])
     # weights are written with ten digits; each multiplies up to 100, and the offset is the mean of what that leaves
     assert np.max(np.abs(found - predicted)) <= 2.0 * 0.5e-9 * np.sum(weights) * 100.0
+
+
+class TestBelievedEffects:
+    """A model that has effects already: their numbers are refitted, and wrong ones are no missing effect."""
+
+    def records(self, before: Callable[[Array], Array], behind: Callable[[Array], Array]) -> list[Record]:
+        """Five records of one session: plays between what acts before and behind them, and noise."""
+        made = []
+        for number in range(5):
+            v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 - 0.1 * number) * (wander(number, 40) - 40.0)])
+            t = np.arange(len(v)) * 1e-3 + 4.0 * number
+            y = behind(brute_output(before(v), (0.0, 10.0), (1.0, 0.5), 0.0))
+            made.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
+        return made
+
+    def diagnosed(self, tmp_path: Path, records: list[Record], effect: dict[str, Any], **more: Any) -> Diagnosis:
+        path = tmp_path / "believed.yaml"
+        path.write_text(_model(tmp_path).read_text().replace("}}", f"}}, effects: {json.dumps([effect])}}}"))
+        return hystgen.diagnose(path, records[:3], holdout=records[3:], history=[0.0], **more)
+
+    def check(self, found: Diagnosis, key: str, value: float) -> None:
+        assert found.content["verdict"] == "nothing_missing", found.sentence()
+        assert found.content["gap"]["after"]["holdout"] < 1.1 * 0.02
+        (effect,) = found.parameters.model.effects
+        assert getattr(effect, key) == pytest.approx(value, rel=0.03)
+
+    def test_a_wrong_time_constant(self, tmp_path: Path) -> None:
+        def lagging(v: Array) -> Array:
+            fine = np.interp(np.linspace(0, len(v) - 1, 20 * (len(v) - 1) + 1), np.arange(len(v)), v)
+            left = np.exp(-1e-3 / 20 / 6e-3)
+            return np.asarray(v[0] + lfilter([1.0 - left], [1.0, -left], fine - v[0]))[::20]
+
+        records = self.records(lagging, lambda y: y)
+        found = self.diagnosed(tmp_path, records, {"name": "lag", "time_constant": 0.0066})
+        self.check(found, "time_constant", 0.006)
+
+    @pytest.mark.parametrize("level", [30.0, 33.0])
+    def test_a_hard_limit(self, tmp_path: Path, level: float) -> None:
+        """The right one too: weights that were fitted without it lie below it, where it does nothing."""
+        records = self.records(lambda v: v, lambda y: np.minimum(y, 30.0))
+        found = self.diagnosed(tmp_path, records, {"name": "saturation", "shape": "stops", "lower": -900.0,
+                                                   "upper": level, "give": 0.0})  # fmt: skip
+        self.check(found, "upper", 30.0)
+
+    def test_gains_of_records_that_come_and_go(self) -> None:
+        """What is remembered of a record is not another's that has come to lie in its place."""
+        effect = ExponentialAgeing(name="ageing", shape="exponential", loss=0.05, travel=100.0)
+        actuator = structure.Actuator(np.array([0.0]), (), (effect,))
+        for number in range(200):
+            v = wander(number, 20)[: 100 + number % 7]
+            run = Run(np.arange(len(v)) * 1e-3, v)
+            (rows,), _ = actuator.columns(Item("passing", run, v, (0.0,), 1.0), np.ones(1))
+            travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(v)))])
+            assert np.max(np.abs(rows - v * (1.0 - 0.05 * (1.0 - np.exp(-travelled / 100.0))))) < 1e-9
+
+    def test_a_history_says_nothing_of_slow_states(self, tmp_path: Path) -> None:
+        """The drive has been at 100 just before, so that creep still comes down: it is creep and nothing else."""
+        records = []
+        for number in range(5):
+            before = np.concatenate([np.full(8000, 0.0), np.linspace(0.0, 100.0, 500), np.linspace(100.0, 0.0, 500)])
+            v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 - 0.1 * number) * (wander(number, 40) - 40.0)])
+            whole = np.concatenate([before, v])
+            play = brute_output(whole, (0.0, 10.0), (1.0, 0.5), 0.0)
+            slow = lfilter([1.0 - np.exp(-1e-3 / 4.0)], [1.0, -np.exp(-1e-3 / 4.0)], play)
+            y = (play + 0.06 * slow)[len(before) :]
+            t = np.arange(len(v)) * 1e-3
+            records.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
+        found = hystgen.diagnose(_model(tmp_path), records[:3], holdout=records[3:], history=[100.0, 0.0])
+        assert [effect["name"] for effect in found.content["effects"]] == ["creep"]
+        assert found.content["gap"]["after"]["holdout"] < 1.15 * 0.02
+
+    def test_the_start_memory_stays(self, tmp_path: Path) -> None:
+        records = self.records(lambda v: v, lambda y: y)
+        path = tmp_path / "believed.yaml"
+        path.write_text(_model(tmp_path).read_text().replace("}}", ", initial_state: 4.0}}"))
+        found = hystgen.diagnose(path, records[:3], holdout=records[3:], history=[0.0])
+        extended, given = hystgen.Model(found.parameters), hystgen.load(path)
+        v = np.linspace(4.0, 40.0, 50)
+        assert np.ptp(extended.simulate(v) - given.simulate(v)) < 0.1
+        assert extended.cascade.pi.start[-1] == pytest.approx(given.cascade.pi.start[-1])
 
 
 class TestOwnEffects:

@@ -1028,6 +1028,40 @@ def test_an_own_effect_that_fails_is_named(tmp_path: Path, answer: str, said: st
         of(own.model_validate({"name": "user:own", "height": 1.0}), t, v)
 
 
+CANDIDATES = OWN.replace("from hystgen.effects import", "from hystgen.effects import Candidate,") + """
+    @classmethod
+    def candidates(cls, about):
+        return {}
+"""
+GOOD = "Candidate('own', np.zeros(1), np.ones(1), np.zeros(1), lambda x: cls(name='user:own', height=float(x[0])))"
+
+
+@pytest.mark.parametrize(("answer", "said"), [
+    ("[1 / 0]", "the effect user:own failed in candidates: ZeroDivisionError: division by zero"),
+    ("5", "the effect user:own failed in candidates: TypeError: 'int' object is not iterable"),
+    (f"[{GOOD.replace('cls(', 'dict(')}]", "the effect user:own answered dict in build of 'own'"),
+    (f"[{GOOD.replace('x[0]', 'x[3]')}]", "the effect user:own failed in build of 'own': IndexError: index 3 is out"),
+    (f"[{GOOD.replace('np.ones(1)', 'np.ones(2)')}]", "the effect user:own has a candidate 'own' whose low, start"),
+    (f"[{GOOD.replace('np.ones(1)', '-np.ones(1)')}]", "the effect user:own has a candidate 'own' whose low, start"),
+])  # fmt: skip
+def test_an_own_effect_with_wrong_candidates_is_named(tmp_path: Path, answer: str, said: str) -> None:
+    about = About((0.0, 1.0), 1.0, 1e-3, 1.0, 1.0, 1.0, 1.0, (0.0,))
+    path = tmp_path / "own.py"
+    path.write_text(CANDIDATES.format(f"[{GOOD}]"))
+    (own,) = effects.load_user_effects(path)
+    assert [each.label for each in own.candidates(about)] == ["own"]
+    path.write_text(CANDIDATES.format(answer))
+    (own,) = effects.load_user_effects(path)
+    with pytest.raises(EffectsError, match=re.escape(said)):
+        own.candidates(about)
+
+
+def test_an_output_that_is_not_finite_is_refused() -> None:
+    t, v = drive()
+    with pytest.raises(EffectsError, match="the output is not finite; what do the parameters of sensor_nonlinearity"):
+        Chain(CASCADE, [make("sensor_nonlinearity", coefficients=(1e30,) * 16, scale=1e-30)]).simulate([Run(t, v)])
+
+
 MOVER = """from typing import ClassVar, Literal
 import numpy as np
 from hystgen import operators

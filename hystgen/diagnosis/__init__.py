@@ -33,6 +33,7 @@ from hystgen.records import Record, read_records
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
+    from hystgen.models import Cascade
     from hystgen.params import Parameters
 
 Array = NDArray[np.float64]
@@ -189,7 +190,7 @@ def diagnose(
         content = content_of(model.parameters, ready, noise, found, as_given, odd, compared.one_loop)
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
     notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
-    extended = _extended(model.parameters, found.fitted, ready, effects)
+    extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
 
 
@@ -206,9 +207,13 @@ STEPS = 120
 
 
 def _extended(
-    parameters: Parameters, fitted: Fitted, ready: believed.Prepared, user: Sequence[type[Effect]]
+    parameters: Parameters,
+    cascade: Cascade,
+    fitted: Fitted,
+    ready: believed.Prepared,
+    user: Sequence[type[Effect]],
 ) -> Parameters:
-    """The parameter file with the model refitted and the effects added."""
+    """The parameter file with the model refitted and the effects added; `cascade`: the believed model."""
     from hystgen.params import make_parameters
 
     p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
@@ -222,11 +227,15 @@ def _extended(
     if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # numbers of its own for every play
         kept[:] = True
     offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
+    plays: dict[str, Any] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}
+    believed_start = cascade.pi.start
+    if np.any(believed_start) and not cascade.stages and not actuator.stages:  # in front of plays they see the drive
+        plays["initial_state"] = np.interp(r[kept], cascade.pi.thresholds, believed_start).tolist()
     content = {
         **parameters.model_dump(),
         "input_range": list(parameters.input_range),
         "model": {
-            "pi": {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()},
+            "pi": plays,
             "memoryless": [stage_content(stage) for stage in actuator.stages],
             "output_offset": offset,
             "effects": [{"name": effect.name, **intervals.entry(effect)} for effect in actuator.effects],

@@ -49,6 +49,10 @@ SETTLED = 3
 """Most steps to the offset in front of a map; each squares what is left of the map's curvature, some per cent."""
 
 
+class NotFiniteError(ArithmeticError):
+    """An output map makes no numbers of what it is given."""
+
+
 class Recent:
     """Arrays that were asked for lately, by what made them; no more than so many, and than so many bytes."""
 
@@ -363,6 +367,8 @@ class Actuator:
         step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
         for _ in range(SETTLED):
             bent = self.mapped(h, level, item)
+            if not np.isfinite(bent).all():
+                raise NotFiniteError
             moved = (self.mapped(h, level + step, item) - bent) / step
             left, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
             if not np.any(slopes[0]):
@@ -525,7 +531,10 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
     """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
     n1 = len(structure.thresholds)
     here = structure.actuator(shape)
-    blocks = [_Block(here, item, p) for item in items if item.known.any()]
+    try:
+        blocks = [_Block(here, item, p) for item in items if item.known.any()]
+    except NotFiniteError:
+        return Shaped(shape, p, math.inf, p, 1, lambda: Reduced(structure.thresholds, np.empty((0, 0)), (), ()))
     samples = sum(block.samples for block in blocks)
 
     def derived() -> Reduced:

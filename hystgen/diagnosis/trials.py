@@ -16,8 +16,9 @@ from hystgen.diagnosis.options import Option, about, front_names, options
 from hystgen.diagnosis.structure import Fitted, Item, Search, Structure
 from hystgen.diagnosis.thinning import everything, needed, thinned
 from hystgen.effects import recursions
-from hystgen.effects.base import About, Effect
+from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
+from hystgen.problems import EffectsError
 
 Array = NDArray[np.float64]
 
@@ -147,7 +148,7 @@ class Records:
         """Records thinned by what the refitted model leaves of them; a user's own effect sees all samples."""
         groups, structure = (to_fit, held), refitted.structure
         masks = everything(groups)
-        if not user and not any(part.name.startswith("user:") for part in structure.parts):
+        if not user and not any(part.name.startswith(USER) for part in structure.parts):
             masks = [needed(group, refitted.errors(group), noise) for group in groups]
         full, quick = (thinned(groups, number, masks)[0] for number in (joint.COMPARED, SEARCHED))
         thin, thin_held = thinned(groups, SCREENED, masks)
@@ -230,6 +231,8 @@ def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_S
         begun = [
             fits.begun(option.alone, records.thin, enough_of_it(option, start), now.weights) for start in starts
         ]
+        if option.name.startswith(USER) and not any(math.isfinite(each.now.rms) for each in begun):
+            raise EffectsError(f"the effect {option.name} gives no finite output wherever a search for it begins")
         near = TOO_FAR * min(each.now.rms for each in acting(begun))
         searches = [each.further(FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
         best = min(acting(searches), key=lambda each: each.now.rms)

@@ -11,13 +11,14 @@ import math
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from hystgen import operators
+from hystgen.effects import watched
 from hystgen.words import counted
 
 Array = NDArray[np.float64]
@@ -33,6 +34,9 @@ class Place(enum.Enum):
     OUTPUT = "output"
     ADDED = "added"
 
+
+USER = "user:"
+"""What names of a user's own effects begin with."""
 
 MOST_BYTES = 2**25
 """Size of the factors that a record remembers."""
@@ -217,6 +221,13 @@ class Effect(BaseModel):
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """A user's own effect may fail or answer anything, and is watched."""
+        words = getattr(cls.model_fields["name"].annotation, "__args__", ())
+        if words and str(words[0]).startswith(USER):
+            watched.watch(cls, str(words[0]))
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""

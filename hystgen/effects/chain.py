@@ -129,6 +129,9 @@ class Chain:
                 raise EffectsError(f"the effect {who} needs the column {name}, which a record does not have")
         session = join(runs, history)
         y = self.output(session.run)
+        if not np.isfinite(y).all() and np.isfinite(session.run.v).all():
+            names = ", ".join(effect.name for effect in self.effects) or "no effects"
+            raise EffectsError(f"the output is not finite; what do the parameters of {names} come to?")
         return [y[part] for part in session.parts]
 
     def output(self, run: Run) -> Array:
@@ -140,20 +143,20 @@ class Chain:
             if _rank(effect) >= _BEHIND_OFFSET:
                 y, offset = y + offset, 0.0
             if effect.place is Place.LINEAR:
-                y = _answer(effect, "filtered", y, y, run)
+                y = effect.filtered(y, run)
             elif effect.place is Place.GAIN:
-                y = _answer(effect, "gain", y, run) * y + _answer(effect, "offset", y, run)
+                y = effect.gain(run) * y + effect.offset(run)
             elif effect.place is Place.OUTPUT:
-                y = _answer(effect, "mapped", y, y, run)
+                y = effect.mapped(y, run)
             else:
-                y = y + _answer(effect, "added", y, run)
+                y = y + effect.added(run)
         return y + offset
 
     def play_input(self, run: Run) -> Array:
         """Input `w` (N,) of the plays: the drive behind delay, slew limit, lag and front."""
         a = np.ascontiguousarray(run.v, dtype=np.float64)
         for effect in self._of(Place.DRIVE):
-            a = _answer(effect, "drive", a, a, run)
+            a = effect.drive(a, run)
         if not self.cascade.branches_differ:
             return through_stages(self.cascade.stages, a, None)
         before = float(self.cascade.front_inverse(self.cascade.pi.start[0])) if self.cascade.start_is_defined else 0.0
@@ -182,14 +185,14 @@ def moved(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, star
     mover = _mover(effects)
     if mover is None:
         return operators.plays(w, thresholds, start)
-    return _answer(mover, "plays", np.empty((len(thresholds), len(w))), w, run, thresholds, start)
+    return mover.plays(w, run, thresholds, start)
 
 
 def bent(effects: Sequence[Effect], rows: Array, thresholds: Array) -> Array:
     """The rows behind all effects that bend them."""
     for effect in effects:
         if effect.bends_plays():
-            rows = _answer(effect, "bent", rows, rows, thresholds)
+            rows = effect.bent(rows, thresholds)
     return rows
 
 
@@ -213,19 +216,3 @@ def summed(effects: Sequence[Effect], p: Array, w: Array, run: Run, thresholds: 
 
 def _mover(effects: Sequence[Effect]) -> Effect | None:
     return next((effect for effect in effects if effect.moves_plays()), None)
-
-
-def _answer(effect: Effect, method: str, like: Array, *arguments: object) -> Array:
-    """What an effect answers, if it has the form of `like`; a user's own effect may fail or answer anything."""
-    try:
-        found = np.asarray(getattr(effect, method)(*arguments))
-    except Exception as error:
-        if not effect.name.startswith("user:"):
-            raise
-        raise EffectsError(f"the effect {effect.name} failed in {method}: {type(error).__name__}: {error}") from error
-    if found.shape != like.shape or found.dtype.kind not in "fiu":
-        what = f"{found.dtype} of shape {found.shape}"
-        raise EffectsError(
-            f"the effect {effect.name} answered {what} in {method}; numbers of shape {like.shape} were expected"
-        )
-    return np.ascontiguousarray(found, dtype=np.float64)

@@ -10,10 +10,8 @@ import sys
 import traceback
 from pathlib import Path
 
-from hystgen.effects.base import Effect, Place
+from hystgen.effects.base import USER, Effect, Place
 from hystgen.problems import EffectsError
-
-PREFIX = "user:"
 
 METHODS = {
     Place.DRIVE: ("drive",),
@@ -76,7 +74,7 @@ def _line(error: BaseException, file: Path) -> str:
 def _problem(effect: type[Effect]) -> str:
     """Why a class cannot be used, or nothing."""
     words: tuple[object, ...] = getattr(effect.model_fields["name"].annotation, "__args__", ())
-    if len(words) != 1 or not str(words[0]).startswith(PREFIX) or words[0] == PREFIX:
+    if len(words) != 1 or not str(words[0]).startswith(USER) or words[0] == USER:
         return 'needs a name of its own; write name: Literal["user:my_effect"]'
     if not isinstance(getattr(effect, "place", None), Place):
         return "needs a place; write place: ClassVar[Place] = Place.OUTPUT, or another of hystgen.effects.Place"

@@ -1,0 +1,96 @@
+"""What effects of a user's own answer is looked at before anything goes on with it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hystgen.problems import EffectsError
+
+if TYPE_CHECKING:
+    from hystgen.effects.base import Candidate, Effect
+
+FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
+    "drive": lambda a, *_: a.shape,
+    "plays": lambda w, _, thresholds, *__: (len(thresholds), len(w)),
+    "summed": lambda _, w, *__: w.shape,
+    "bent": lambda rows, *_: rows.shape,
+    "bent_sum": lambda _, rows, *__: rows.shape[1:],
+    "filtered": lambda h, *_: h.shape,
+    "gain": lambda run: run.t.shape,
+    "offset": lambda run: run.t.shape,
+    "mapped": lambda y, *_: y.shape,
+    "added": lambda run: run.t.shape,
+    "transients": lambda run: (-1, len(run.t)),
+}
+"""Shape of what each method answers, by its arguments; -1 stands for any number."""
+
+
+def watch(effect: type[Effect], name: str) -> None:
+    """Make methods that a class defines raise EffectsError where they fail or answer what cannot be used."""
+    for method in FORMS:
+        if method in vars(effect):
+            setattr(effect, method, _method(vars(effect)[method], name, method))
+    if "candidates" in vars(effect):
+        effect.candidates = classmethod(_candidates(vars(effect)["candidates"].__func__, name))  # type: ignore[assignment, method-assign]
+
+
+def _method(own: Callable[..., Any], name: str, method: str) -> Callable[..., Any]:
+    @functools.wraps(own)
+    def answer(self: Effect, *arguments: Any) -> Any:
+        try:
+            found = np.asarray(own(self, *arguments))
+        except Exception as error:
+            raise _failed(name, method, error) from error
+        wanted = FORMS[method](*arguments)
+        fits = len(found.shape) == len(wanted) and all(a in (-1, b) for a, b in zip(wanted, found.shape, strict=True))
+        if not fits or found.dtype.kind not in "fiu":
+            raise EffectsError(
+                f"the effect {name} answered {found.dtype} of shape {found.shape} in {method}; numbers of shape "
+                f"{wanted} were expected"
+            )
+        return np.ascontiguousarray(found, dtype=np.float64)
+
+    return answer
+
+
+def _candidates(own: Callable[..., Any], name: str) -> Callable[..., list[Candidate]]:
+    @functools.wraps(own)
+    def candidates(cls: type[Effect], about: Any) -> list[Candidate]:
+        try:
+            return [_candidate(each, cls, name) for each in own(cls, about)]
+        except EffectsError:
+            raise
+        except Exception as error:
+            raise _failed(name, "candidates", error) from error
+
+    return candidates
+
+
+def _candidate(each: Candidate, cls: type[Effect], name: str) -> Candidate:
+    def build(x: Any) -> Effect:
+        try:
+            made = each.build(x)
+        except Exception as error:
+            raise _failed(name, f"build of {each.label!r}", error) from error
+        if not isinstance(made, cls):
+            raise EffectsError(f"the effect {name} answered {type(made).__name__} in build of {each.label!r}")
+        return made
+
+    vectors = [np.asarray(x, dtype=np.float64) for x in (each.low, each.start, each.high, *each.others)]
+    low, _, high = vectors[:3]
+    if low.ndim != 1 or any(x.shape != low.shape or not np.isfinite(x).all() for x in vectors) or np.any(low > high):
+        raise EffectsError(
+            f"the effect {name} has a candidate {each.label!r} whose low, start, high and others are not finite lists "
+            "of one length, low below high"
+        )
+    build(vectors[1])
+    return replace(each, low=low, start=vectors[1], high=high, others=tuple(vectors[3:]), build=build)
+
+
+def _failed(name: str, method: str, error: Exception) -> EffectsError:
+    return EffectsError(f"the effect {name} failed in {method}: {type(error).__name__}: {error}")
