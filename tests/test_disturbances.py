@@ -126,6 +126,20 @@ class TestWrongSamples:
             wrong = np.concatenate([np.arange(a, b) for a, b in runs])
             assert np.flatnonzero(np.isnan(clean[k].y)).tolist() == wrong.tolist()
 
+    @pytest.mark.parametrize("period", [7.0, 8.4, 12.0, 20.0])
+    def test_ringing_is_no_drop_out(self, period: float) -> None:
+        """Behind steps with long rests half a swing leaves and comes back too, in several steps."""
+        angle, decay = 2.0 * np.pi / period, np.exp(-0.03 * 2.0 * np.pi / period)
+        down = [1.0, -2.0 * decay * np.cos(angle), decay**2]
+        v = np.repeat([0.0, 80.0, 20.0, 100.0, 40.0], 4000)
+        y = lfilter([sum(down)], down, plant(v)) + noise(len(v), 5)
+        item = Item("steps.csv", Run(np.arange(len(v)) * STEP, v), y, HISTORY, float(np.ptp(y)))
+        assert bad_samples.without_faults([item], [])[1] == []
+        y = y.copy()
+        y[6000:6030] = -30.0
+        (each,) = bad_samples.without_faults([changed(item, y)], [])[1]
+        assert (each["kind"], each["samples"]) == ("drop_outs", 30)
+
     def test_held_samples(self) -> None:
         items = session()
         runs = [(200, 240), (900, 915), (1800, 1850)]
@@ -287,6 +301,25 @@ class TestWholeRecords:
         assert (each["kind"], each["record"]) == ("scale", "r1.csv")
         assert each["factor"] == pytest.approx(factor, rel=0.05)
         assert [k for k, one in enumerate(kept) if one is None] == [1]
+
+    @pytest.mark.parametrize("factor", [1000.0, 0.001])
+    def test_a_drive_in_another_unit(self, factor: float) -> None:
+        """It is no measure of how wide the others are."""
+        given = records()
+        given[1] = replace(given[1], v=factor * np.asarray(given[1].v))
+        kept, (each,) = check(given)
+        assert (each["kind"], each["record"]) == ("scale", "r1.csv")
+        assert each["factor"] == pytest.approx(1.0 / factor, rel=0.5)
+        assert [k for k, one in enumerate(kept) if one is None] == [1]
+
+    @pytest.mark.parametrize("which", [0, 1, 3])
+    def test_a_dead_sensor(self, which: int) -> None:
+        given = records()
+        given[which] = replace(given[which], y=3.0 + noise(len(given[which].v), 70))
+        kept, (each,) = check(given)
+        assert (each["kind"], each["record"]) == ("scale", f"r{which}.csv")
+        assert each["factor"] < 0.02
+        assert [k for k, one in enumerate(kept) if one is None] == [which]
 
     @pytest.mark.parametrize("factor", [1000.0, 0.1, -1.0])
     def test_all_in_other_units(self, factor: float) -> None:

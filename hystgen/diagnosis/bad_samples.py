@@ -26,6 +26,9 @@ RAIL = 12
 SHARP, USUAL = 8.0, 0.98
 """A drop-out begins and ends with a step of so many times this quantile of the steps."""
 
+SWINGS = 0.4
+"""A step beside steps of more than this share of it, but for one, is part of a swing."""
+
 LONGEST = 200
 """Most samples of a drop-out, and of what is masked as one no more than a twentieth of the record."""
 
@@ -124,6 +127,8 @@ def _slope(y: Array, v: Array) -> float:
 def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
     """Runs [a, b) over which the output leaves at a step, stays away and comes back at a step, as the drive does not.
 
+    What rings does so in several steps.
+
     `y`: NaN where it is not compared.
     """
     known = np.flatnonzero(np.isfinite(y))
@@ -147,6 +152,8 @@ def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
         back = abs(level[j + 1] - level[k])
         inside = (level[k + 1 : j + 1] - np.interp(np.arange(k + 1, j + 1), [k, j + 1], level[[k, j + 1]])) / step[k]
         follows = max(abs(move[k]), abs(move[j])) > 0.25 * size[k]
+        beside = sorted(size[m] for m in (k - 1, k + 1, j - 1, j + 1) if 0 <= m < len(size))
+        follows = follows or beside[-2] > SWINGS * size[k]
         if j - k >= SHORT and not follows and back < 0.3 * size[k] and np.min(inside) > 0.5:
             found.append((int(known[k + 1]), int(known[j]) + 1))
             end = j

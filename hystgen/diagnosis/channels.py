@@ -25,6 +25,12 @@ ONE = 1.7
 MOVES = 0.3
 """Only records whose drive moves over this share of the widest one's range tell of their scale."""
 
+OTHER_UNIT = 30.0
+"""A drive that many times as wide as half of the others is in another unit, and no measure for them."""
+
+DEAD = 0.1
+"""An output that does not go with the drive and moves by less than this share of what is expected is no measurement."""
+
 GOES_WITH = 0.9
 """Least correlation of output and prediction for a scale to be told from them."""
 
@@ -56,7 +62,9 @@ def checked(
 
     Exchanged columns are put right; a record in other units than the others, or with another's output, is left out.
     """
-    widest = max(float(np.ptp(record.v)) for record in records)
+    widths = np.array([float(np.ptp(record.v)) for record in records])
+    moving = widths[widths > 0.0]
+    widest = float(np.max(moving[moving <= OTHER_UNIT * np.median(moving)], initial=0.0))
     tells = [k for k, record in enumerate(records) if _tells(record)]
     predicted = {k: _predicted(records[k], actuator, weights, history) for k in tells}
     found = {k: _against(records[k], predicted[k]) for k in tells}
@@ -78,12 +86,22 @@ def checked(
     usual = float(np.median([found[k].factor for k in sure])) if sure else 1.0
     if not 1.0 / ALL < usual < ALL:
         told.append({"kind": "scale", "record": "all", "factor": usual})
-    for k in sure:
+    little = [k for k in tells if k not in swapped and k not in wide and found[k].correlation > GOES_WITH]
+    for k in (*sure, *little):
         factor = found[k].factor / usual
-        if not 1.0 / ONE < factor < ONE:
+        if not (1.0 / ONE if k in sure else 0.0) < factor < (ONE if k in sure else OTHER_UNIT):
             kept[k] = None
             told.append({"kind": "scale", "record": records[k].name, "factor": factor})
+    for k in (k for k in wide if sure and k not in sure and kept[k] is not None):
+        size = _spread(records[k].y) / max(usual * _spread(predicted[k]), 1e-300)
+        if size < DEAD:
+            kept[k] = None
+            told.append({"kind": "scale", "record": records[k].name, "factor": size})
     return kept, told
+
+
+def _spread(x: Any) -> float:
+    return float(np.subtract(*np.quantile(x, (0.75, 0.25))))
 
 
 def _tells(record: Record) -> bool:

@@ -55,7 +55,7 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
             )
         return (
             f"{record}: left out, its output is {each['factor']:.4g} times what the other records let expect: other "
-            "units, or another gain of the sensor"
+            "units of drive or output, another gain of the sensor, or a dead one"
         )
     if kind == "swapped_channels":
         return f"{record}: drive and displacement are exchanged (the output is ahead of the drive); put right"
