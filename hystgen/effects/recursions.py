@@ -55,11 +55,23 @@ def creep(
 
 
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
-    """`u` followed by moves of at most `up_k` upwards and `down_k` downwards to sample k + 1."""
+    """`u`, straight between samples, followed at no more than `up_k` upwards and `down_k` downwards in a step.
+
+    Where it is met within a step, the rest of the step goes along with it, or as fast as it may.
+    """
     x = u[0]
     out[0] = x
     for k in range(len(u) - 1):
-        x = min(max(u[k + 1], x - down[k]), x + up[k])
+        change = u[k + 1] - u[k]
+        ahead = u[k] - x
+        closing = up[k] - change if ahead > 0.0 else down[k] + change
+        if ahead != 0.0 and not closing > abs(ahead):
+            x = x + up[k] if ahead > 0.0 else x - down[k]
+        elif -down[k] <= change <= up[k]:
+            x = u[k + 1]
+        else:
+            part = abs(ahead) / closing if ahead != 0.0 else 0.0
+            x = u[k] + part * change + (1.0 - part) * (up[k] if change > 0.0 else -down[k])
         out[k + 1] = x
 
 

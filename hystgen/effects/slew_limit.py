@@ -16,7 +16,10 @@ BELOW = (0.3, 0.5, 0.7, 1.0)
 
 
 class SlewLimit(Effect):
-    """Slew limit `-S_falling <= a' <= S` of the drive: from sample to sample `a` goes as far towards `v` as it may."""
+    """Slew limit `-S_falling <= a' <= S` of the drive: `a` goes towards `v` as fast as it may.
+
+    Exact for straight `v` between samples.
+    """
 
     name: Literal["slew_limit"] = Field(description="name of the effect")
     rate: Positive = Field(description="S, input units per s", examples=[5.0e3])
