@@ -1021,9 +1021,14 @@ def test_a_wrong_file_gives_one_message(tmp_path: Path, text: str | None, said: 
     ("run.v[:-1]", "the effect user:own answered float64 of shape (1999,) in added; numbers of shape (2000,)"),
     ("'text'", "the effect user:own answered <U4 of shape () in added"),
 ])  # fmt: skip
-def test_an_own_effect_that_fails_is_named(tmp_path: Path, answer: str, said: str) -> None:
+@pytest.mark.parametrize("inherited", [False, True])
+def test_an_own_effect_that_fails_is_named(tmp_path: Path, answer: str, said: str, inherited: bool) -> None:
     path = tmp_path / "own.py"
-    path.write_text(OWN.replace("self.height * np.ones(len(run.t))", answer))
+    text = OWN.replace("self.height * np.ones(len(run.t))", answer)
+    if inherited:
+        text = text.replace("class Own(", "class _Part(").replace('    name: Literal["user:own"]\n', "")
+        text += '\nclass Own(_Part):\n    name: Literal["user:own"]\n'
+    path.write_text(text)
     (own,) = effects.load_user_effects(path)
     t, v = drive()
     with pytest.raises(EffectsError, match=re.escape(said)):

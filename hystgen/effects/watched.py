@@ -31,12 +31,15 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
 
 
 def watch(effect: type[Effect], name: str) -> None:
-    """Make methods that a class defines raise EffectsError where they fail or answer what cannot be used."""
+    """Make what a class or those above it define raise EffectsError where it fails or answers what is of no use."""
+    own: dict[str, Any] = {}
+    for each in reversed(effect.__mro__[: [kind.__name__ for kind in effect.__mro__].index("Effect")]):
+        own.update(vars(each))
     for method in FORMS:
-        if method in vars(effect):
-            setattr(effect, method, _method(vars(effect)[method], name, method))
-    if "candidates" in vars(effect):
-        effect.candidates = classmethod(_candidates(vars(effect)["candidates"].__func__, name))  # type: ignore[assignment, method-assign]
+        if method in own:
+            setattr(effect, method, _method(own[method], name, method))
+    if "candidates" in own:
+        effect.candidates = classmethod(_candidates(own["candidates"].__func__, name))  # type: ignore[assignment, method-assign]
 
 
 def _method(own: Callable[..., Any], name: str, method: str) -> Callable[..., Any]:
