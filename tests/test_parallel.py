@@ -92,10 +92,11 @@ class TestEach:
 
 class TestThreads:
     def test_all_is_done_and_no_thread_is_left(self) -> None:
-        done: list[int] = []
-        parallel.in_threads(done.append, range(20))
-        assert sorted(done) == list(range(20))
-        assert threading.active_count() == 1
+        done: list[tuple[int, threading.Thread]] = []
+        parallel.in_threads(lambda k: done.append((k, threading.current_thread())), range(20))
+        assert sorted(k for k, _ in done) == list(range(20))
+        assert threading.current_thread() not in [thread for _, thread in done]
+        assert not any(thread.is_alive() for _, thread in done)
 
     def test_nothing_to_do(self) -> None:
         parallel.in_threads(lambda _: pytest.fail("called"), [])
