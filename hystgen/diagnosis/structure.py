@@ -407,13 +407,16 @@ class Actuator:
     def _free(self, item: Item) -> Array:
         """The same of all samples."""
         free = [np.ones((1, len(item.run.t)))]
-        free += [found for effect in self.effects if len(found := effect.transients(item.run))]
+        free += [found for effect in self._starting(item) if len(found := effect.transients(item.run))]
         return np.concatenate(free)
+
+    def _starting(self, item: Item) -> list[Effect]:
+        return [effect for effect in self.effects if item.history is None or not effect.fades]
 
     def largest(self, item: Item, p: Array) -> Array:
         """(k,) how large the factors of `nuisances` may be: an effect of little weight has little left from a start."""
         span = FAR * float(np.sum(p)) * float(np.ptp((item.session or item.run).v))
-        limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self.effects)]
+        limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self._starting(item))]
         return np.concatenate(limits)
 
     def error(self, item: Item, p: Array, like: Fitted | None = None) -> Array:

@@ -213,6 +213,8 @@ class Effect(BaseModel):
     """whether `bent` or `mapped` makes of a sample what depends on that sample alone, and needs nothing of the run"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
+    fades: ClassVar[bool] = False
+    """whether its start state is at rest behind the pause before a record whose history is known"""
     settled: ClassVar[tuple[str, ...]] = ()
     """keys of conventions, and of numbers that a fit cannot tell from others: a refit leaves them as they are"""
     hint: ClassVar[str] = ""

@@ -24,6 +24,7 @@ class Resonance(Effect):
     damping: Annotated[Positive, Field(le=10.0)] = Field(description="zeta, above 0, 1 is critical", examples=[0.02])
 
     place: ClassVar[Place] = Place.LINEAR
+    fades: ClassVar[bool] = True
     order: ClassVar[int] = 1
     repeatable: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "approximate"
