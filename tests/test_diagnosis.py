@@ -685,18 +685,22 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     assert np.max(np.abs(found - predicted)) <= 2.0 * 0.5e-9 * np.sum(weights) * 100.0
 
 
+def five_records(output: Callable[[Array, Array], Array]) -> list[Record]:
+    """Five records of one session: an output of time and drive, and noise."""
+    made = []
+    for number in range(5):
+        v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 - 0.1 * number) * (wander(number, 40) - 40.0)])
+        t = np.arange(len(v)) * 1e-3 + 4.0 * number
+        made.append(Record(f"record {number}", t, v, noisy(output(t, v), 0.02, number), sample_time=0.001))
+    return made
+
+
 class TestBelievedEffects:
     """A model that has effects already: their numbers are refitted, and wrong ones are no missing effect."""
 
     def records(self, before: Callable[[Array], Array], behind: Callable[[Array], Array]) -> list[Record]:
-        """Five records of one session: plays between what acts before and behind them, and noise."""
-        made = []
-        for number in range(5):
-            v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 - 0.1 * number) * (wander(number, 40) - 40.0)])
-            t = np.arange(len(v)) * 1e-3 + 4.0 * number
-            y = behind(brute_output(before(v), (0.0, 10.0), (1.0, 0.5), 0.0))
-            made.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
-        return made
+        """Plays between what acts before and behind them."""
+        return five_records(lambda _, v: behind(brute_output(before(v), (0.0, 10.0), (1.0, 0.5), 0.0)))
 
     def diagnosed(self, tmp_path: Path, records: list[Record], effect: dict[str, Any], **more: Any) -> Diagnosis:
         path = tmp_path / "believed.yaml"
@@ -766,15 +770,13 @@ class TestOwnEffects:
     """A user's own effect takes part like those of the catalogue."""
 
     def records(self, amplitude: float, period: float) -> list[Record]:
-        """Five records of one session: plays, a duty cycle beside them, noise."""
-        made = []
-        for number in range(5):
-            v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (1.0 - 0.1 * number) * (wander(number, 40) - 40.0)])
-            t = np.arange(len(v)) * 1e-3 + 4.0 * number
-            y = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0)
-            y = y + 0.5 * amplitude * (1.0 - np.cos(2.0 * np.pi * t / period))
-            made.append(Record(f"record {number}", t, v, noisy(y, 0.02, number), sample_time=0.001))
-        return made
+        """Plays, and a duty cycle beside them."""
+
+        def output(t: Array, v: Array) -> Array:
+            beside = 0.5 * amplitude * (1.0 - np.cos(2.0 * np.pi * t / period))
+            return np.asarray(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) + beside)
+
+        return five_records(output)
 
     @pytest.mark.parametrize(("amplitude", "period"), [(2.0, 3.3), (-6.0, 11.0)])
     def test_it_is_found_named_and_added(self, tmp_path: Path, run: Call, amplitude: float, period: float) -> None:

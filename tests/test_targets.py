@@ -112,7 +112,6 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
                 assert 0 <= (row.stack or 0) < 400
 
 
-@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("operator", ["both", "inverse"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
@@ -125,7 +124,7 @@ def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(
     An operator alone is inlined in other ways than both.
     """
     report = hystgen.verify(
-        model(name), operator=operator, arithmetic=arithmetic, engine=engine, targets=["cortex-m4f"], target_length=700
+        model(name), operator=operator, arithmetic=arithmetic, engine=engine, targets=["cortex-m4f"], target_length=1500
     )
     assert report.ok, report.table()
     used = [row.stack for row in report.rows if row.stack is not None]

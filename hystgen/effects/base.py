@@ -229,7 +229,7 @@ class Effect(BaseModel):
         """A user's own effect may fail or answer anything, and is watched."""
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):
-            watched.watch(cls, str(words[0]))
+            watched.watch(cls, Effect, str(words[0]))
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""

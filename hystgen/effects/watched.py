@@ -30,10 +30,10 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
 """Shape of what each method answers, by its arguments; -1 stands for any number."""
 
 
-def watch(effect: type[Effect], name: str) -> None:
-    """Make what a class or those above it define raise EffectsError where it fails or answers what is of no use."""
+def watch(effect: type[Effect], base: type[Effect], name: str) -> None:
+    """Make what a class, or one between it and `base`, defines raise EffectsError where it fails or is of no use."""
     own: dict[str, Any] = {}
-    for each in reversed(effect.__mro__[: [kind.__name__ for kind in effect.__mro__].index("Effect")]):
+    for each in reversed(effect.__mro__[: effect.__mro__.index(base)]):
         own.update(vars(each))
     for method in FORMS:
         if method in own:
