@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from modelfiles import FILES
+from modelfiles import FILES, PLAYS
 
 import hystgen
 from hystgen import reference
@@ -130,6 +130,22 @@ def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(
     used = [row.stack for row in report.rows if row.stack is not None]
     assert len(used) == (4 if shutil.which(targets.ARM_GCC) else 2) * (2 if operator == "both" else 1)
     assert max(used) <= 128, report.table()
+
+
+@pytest.mark.parametrize("plays", [8, 9])
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("name", ["plain", "two_branches"])
+def test_nor_do_loops_that_are_unrolled(name: str, arithmetic: str, plays: int) -> None:
+    """A compiler that takes all plays at once, up to nine of them, would like all their products at once too."""
+    thresholds = [round(2.7 * k / plays, 4) for k in range(plays + 1)]
+    weights = [0.72, *(round(2.0 / (plays + k), 4) for k in range(1, plays + 1))]
+    more = f"\n  pi:\n    thresholds: {thresholds}\n    weights: {weights}\n"
+    several = Model(parse_parameters(FILES[name].replace(PLAYS, more), f"{name}.yaml"))
+    report = hystgen.verify(
+        several, operator="both", arithmetic=arithmetic, engine="loop", targets=["cortex-m4f"], target_length=500
+    )
+    assert report.ok, report.table()
+    assert max(row.stack for row in report.rows if row.stack is not None) <= 128, report.table()
 
 
 @pytest.mark.parametrize("core", ["cortex-m0plus", "cortex-m4f", "rv32imac"])
