@@ -15,7 +15,7 @@ from recordings import brute_output, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.diagnosis import bad_samples, channels, description, intervals, periodic, stick_slip, structure
+from hystgen.diagnosis import bad_samples, channels, description, intervals, periodic, stick_slip, structure, told
 from hystgen.diagnosis.drives import one_loop, one_speed
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import shapes
@@ -199,6 +199,43 @@ class TestPeriodic:
         assert ripple["amplitude"] == pytest.approx(0.05, rel=0.06)
         assert len(ripple["records"]) == len(items)
         assert np.std(np.concatenate(left)) == pytest.approx(NOISE, rel=0.1)
+
+    def test_a_ripple_is_told_by_what_moves(self) -> None:
+        """Of a long record of holds a fit has left nothing of it."""
+        moving = [changed(item, item.y + 0.05 * np.sin(2 * np.pi * plant(item.run.v) / 0.4)) for item in session(0.5)]
+        v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 5000)
+        still = Item("still.csv", Run(np.arange(len(v)) * STEP, v), plant(v) + noise(len(v), 7), HISTORY, 10.0)
+        items = [*moving, still]
+        (ripple,), left = periodic.ripples(items, errors(items))
+        assert (ripple["pitch"], ripple["amplitude"]) == (pytest.approx(0.4, rel=0.003), pytest.approx(0.05, rel=0.06))
+        assert ripple["records"] == [item.name for item in moving]
+        assert np.std(np.concatenate(left[:-1])) == pytest.approx(NOISE, rel=0.1)
+
+    def test_codes_of_a_converter_are_no_interpolation_error(self) -> None:
+        items = [changed(item, 0.1 * np.round(item.y / 0.1)) for item in session(0.5)]
+        (ripple,), _ = periodic.lines(items, errors(items))
+        assert (ripple["pitch"], ripple["converter_step"]) == (pytest.approx(0.1, rel=0.003), True)
+        assert told.sentence(ripple, "um").endswith("its pitch is the step of the converter")
+        finer = [changed(item, item.y + 0.01 * np.sin(2 * np.pi * plant(item.run.v) / 0.1)) for item in session(0.5)]
+        (ripple,), _ = periodic.lines(finer, errors(finer))
+        assert ripple["converter_step"] is False
+        assert "interpolation error" in told.sentence(ripple, "um")
+
+    def test_what_is_another_on_the_way_back_is_no_ripple(self) -> None:
+        """Triangles over the same range, so that what turns with the way is the same in all of them."""
+        t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
+        made = {}
+        for ways in ("both", "turned"):
+            items = []
+            for k, period in enumerate((2.0, 1.0, 0.5)):
+                v = np.asarray(100.0 * np.abs(((t / period) % 2.0) - 1.0))
+                ripple = 0.05 * np.sin(2 * np.pi * plant(v) / 0.4)
+                way = np.sign(np.gradient(v)) if ways == "turned" else 1.0
+                y = plant(v) + way * ripple + noise(len(t), k)
+                items.append(Item(f"r{k}", Run(t, v), y, HISTORY, 10.0))
+            made[ways] = [each for each in periodic.lines(items, errors(items))[0] if each["kind"] == "ripple"]
+        assert len(made["both"]) == 1
+        assert made["turned"] == []
 
     def test_harmonics_of_a_periodic_drive_are_no_lines(self) -> None:
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
@@ -482,3 +519,34 @@ def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
     for words in ("a line at 50 Hz (mains hum)", "drop-outs", "No effect of the catalogue", "Faults of the data"):
         assert words in page
     assert json.loads((tmp_path / "out" / "diagnosis.json").read_text()) == found.content
+
+
+def _late(v: Array, samples: float) -> Array:
+    """The drive behind a first-order lag, in steps of a hundredth of a sample."""
+    fine = np.interp(np.arange(100 * (len(v) - 1) + 1) / 100, np.arange(len(v)), v)
+    return np.asarray(lfilter(*_smooth(100.0 * samples), fine, zi=[np.exp(-0.01 / samples) * v[0]])[0][::100])
+
+
+@pytest.mark.parametrize("lagging", [False, True])
+def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> None:
+    """So large that the output turns round, and beside a lag only seen once that is found: neither an effect nor
+    stick-slip. A few per cent of it are in the weights."""
+    made = []
+    for k, v in enumerate(drives()):
+        t = np.asarray(100.0 * k + np.arange(len(v)) * STEP, dtype=np.float64)
+        y = plant(_late(v, 6.0) if lagging else v)
+        y = y + 0.05 * np.sin(2 * np.pi * y / 0.25 + 0.7) + noise(len(v), 40 + k)
+        made.append(Record(f"r{k}.csv", t, v, y))
+    (tmp_path / "stage.yaml").write_text(
+        "hystgen: 1\nname: stage\nunits: {input: V, output: um}\ninput_range: [0, 100]\n"
+        f"model: {{pi: {{thresholds: {list(THRESHOLDS)}, weights: {list(WEIGHTS)}}}}}\n"
+    )
+    found = hystgen.diagnose(tmp_path / "stage.yaml", made[:4], holdout=made[4:], history=HISTORY)
+    assert [effect["name"] for effect in found.content["effects"]] == ["lag"] * lagging
+    assert found.verdict == ("effects_found" if lagging else "unexplained")
+    (ripple,) = found.content["unexplained"]
+    assert (ripple["kind"], ripple["pitch"]) == ("ripple", pytest.approx(0.25, rel=0.003))
+    assert ripple["amplitude"] == pytest.approx(0.05, rel=0.15)
+    assert found.content["gap"]["after"]["holdout"] < 1.25 * NOISE
+    (note,) = [note for note in found.notes if "ripple" in note]
+    assert "taken out of the records" in note

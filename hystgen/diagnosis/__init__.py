@@ -12,15 +12,17 @@ import json
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import believed, channels, floor, intervals, selection, starts, structure, told
+from hystgen.diagnosis import believed, channels, floor, intervals, ripples, selection, starts, structure, told
 from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.floor import Floor
+from hystgen.diagnosis.ripples import Rippled
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
@@ -167,29 +169,46 @@ def diagnose(
             for group in (usable[: len(several)], usable[len(several) :])
         )
 
-        def searched(history: tuple[float, ...] | None) -> tuple[believed.Prepared, Floor, Records, Outcome]:
+        def searched(history: tuple[float, ...] | None) -> tuple[Rippled, Floor, Records, Outcome]:
             ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
-            noise = floor.noise_floor([*ready.to_fit, *ready.held])
             base, start = believed.structure_of(model.cascade, given, ready)
-            refitted = selection.refit(base, ready.to_fit, start, believed.believed_weights(model.cascade, base))
-            records = Records.of(ready.to_fit, ready.held, refitted, noise.rms, effects, lambda: bar.tick(1))
-            return ready, noise, records, selection.select(records, refitted)
+            weights = believed.believed_weights(model.cascade, base)
 
-        ready, noise, compared, found = searched(before)
-        wrong = starts.contradicted(ready.to_fit, found.fitted)
+            def refit(ready: believed.Prepared) -> Fitted:
+                return selection.refit(base, ready.to_fit, start, weights)
+
+            def select(clean: believed.Prepared, refitted: Fitted) -> tuple[Floor, Records, Outcome]:
+                noise = floor.noise_floor([*clean.to_fit, *clean.held])
+                records = Records.of(clean.to_fit, clean.held, refitted, noise.rms, effects, lambda: bar.tick(1))
+                return noise, records, selection.select(records, refitted)
+
+            refitted = refit(ready)
+            rippled = ripples.taken_out(ripples.none_in(ready), refitted, refit)
+            if rippled.told:
+                refitted = refit(rippled.clean)
+            noise, records, found = select(rippled.clean, refitted)
+            if found.found and rippled.left_by(found.fitted):  # only beside what is found it shows as it is
+                rippled = ripples.taken_out(rippled, found.fitted, partial(selection.again, found.fitted))
+                noise, records, found = select(rippled.clean, refit(rippled.clean))
+            return rippled, noise, records, found
+
+        rippled, noise, compared, found = searched(before)
+        wrong = starts.contradicted(rippled.clean.to_fit, found.fitted)
         if wrong is not None:
             odd.append(wrong)
             try:
-                ready, noise, compared, found = searched(None)
+                rippled, noise, compared, found = searched(None)
             except IdentificationError as error:
                 said = told.sentence(wrong, model.parameters.units.output)
                 raise IdentificationError(f"{said}, and without it {error}") from None
+        ready, odd = rippled.clean, [*odd, *rippled.told]
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
         content = content_of(model.parameters, ready, noise, found, as_given, odd, compared.one_loop)
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
     notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
+    notes += rippled.notes(model.parameters.units.output)
     extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
 

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.diagnosis import bad_samples, description, intervals, periodic, stick_slip, structure, told, where
+from hystgen.diagnosis import (
+    bad_samples,
+    description,
+    intervals,
+    periodic,
+    ripples,
+    stick_slip,
+    structure,
+    told,
+    where,
+)  # fmt: skip
 from hystgen.diagnosis.believed import Prepared
 from hystgen.diagnosis.decisions import FAR_ABOVE
 from hystgen.diagnosis.floor import Floor
@@ -45,8 +55,12 @@ def content_of(
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
     refitted, last = ([structure.rms(errors) for errors in each] for each in (before, after))
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
-    periodic_ones, errors = periodic.lines(everything, errors)
-    sticking = bad_samples.merged(stick_slip.stick_slip(everything, errors, noise.rms))
+    lines, errors = periodic.lines(everything, errors)
+    known = [each for each in odd if each["kind"] == "ripple"]
+    periodic_ones = [line for line in lines if not ripples.is_told(line, known)]
+    # where the position is not predicted as well as a ripple asks for, what is left of that jumps
+    jumping = max([noise.rms, *(each["amplitude"] for each in (*known, *periodic_ones) if each["kind"] == "ripple")])
+    sticking = bad_samples.merged(stick_slip.stick_slip(everything, errors, jumping))
     left = [each for each in odd if each["kind"] not in told.REPAIRED] + periodic_ones + sticking
     share, _ = description.structure(ready.held, errors[len(ready.to_fit) :])
     share = max(share, *description.together(everything, errors))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.diagnosis.floor import HOLD, still
 from hystgen.diagnosis.structure import Item
 
 Array = NDArray[np.float64]
@@ -17,8 +18,10 @@ Array = NDArray[np.float64]
 STANDS = 30.0
 """A line stands so many times above the median of its surroundings, in power."""
 
-SHARE, ALONE = 0.03, 0.3
-"""Least share of a record's residual variance in a line, and where only a few of the records have it."""
+SHARE, RULES = 0.03, 0.3
+"""Least share of the residual variance in a line, and in one that rules: it may be in a few of the records alone, and
+over the position it is taken out before effects are sought. What effects leave that are not found yet may look like a
+weak one."""
 
 OWN, PEAK = 1e-6, 10.0
 """A line is the drive's own where that has so much of its power there, and so many times its surroundings'."""
@@ -34,6 +37,15 @@ MOST = 4
 
 CLOSE = 0.02
 """Frequencies of ringing that differ by less are the same."""
+
+RESOLVED = 0.25
+"""A sample tells of a ripple where the position moves by less than this share of its pitch."""
+
+OF_THE_CONVERTER = 0.02
+"""A pitch that is the least step of the output within this share is that of the converter's codes."""
+
+ENOUGH = 20_000
+"""Samples from which a pitch is told."""
 
 BINS = 4096
 """Positions are taken to so many places of the range."""
@@ -56,9 +68,23 @@ class Line:
 
 def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
     """Lines in the errors of several records, the strongest first, and the errors without them."""
+    return _taken_out(items, errors, (_in_time, _in_position), 0.0)
+
+
+def ripples(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
+    """The same of lines over the position that rule the errors."""
+    return _taken_out(items, errors, (_in_position,), RULES)
+
+
+def _taken_out(
+    items: Sequence[Item],
+    errors: Sequence[Array],
+    ways: Sequence[Callable[[Sequence[Item], Sequence[Array]], Line | None]],
+    least: float,
+) -> tuple[list[dict[str, Any]], list[Array]]:
     left, told = list(errors), []
     for _ in range(MOST):
-        found = [line for line in (_in_time(items, left), _in_position(items, left)) if line is not None]
+        found = [line for line in (way(items, left) for way in ways) if line is not None and line.share >= least]
         if not found:
             break
         best = max(found, key=lambda line: line.share)
@@ -94,7 +120,7 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
         able = [j for j, n in enumerate(lengths) if n * frequency >= PERIODS and 2.0 * frequency <= rates[j]]
         strength = sum(p[0] for p in near)
         common = len(seen) >= max(2, 0.4 * len(able)) or len(able) == len(seen)
-        if (common or min(p[0] for p in near) > ALONE) and (best is None or strength > best[0]):
+        if (common or min(p[0] for p in near) > RULES) and (best is None or strength > best[0]):
             longest = max(near, key=lambda p: lengths[p[2]])  # which tells the frequency best
             best = strength, longest[1], seen, able
     if best is None:
@@ -243,25 +269,50 @@ def _without(error: Array, phase: Array) -> tuple[Array, float]:
 # Over the position -------------------------------------------------------------------------------------------
 
 
-def _in_position(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
-    """A ripple with a fixed pitch over the predicted position, of the same phase in all records.
+@dataclass(frozen=True)
+class _Course:
+    """A record as a ripple sees it: predicted places of the samples that are compared, what is left there, and how far
+    up or down the prediction moves from the sample before, NaN where the drive holds.
 
-    The measured position would not do: a ripple that is large against its pitch is no sine over itself.
+    There one place is measured again and again, and the model has been bent to meet it. The measured position would not
+    do: a ripple that is large against its pitch is no sine over itself.
     """
-    known = [np.isfinite(e) & np.isfinite(item.y) for item, e in zip(items, errors, strict=True)]
-    values = [e[at] for e, at in zip(errors, known, strict=True)]
-    places = [item.y[at] - e for item, e, at in zip(items, values, known, strict=True)]
-    if sum(map(len, values)) < 256:
+
+    at: NDArray[np.bool_]
+    places: Array
+    left: Array
+    moves: Array
+
+    @classmethod
+    def of(cls, item: Item, error: Array) -> _Course:
+        """The course of a record."""
+        at = np.isfinite(error) & np.isfinite(item.y)
+        predicted = item.y - error
+        moves = np.diff(predicted, prepend=np.nan)
+        for first, last in still(item.run.v, HOLD):
+            moves[first + 1 : last] = np.nan
+        return cls(at, predicted[at], error[at], moves[at])
+
+    def tells(self, pitch: float) -> NDArray[np.bool_]:
+        """The samples that resolve a ripple of this pitch."""
+        return np.asarray(np.abs(self.moves) < RESOLVED * pitch)
+
+
+def _in_position(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
+    """A ripple with a fixed pitch over the predicted position, of the same phase in all records."""
+    courses = [_Course.of(item, error) for item, error in zip(items, errors, strict=True)]
+    if sum(len(course.places) for course in courses) < 256:
         return None
-    low = min(float(y.min()) for y in places if len(y))
-    span = max(float(y.max()) for y in places if len(y)) - low
+    low = min(float(course.places.min()) for course in courses if len(course.places))
+    span = max(float(course.places.max()) for course in courses if len(course.places)) - low
     if span == 0.0:
         return None
     summed = np.zeros(BINS)
-    for y, e in zip(places, values, strict=True):
-        if len(e):
-            at = np.minimum(((y - low) / span * BINS).astype(int), BINS - 1)
-            summed += np.bincount(at, e - e.mean(), BINS)
+    for course in courses:
+        now = course.tells(span / PERIODS)
+        if now.any():
+            place = np.minimum(((course.places[now] - low) / span * BINS).astype(int), BINS - 1)
+            summed += np.bincount(place, course.left[now] - course.left[now].mean(), BINS)
     # four times as long: pitches between whole parts of the range
     power = np.abs(np.fft.rfft(summed, 4 * BINS)) ** 2
     power[: 4 * PERIODS] = 0.0
@@ -270,8 +321,7 @@ def _in_position(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
         around = np.concatenate([power[max(k - 160, 4 * PERIODS) : k - 12], power[k + 13 : k + 160]])
         if not len(around) or power[k] <= STANDS * float(np.median(around)):
             continue
-        pitch = _pitch(places, values, 4.0 * span / k)
-        found = _ripple(items, errors, places, values, pitch)
+        found = _ripple(items, errors, courses, _pitch(courses, 4.0 * span / k))
         if found is not None:
             return found
     return None
@@ -287,28 +337,44 @@ def _highest(power: Array, most: int) -> list[int]:
     return found
 
 
-def _pitch(places: Sequence[Array], values: Sequence[Array], pitch: float) -> float:
-    """The pitch that takes most out of the errors."""
-    y, e = np.concatenate(list(places)), np.concatenate([v - v.mean() for v in values if len(v)])
-    span = float(np.ptp(y))
-    candidates = 1.0 / (1.0 / pitch + np.linspace(-0.5, 0.5, 21) / span)
-    return float(max(candidates, key=lambda p: abs(np.exp(2j * np.pi * y / p) @ e)))
+def _pitch(courses: Sequence[_Course], pitch: float) -> float:
+    """The pitch whose ripple takes most out of the errors."""
+    parts = [(course, now) for course, now in ((course, course.tells(pitch)) for course in courses) if now.any()]
+    if not parts:
+        return pitch
+    every = max(1, sum(int(np.count_nonzero(now)) for _, now in parts) // ENOUGH)
+    y = np.concatenate([course.places[now][::every] for course, now in parts])
+    e = np.concatenate([course.left[now][::every] - course.left[now].mean() for course, now in parts])
+
+    def removed(waves: float) -> float:
+        table = np.column_stack([np.cos(2.0 * np.pi * waves * y), np.sin(2.0 * np.pi * waves * y)])
+        right = table.T @ e
+        return float(right @ np.linalg.lstsq(table.T @ table, right, rcond=None)[0])
+
+    best, step = 1.0 / pitch, 0.05 / max(float(np.ptp(y)), pitch)
+    for _ in range(2):
+        places = best + step * np.arange(-10, 11)
+        best, step = float(max(places, key=removed)), 0.1 * step
+    return 1.0 / best
 
 
-def _ripple(
-    items: Sequence[Item], errors: Sequence[Array], places: Sequence[Array], values: Sequence[Array], pitch: float
-) -> Line | None:
-    """The ripple, where what the other records say of it holds in most of those that travel over several pitches."""
+def _ripple(items: Sequence[Item], errors: Sequence[Array], courses: Sequence[_Course], pitch: float) -> Line | None:
+    """The ripple, where what others say of it holds in most of the ways up and down over several pitches.
+
+    What a lag or a loop leaves is another one on the way back.
+    """
     tables = [
-        np.column_stack([np.cos(2.0 * np.pi * y / pitch), np.sin(2.0 * np.pi * y / pitch)]) for y in places
+        np.column_stack([np.cos(2.0 * np.pi * course.places / pitch), np.sin(2.0 * np.pi * course.places / pitch)])
+        for course in courses
     ]
-    parts = [k for k, y in enumerate(places) if len(y) > 64 and np.ptp(y) > 3.0 * pitch]
-    pieces = [(tables[k], values[k] - values[k].mean()) for k in parts]
-    if len(pieces) == 1:
-        table, e = pieces[0]
-        half = len(e) // 2
-        pieces = [(table[:half], e[:half]), (table[half:], e[half:])]
-    if not pieces:
+    pieces, parts = [], []
+    for k, (course, table) in enumerate(zip(courses, tables, strict=True)):
+        for way in (1.0, -1.0):
+            now = course.tells(pitch) & (way * course.moves > 0.0)
+            if np.count_nonzero(now) > 32 and np.sum(np.abs(course.moves[now])) > 3.0 * pitch:
+                pieces.append((table[now], course.left[now] - course.left[now].mean()))
+                parts.append(k)
+    if len(pieces) < 2:
         return None
     squares = [(x.T @ x, x.T @ e) for x, e in pieces]
     matrix, right = sum(s[0] for s in squares), sum(s[1] for s in squares)
@@ -319,19 +385,25 @@ def _ripple(
     solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
     if holds < 0.6 * len(pieces):
         return None
-    after = []
-    for error, table in zip(errors, tables, strict=True):
-        e = error.copy()
-        e[np.isfinite(e)] -= table @ solution
-        after.append(e)
-    share = _share(errors, after)
+    share = _share([e for _, e in pieces], [e - x @ solution for x, e in pieces])
     if share < SHARE:
         return None
+    after = []
+    for error, course, table in zip(errors, courses, tables, strict=True):
+        e = error.copy()
+        e[course.at] -= table @ solution
+        after.append(e)
     told = {
         "kind": "ripple",
         "pitch": float(f"{pitch:.4g}"),
         "amplitude": float(np.hypot(solution[0], solution[1])),
         "share": share,
-        "records": [items[k].name for k in parts],
+        "records": [items[k].name for k in sorted(set(parts))],
+        "converter_step": all(abs(_grain(items[k].y) / pitch - 1.0) < OF_THE_CONVERTER for k in parts),
     }
     return Line(told, after, share)
+
+
+def _grain(y: Array) -> float:
+    """The least step between two outputs that occur."""
+    return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))

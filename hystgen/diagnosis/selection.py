@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis import decisions
 from hystgen.diagnosis import structure as fits
+from hystgen.diagnosis.believed import Prepared
 from hystgen.diagnosis.decisions import Merit
 from hystgen.diagnosis.options import Option
 from hystgen.diagnosis.structure import Fitted, Item, Structure
@@ -59,12 +60,21 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, believed: Array
     Sought from `start`, and where an output map bends the weights' part also from the `believed` ones: beyond a limit
     no sample tells how far off others are.
     """
-    (quick,) = thinned([to_fit], joint.COMPARED, everything([to_fit]))
+    quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
     if believed is not None and base.actuator(start).bends:
         starts.append(believed)
     found = [fits.fit(base, quick, start, p) for p in starts]
     return min(found, key=lambda each: fits.rms(each.errors(quick)))
+
+
+def again(fitted: Fitted, ready: Prepared) -> Fitted:
+    """A hypothesis fitted anew to other records."""
+    return fits.fit(fitted.structure, _quick(ready.to_fit), fitted.shape, fitted.weights)
+
+
+def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:
+    return thinned([to_fit], joint.COMPARED, everything([to_fit]))[0]
 
 
 def select(records: Records, refitted: Fitted) -> Outcome:

@@ -21,6 +21,9 @@ ONE_LOOP = (
 """What to do about records that are that poor."""
 
 
+INTERPOLATION = "the sensor's interpolation error looks like this"
+
+
 def sentence(each: Mapping[str, Any], unit: str | None) -> str:
     """An entry as a sentence without its full stop; `unit` of the displacement."""
     u = f" {unit}" if unit else ""
@@ -39,8 +42,8 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
     if kind == "ripple":
         return (
             f"a ripple over the position with a pitch of {each['pitch']:.4g}{u}, amplitude {each['amplitude']:.3g}{u}, "
-            f"in {_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance; the sensor's "
-            "interpolation error looks like this"
+            f"in {_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance; "
+            + ("its pitch is the step of the converter" if each["converter_step"] else INTERPOLATION)
         )
     if kind == "stick_slip":
         return (

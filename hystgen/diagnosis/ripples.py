@@ -1,0 +1,94 @@
+"""Records without what a sensor adds over the position, which would be taken for effects and for stick-slip."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hystgen.diagnosis import periodic, told
+from hystgen.diagnosis.believed import Prepared
+from hystgen.diagnosis.floor import HOLD, still
+from hystgen.diagnosis.held_out import ENOUGH
+from hystgen.diagnosis.structure import Fitted, Item
+
+ROUNDS = 3
+"""A model that was fitted to a ripple stands beside the positions that the ripple is seen over; without it, it comes
+nearer to them."""
+
+SAME = 0.05
+"""A line over the position is the rest of a stronger one whose pitch differs by a smaller share."""
+
+
+@dataclass(frozen=True)
+class Rippled:
+    """Records as they were measured, and without the ripples that are told of them."""
+
+    measured: Prepared
+    clean: Prepared
+    told: list[dict[str, Any]]
+
+    def seen_by(self, fitted: Fitted) -> Rippled:
+        """The ripples over the positions that a model predicts."""
+        measured, clean = _items(self.measured), _items(self.clean)
+        errors = [
+            error + (item.y - without.y)
+            for item, without, error in zip(measured, clean, fitted.errors(clean), strict=True)
+        ]
+        found, left = periodic.ripples(measured, errors)
+        items = [
+            replace(item, y=item.y - (error - rest)) for item, error, rest in zip(measured, errors, left, strict=True)
+        ]
+        number = len(self.measured.to_fit)
+        ripples = [line for k, line in enumerate(found) if not is_told(line, found[:k])]
+        return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), told=ripples)
+
+    def left_by(self, fitted: Fitted) -> bool:
+        """Whether ripples are in what a model leaves of the records without them."""
+        clean = _items(self.clean)
+        return bool(periodic.ripples(clean, fitted.errors(clean))[0])
+
+    def notes(self, unit: str | None) -> list[str]:
+        """What was done to the records."""
+        return [
+            f"{told.sentence(each, unit)}; taken out of the records before effects were sought" for each in self.told
+        ]
+
+
+def none_in(ready: Prepared) -> Rippled:
+    """Records of which no ripple is known."""
+    return Rippled(ready, ready, [])
+
+
+def taken_out(found: Rippled, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Rippled:
+    """Records without the ripples that a model shows which is fitted anew to what is left of them."""
+    for _ in range(ROUNDS):
+        seen = found.seen_by(fitted)
+        if not seen.told:
+            break
+        found, fitted = seen, refit(_moving(seen.clean))
+    return found
+
+
+def _moving(ready: Prepared) -> Prepared:
+    """The records without their holds: there a ripple is an offset that the model would be bent to meet, and one that
+    is wrong is not seen."""
+
+    def without_holds(item: Item) -> Item:
+        y = item.y.copy()
+        for first, last in still(item.run.v, HOLD):
+            y[first + 1 : last] = np.nan
+        return replace(item, y=y) if np.count_nonzero(np.isfinite(y)) > ENOUGH else item
+
+    return replace(ready, to_fit=[without_holds(item) for item in ready.to_fit])
+
+
+def is_told(line: dict[str, Any], ripples: Sequence[dict[str, Any]]) -> bool:
+    """Whether a line over the position is the rest of a ripple that is told already."""
+    return line["kind"] == "ripple" and any(abs(line["pitch"] / each["pitch"] - 1.0) < SAME for each in ripples)
+
+
+def _items(ready: Prepared) -> list[Item]:
+    return [*ready.to_fit, *ready.held]
