@@ -177,19 +177,21 @@ def diagnose(
             def refit(ready: believed.Prepared) -> Fitted:
                 return selection.refit(base, ready.to_fit, start, weights)
 
-            def select(clean: believed.Prepared, refitted: Fitted) -> tuple[Floor, Records, Outcome]:
+            def prepared(clean: believed.Prepared, refitted: Fitted) -> tuple[Floor, Records]:
                 noise = floor.noise_floor([*clean.to_fit, *clean.held])
-                records = Records.of(clean.to_fit, clean.held, refitted, noise.rms, effects, lambda: bar.tick(1))
-                return noise, records, selection.select(records, refitted)
+                return noise, Records.of(clean.to_fit, clean.held, refitted, noise.rms, effects, lambda: bar.tick(1))
 
             refitted = refit(ready)
             rippled = ripples.taken_out(ripples.none_in(ready), refitted, refit)
             if rippled.told:
                 refitted = refit(rippled.clean)
-            noise, records, found = select(rippled.clean, refitted)
-            if found.found and rippled.left_by(found.fitted):  # only beside what is found it shows as it is
+            noise, records = prepared(rippled.clean, refitted)
+            found = selection.select(records, refitted, rippled.left_by)
+            if found.found and rippled.left_by(found.fitted):  # beside what is found it shows as it is
                 rippled = ripples.taken_out(rippled, found.fitted, partial(selection.again, found.fitted))
-                noise, records, found = select(rippled.clean, refit(rippled.clean))
+                refitted = refit(rippled.clean)
+                noise, records = prepared(rippled.clean, refitted)
+                found = selection.select(records, refitted)
             return rippled, noise, records, found
 
         rippled, noise, compared, found = searched(before)

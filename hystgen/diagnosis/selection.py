@@ -77,8 +77,8 @@ def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:
     return thinned([to_fit], joint.COMPARED, everything([to_fit]))[0]
 
 
-def select(records: Records, refitted: Fitted) -> Outcome:
-    """Add effects to the refitted model as long as one qualifies."""
+def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] = lambda _: False) -> Outcome:
+    """Add effects to the refitted model as long as one qualifies, and `until` something shows beside what is found."""
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     none = now
     found: list[Found] = []
@@ -112,6 +112,8 @@ def select(records: Records, refitted: Fitted) -> Outcome:
         now, found = _exchanged(now, found, {each.option.name for tried in rankings for each in tried}, records)
         if now is not step.best.fitted:
             latest = None
+        if until(now):
+            return Outcome(refitted, now, tuple(found), tuple(rankings))
     if not decisions.borne_out(records.left(now), records):
         now, found = none, []
     if found:

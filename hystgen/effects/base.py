@@ -87,13 +87,23 @@ class Run:
         """`decays` of the steps and a time constant, (3, N - 1)."""
         return self.remembered(time_constant, lambda: self.of_steps(lambda s: np.stack(decays(s, time_constant))))
 
+    def spectrum(self, time_constants: tuple[float, ...]) -> Array:
+        """`decays` of the `different` steps and several time constants, (3, steps, time constants)."""
+
+        def make() -> Array:
+            steps, _ = self.different
+            return np.ascontiguousarray(np.stack([decays(steps, each) for each in time_constants], axis=2))
+
+        return self.remembered(time_constants, make)
+
     def of_steps(self, make: Callable[[Array], Array]) -> Array:
         """What is made of each step by itself, (k, N - 1); for steps that are equal it is made once."""
-        steps, place = self._different
+        steps, place = self.different
         return make(steps).take(place, axis=1) if len(steps) < len(place) // 2 else make(self.steps)
 
     @cached_property
-    def _different(self) -> tuple[Array, NDArray[np.intp]]:
+    def different(self) -> tuple[Array, NDArray[np.intp]]:
+        """The steps that there are, and which of them each step is."""
         return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:

@@ -29,9 +29,8 @@ PER_DECADE = 2
 def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
     """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
     rows = np.ascontiguousarray(np.atleast_2d(h).T)
-    total = np.zeros_like(rows)
-    for tau, weight in zip(time_constants.tolist(), weights.tolist(), strict=True):
-        code().creep(rows, *run.factors(tau), weight, rows[0].copy(), total)
+    total, states = np.zeros_like(rows), np.repeat(rows[:1], len(weights), axis=0)
+    code().creep(rows, run.different[1], *run.spectrum(tuple(time_constants.tolist())), weights, states, total)
     return total.T.reshape(np.shape(h))
 
 

@@ -39,19 +39,33 @@ def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Arr
 
 
 def creep(
-    u: Array, decay: Array, early: Array, late: Array, weight: float, state: Array, total: Array
+    u: Array, step: NDArray[np.intp], decay: Array, early: Array, late: Array, weights: Array, states: Array,
+    total: Array,
 ) -> None:
-    """Add `weight` times the first-order filter of every column of `u` (N, R), from `state` (R,), to `total`.
+    """Add the first-order filters of every column of `u` (N, R), times the weight of each, to `total`.
 
-    Columns side by side, since each by itself waits for its own last sample.
+    `step` (N - 1): the row of `decay`, `early` and `late` (., T) that holds; `states` (T, R) are where the filters
+    begin. All side by side, since each by itself waits for its own last sample.
     """
-    for i in range(u.shape[1]):
-        total[0, i] += weight * state[i]
+    taus, rows = states.shape
+    for j in range(taus):
+        for i in range(rows):
+            total[0, i] += weights[j] * states[j, i]
+    if rows == 1:
+        for k in range(len(u) - 1):
+            s = step[k]
+            for j in range(taus):
+                states[j, 0] = decay[s, j] * states[j, 0] + early[s, j] * u[k, 0] + late[s, j] * u[k + 1, 0]
+            for j in range(taus):
+                total[k + 1, 0] += weights[j] * states[j, 0]
+        return
     for k in range(len(u) - 1):
-        for i in range(u.shape[1]):
-            x = decay[k] * state[i] + early[k] * u[k, i] + late[k] * u[k + 1, i]
-            state[i] = x
-            total[k + 1, i] += weight * x
+        s = step[k]
+        for j in range(taus):
+            for i in range(rows):
+                x = decay[s, j] * states[j, i] + early[s, j] * u[k, i] + late[s, j] * u[k + 1, i]
+                states[j, i] = x
+                total[k + 1, i] += weights[j] * x
 
 
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
@@ -329,7 +343,8 @@ def load() -> None:
     u, step = np.arange(2.0), np.ones(1)
     run, out = code(), np.empty(2)
     run.follow(u, step, step, step, 0.0, out)
-    run.creep(u[:, None], step, step, step, 1.0, np.ones(1), out[:, None])
+    first = np.zeros(1, dtype=np.intp)
+    run.creep(u[:, None], first, *np.ones((3, 1, 1)), step, np.ones((1, 1)), out[:, None])
     run.limit(u, step, step, out)
     run.ring(u, step, step, step, step, 1.0, out)
     run.curve(u, 1.0, step, 1.0, out)
