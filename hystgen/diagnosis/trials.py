@@ -302,10 +302,12 @@ def _each(
         left = fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
         return fitted.shape, fitted.weights, fitted.rms, left
 
-    done = parallel.each(numbers, range(len(found)), records.jobs, records.tick)
+    # those with most numbers first, so that no process is left alone with one of them
+    order = sorted(range(len(found)), key=lambda k: -len(structures[k].start) * (1 + len(found[k].starts)))
+    done = dict(zip(order, parallel.each(numbers, order, records.jobs, records.tick), strict=True))
     return [
-        _Screened(option, Fitted(structure, shape, p, rms), left)
-        for option, structure, (shape, p, rms, left) in zip(found, structures, done, strict=True)
+        _Screened(option, Fitted(structure, *done[k][:3]), done[k][3])
+        for k, (option, structure) in enumerate(zip(found, structures, strict=True))
     ]
 
 
