@@ -461,11 +461,13 @@ def diagnose(
         raise click.UsageError("--max-rate is for drives; give --plan with it")
     from hystgen import diagnosis
     from hystgen.effects import load_user_effects
+    from hystgen.emission import files
     from hystgen.report import drawing
 
     model = _load(params, effects)
     _shown(params, drawing.require)
-    _keep([Path(output) / name for name in ("diagnosis.json", "report.html", "params.yaml")], (params, *data, *holdout))
+    _keep([Path(output) / name for name in diagnosis.Diagnosis.FILES], (params, *data, *holdout))
+    _shown(output, partial(files.check, Path(output), diagnosis.Diagnosis.FILES))
     visited = _numbers(history)
     how = _reading(**reading)
 

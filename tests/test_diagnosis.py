@@ -97,6 +97,21 @@ class TestBlindPlants:
             assert content["gap"]["after"]["holdout"] <= 1.25 * label["noise"]["rms"]
             assert content["noise_floor"] == pytest.approx(label["noise"]["rms"], rel=0.45)
 
+    @pytest.mark.parametrize("place", ["file/out", "taken"])
+    def test_a_folder_that_cannot_be_written_is_found_before_the_search(
+        self, tmp_path: Path, run: Call, monkeypatch: pytest.MonkeyPatch, place: str
+    ) -> None:
+        (case, _), *_ = made(tmp_path, "none", 1)
+        (tmp_path / "file").touch()
+        (tmp_path / "taken" / "report.html").mkdir(parents=True)
+        monkeypatch.setattr("hystgen.diagnosis.diagnose", lambda *_, **__: pytest.fail("searched"))
+        data = sorted(case.glob("r*.csv"))[:2]
+        code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
+        assert (code, out) == (2, "")
+        said = {"file/out": f"Not a directory: '{tmp_path / 'file'}'",
+                "taken": f"Is a directory: '{tmp_path / 'taken' / 'report.html'}'"}  # fmt: skip
+        assert said[place] in err
+
     def test_the_command(self, tmp_path: Path, run: Call) -> None:
         (case, _), *_ = made(tmp_path, "single", 1)
         told = json.loads((case / "session.json").read_text())

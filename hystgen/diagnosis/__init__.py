@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,8 @@ class Diagnosis:
     notes: tuple[str, ...]
     signals: tuple[Signals, ...] = field(compare=False)
 
+    FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
+
     @property
     def verdict(self) -> str:
         """`nothing_missing`, `effects_found` or `unexplained`."""
@@ -122,8 +124,8 @@ class Diagnosis:
         from hystgen.report import diagnosis as report
 
         text = dump_parameters(self.parameters, header=f"Diagnosed by hystgen. {self.sentence()}")
-        made = {"diagnosis.json": self.to_json(), "report.html": report.html(self, text), "params.yaml": text}
-        return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made.items()})
+        made = zip(self.FILES, (self.to_json(), report.html(self, text), text), strict=True)
+        return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
 
 
 def diagnose(

@@ -5,8 +5,22 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+
+def check(folder: Path, names: Iterable[str]) -> None:
+    """Raise the OSError that writing these files into `folder` would end in, as far as can be told before."""
+    around = folder
+    while not around.exists() and around != around.parent:
+        around = around.parent
+    if not around.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(around))
+    if not os.access(around, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(around))
+    for name in names:  # the one thing that could stop a replacement half-way
+        if (folder / name).is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
 
 
 def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
@@ -25,9 +39,7 @@ def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
         if new:
             made.rename(folder)
             return [folder / name for name in files]
-        for name in files:  # the one thing that could stop a replacement half-way
-            if (folder / name).is_dir():
-                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
+        check(folder, files)
         for name in files:
             os.replace(made / name, folder / name)
     return [folder / name for name in files]
