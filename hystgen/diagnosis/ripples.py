@@ -42,7 +42,7 @@ class Rippled:
             replace(item, y=item.y - (error - rest)) for item, error, rest in zip(measured, errors, left, strict=True)
         ]
         number = len(self.measured.to_fit)
-        ripples = [line for k, line in enumerate(found) if not is_told(line, found[:k])]
+        ripples = [{**line, "repaired": True} for k, line in enumerate(found) if not is_told(line, found[:k])]
         return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), told=ripples)
 
     def left_by(self, fitted: Fitted) -> bool:

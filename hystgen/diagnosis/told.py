@@ -44,6 +44,7 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
             f"a ripple over the position with a pitch of {each['pitch']:.4g}{u}, amplitude {each['amplitude']:.3g}{u}, "
             f"in {_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance; "
             + ("its pitch is the step of the converter" if each["converter_step"] else INTERPOLATION)
+            + ("; taken out of the records before effects were sought" if each.get("repaired") else "")
         )
     if kind == "stick_slip":
         return (

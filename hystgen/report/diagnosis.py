@@ -58,6 +58,11 @@ def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
     return drawing.content(FIGURES[name](found, width), "svg")
 
 
+def _chance(p_value: float) -> str:
+    """It may be less than the least number that there is."""
+    return f"{p_value:.1g}" if p_value > 0.0 else "< 1e-300"
+
+
 def _refitted(content: Mapping[str, Any]) -> list[Text]:
     """What the second bar means where it is plainly longer than the first."""
     given, refitted = content["gap"]["as_given"], content["gap"]["refitted"]
@@ -83,7 +88,7 @@ def _found(content: Mapping[str, Any], there: Sequence[Effect]) -> list[Text | T
     for effect in content["effects"]:
         before, after = effect["holdout_before"], effect["holdout_after"]
         share = f"{100.0 * effect['share_of_gap']:.0f} %"
-        rows.append([effect["name"], f"{before:.4g}", f"{after:.4g}", share, f"{effect['p_value']:.1g}"])
+        rows.append([effect["name"], f"{before:.4g}", f"{after:.4g}", share, _chance(effect["p_value"])])
         kind = _kind(effect, there)
         how = (kind.compensated, kind.compensation) if kind is not None else FRONT
         means.append([effect["name"], *how])
