@@ -17,7 +17,7 @@ from hystgen.diagnosis import (
     structure,
     told,
     where,
-)  # fmt: skip
+)
 from hystgen.diagnosis.believed import Prepared
 from hystgen.diagnosis.decisions import FAR_ABOVE
 from hystgen.diagnosis.floor import Floor

@@ -145,7 +145,7 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
         "frequency": float(f"{frequency:.4g}"),
         "amplitude": float(np.median(sizes)),
         "share": own,
-        "records": [items[k].name for k in has],
+        "records": list(dict.fromkeys(items[k].name for k in has)),
     }
     width = 0.5 / max(lengths[k] for k in seen)
     order = [(f, n) for f in MAINS for n in (1, 2, 3, 5) if abs(frequency - n * f) < max(width, 0.002 * frequency)]
@@ -398,7 +398,7 @@ def _ripple(items: Sequence[Item], errors: Sequence[Array], courses: Sequence[_C
         "pitch": float(f"{pitch:.4g}"),
         "amplitude": float(np.hypot(solution[0], solution[1])),
         "share": share,
-        "records": [items[k].name for k in sorted(set(parts))],
+        "records": list(dict.fromkeys(items[k].name for k in parts)),
         "converter_step": all(abs(_grain(items[k].y) / pitch - 1.0) < OF_THE_CONVERTER for k in parts),
     }
     return Line(told, after, share)

@@ -52,9 +52,7 @@ class Rippled:
 
     def notes(self, unit: str | None) -> list[str]:
         """What was done to the records."""
-        return [
-            f"{told.sentence(each, unit)}; taken out of the records before effects were sought" for each in self.told
-        ]
+        return [told.sentence(each, unit) for each in self.told]
 
 
 def none_in(ready: Prepared) -> Rippled:
