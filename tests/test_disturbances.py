@@ -206,7 +206,7 @@ class TestPeriodic:
         v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 5000)
         still = Item("still.csv", Run(np.arange(len(v)) * STEP, v), plant(v) + noise(len(v), 7), HISTORY, 10.0)
         items = [*moving, still]
-        (ripple,), left = periodic.ripples(items, errors(items))
+        (ripple,), left = periodic.ruling(items, errors(items))
         assert (ripple["pitch"], ripple["amplitude"]) == (pytest.approx(0.4, rel=0.003), pytest.approx(0.05, rel=0.06))
         assert ripple["records"] == [item.name for item in moving]
         assert np.std(np.concatenate(left[:-1])) == pytest.approx(NOISE, rel=0.1)
@@ -549,4 +549,27 @@ def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> No
     assert ripple["amplitude"] == pytest.approx(0.05, rel=0.15)
     assert found.content["gap"]["after"]["holdout"] < 1.25 * NOISE
     (note,) = [note for note in found.notes if "ripple" in note]
-    assert "taken out of the records" in note
+    assert note.endswith("taken out of the records before effects were sought")
+
+
+@pytest.mark.parametrize("frequency", [50.0, 180.0])
+def test_hum_hides_nothing(tmp_path: Path, frequency: float) -> None:
+    """A drift of 2.5 times the noise beside hum of 14 times as much."""
+    made = []
+    for k, v in enumerate(drives()):
+        t = np.asarray(10.0 * k + np.arange(len(v)) * STEP, dtype=np.float64)
+        y = plant(v) + 0.035 * t + 0.2 * np.sin(2 * np.pi * frequency * t + k) + noise(len(v), 60 + k)
+        made.append(Record(f"r{k}.csv", t, v, y))
+    (tmp_path / "stage.yaml").write_text(
+        "hystgen: 1\nname: stage\nunits: {input: V, output: um}\ninput_range: [0, 100]\n"
+        f"model: {{pi: {{thresholds: {list(THRESHOLDS)}, weights: {list(WEIGHTS)}}}}}\n"
+    )
+    found = hystgen.diagnose(tmp_path / "stage.yaml", made[:4], holdout=made[4:], history=HISTORY)
+    (drift,) = found.content["effects"]
+    assert drift["name"] == "drift"
+    assert drift["parameters"]["rate"] == pytest.approx(0.035, rel=0.1)
+    (line,) = found.content["unexplained"]
+    assert (line["kind"], line["amplitude"]) == ("line", pytest.approx(0.2, rel=0.02))
+    assert line["frequency"] == pytest.approx(frequency, abs=0.05)
+    assert found.content["gap"]["after"]["holdout"] < 1.15 * NOISE
+    assert found.content["noise_floor"] == pytest.approx(NOISE, rel=0.1)

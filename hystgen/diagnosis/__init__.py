@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import believed, channels, floor, intervals, ripples, selection, starts, structure, told
+from hystgen.diagnosis import believed, channels, disturbances, floor, intervals, selection, starts, structure, told
 from hystgen.diagnosis.content import content_of
+from hystgen.diagnosis.disturbances import Cleaned
 from hystgen.diagnosis.floor import Floor
-from hystgen.diagnosis.ripples import Rippled
 from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
@@ -171,7 +171,7 @@ def diagnose(
             for group in (usable[: len(several)], usable[len(several) :])
         )
 
-        def searched(history: tuple[float, ...] | None) -> tuple[Rippled, Floor, Records, Outcome]:
+        def searched(history: tuple[float, ...] | None) -> tuple[Cleaned, Floor, Records, Outcome]:
             ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
             base, start = believed.structure_of(model.cascade, given, ready)
             weights = believed.believed_weights(model.cascade, base)
@@ -184,35 +184,35 @@ def diagnose(
                 return noise, Records.of(clean.to_fit, clean.held, refitted, noise.rms, effects, lambda: bar.tick(1))
 
             refitted = refit(ready)
-            rippled = ripples.taken_out(ripples.none_in(ready), refitted, refit)
-            if rippled.told:
-                refitted = refit(rippled.clean)
-            noise, records = prepared(rippled.clean, refitted)
-            found = selection.select(records, refitted, rippled.left_by)
-            if found.found and rippled.left_by(found.fitted):  # beside what is found it shows as it is
-                rippled = ripples.taken_out(rippled, found.fitted, partial(selection.again, found.fitted))
-                refitted = refit(rippled.clean)
-                noise, records = prepared(rippled.clean, refitted)
+            cleaned = disturbances.taken_out(disturbances.none_in(ready), refitted, refit)
+            if cleaned.told:
+                refitted = refit(cleaned.clean)
+            noise, records = prepared(cleaned.clean, refitted)
+            found = selection.select(records, refitted, cleaned.left_by)
+            if found.found and cleaned.left_by(found.fitted):  # beside what is found it shows as it is
+                cleaned = disturbances.taken_out(cleaned, found.fitted, partial(selection.again, found.fitted))
+                refitted = refit(cleaned.clean)
+                noise, records = prepared(cleaned.clean, refitted)
                 found = selection.select(records, refitted)
-            return rippled, noise, records, found
+            return cleaned, noise, records, found
 
-        rippled, noise, compared, found = searched(before)
-        wrong = starts.contradicted(rippled.clean.to_fit, found.fitted)
+        cleaned, noise, compared, found = searched(before)
+        wrong = starts.contradicted(cleaned.clean.to_fit, found.fitted)
         if wrong is not None:
             odd.append(wrong)
             try:
-                rippled, noise, compared, found = searched(None)
+                cleaned, noise, compared, found = searched(None)
             except IdentificationError as error:
                 said = told.sentence(wrong, model.parameters.units.output)
                 raise IdentificationError(f"{said}, and without it {error}") from None
-        ready, odd = rippled.clean, [*odd, *rippled.told]
+        ready, odd = cleaned.clean, [*odd, *cleaned.told]
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
         content = content_of(model.parameters, ready, noise, found, as_given, odd, compared.one_loop)
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
     notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
-    notes += rippled.notes(model.parameters.units.output)
+    notes += cleaned.notes(model.parameters.units.output)
     extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
 

@@ -10,9 +10,9 @@ import numpy as np
 from hystgen.diagnosis import (
     bad_samples,
     description,
+    disturbances,
     intervals,
     periodic,
-    ripples,
     stick_slip,
     structure,
     told,
@@ -56,8 +56,8 @@ def content_of(
     refitted, last = ([structure.rms(errors) for errors in each] for each in (before, after))
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = periodic.lines(everything, errors)
-    known = [each for each in odd if each["kind"] == "ripple"]
-    periodic_ones = [line for line in lines if not ripples.is_told(line, known)]
+    known = [each for each in odd if each["kind"] in ("line", "ripple")]
+    periodic_ones = [line for line in lines if not disturbances.is_told(line, known)]
     # where the position is not predicted as well as a ripple asks for, what is left of that jumps
     jumping = max([noise.rms, *(each["amplitude"] for each in (*known, *periodic_ones) if each["kind"] == "ripple")])
     sticking = bad_samples.merged(stick_slip.stick_slip(everything, errors, jumping))

@@ -20,8 +20,8 @@ STANDS = 30.0
 
 SHARE, RULES = 0.03, 0.3
 """Least share of the residual variance in a line, and in one that rules: it may be in a few of the records alone, and
-over the position it is taken out before effects are sought. What effects leave that are not found yet may look like a
-weak one."""
+hum or a ripple is taken out before effects are sought. What effects leave that are not found yet may look like a weak
+one."""
 
 OWN, PEAK = 1e-6, 10.0
 """A line is the drive's own where that has so much of its power there, and so many times its surroundings'."""
@@ -71,9 +71,9 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str
     return _taken_out(items, errors, (_in_time, _in_position), 0.0)
 
 
-def ripples(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
-    """The same of lines over the position that rule the errors."""
-    return _taken_out(items, errors, (_in_position,), RULES)
+def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
+    """The same of lines that rule the errors and are none of the actuator: of the mains, and over the position."""
+    return _taken_out(items, errors, (_of_the_mains, _in_position), RULES)
 
 
 def _taken_out(
@@ -153,6 +153,12 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
         mains, n = order[0]
         told["mains"] = mains if n == 1 else f"{n} x {mains:g} Hz"
     return Line(told, after, _share(errors, after))
+
+
+def _of_the_mains(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
+    """The strongest line, where it is hum: any other may be the ringing of a resonance."""
+    line = _in_time(items, errors)
+    return line if line is not None and "mains" in line.told else None
 
 
 def peaks(item: Item, error: Array) -> list[tuple[float, float]]:

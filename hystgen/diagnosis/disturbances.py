@@ -1,4 +1,5 @@
-"""Records without what a sensor adds over the position, which would be taken for effects and for stick-slip."""
+"""Records without what rules their errors and is none of the actuator: mains hum, which hides effects, and what a
+sensor adds over the position, which would be taken for effects and for stick-slip."""
 
 from __future__ import annotations
 
@@ -19,49 +20,49 @@ ROUNDS = 3
 nearer to them."""
 
 SAME = 0.05
-"""A line over the position is the rest of a stronger one whose pitch differs by a smaller share."""
+"""A line is the rest of a stronger one whose pitch or frequency differs by a smaller share."""
 
 
 @dataclass(frozen=True)
-class Rippled:
-    """Records as they were measured, and without the ripples that are told of them."""
+class Cleaned:
+    """Records as they were measured, and without the lines that are told of them."""
 
     measured: Prepared
     clean: Prepared
     told: list[dict[str, Any]]
 
-    def seen_by(self, fitted: Fitted) -> Rippled:
-        """The ripples over the positions that a model predicts."""
+    def seen_by(self, fitted: Fitted) -> Cleaned:
+        """Without the lines that a model leaves, over the positions that it predicts."""
         measured, clean = _items(self.measured), _items(self.clean)
         errors = [
             error + (item.y - without.y)
             for item, without, error in zip(measured, clean, fitted.errors(clean), strict=True)
         ]
-        found, left = periodic.ripples(measured, errors)
+        found, left = periodic.ruling(measured, errors)
         items = [
             replace(item, y=item.y - (error - rest)) for item, error, rest in zip(measured, errors, left, strict=True)
         ]
         number = len(self.measured.to_fit)
-        ripples = [{**line, "repaired": True} for k, line in enumerate(found) if not is_told(line, found[:k])]
-        return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), told=ripples)
+        lines = [{**line, "repaired": True} for k, line in enumerate(found) if not is_told(line, found[:k])]
+        return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), told=lines)
 
     def left_by(self, fitted: Fitted) -> bool:
-        """Whether ripples are in what a model leaves of the records without them."""
+        """Whether more such lines are in what a model leaves."""
         clean = _items(self.clean)
-        return bool(periodic.ripples(clean, fitted.errors(clean))[0])
+        return bool(periodic.ruling(clean, fitted.errors(clean))[0])
 
     def notes(self, unit: str | None) -> list[str]:
         """What was done to the records."""
         return [told.sentence(each, unit) for each in self.told]
 
 
-def none_in(ready: Prepared) -> Rippled:
-    """Records of which no ripple is known."""
-    return Rippled(ready, ready, [])
+def none_in(ready: Prepared) -> Cleaned:
+    """Records of which no disturbance is known."""
+    return Cleaned(ready, ready, [])
 
 
-def taken_out(found: Rippled, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Rippled:
-    """Records without the ripples that a model shows which is fitted anew to what is left of them."""
+def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Cleaned:
+    """Records without the lines that a model shows which is fitted anew to what is left of them."""
     for _ in range(ROUNDS):
         seen = found.seen_by(fitted)
         if not seen.told:
@@ -83,9 +84,10 @@ def _moving(ready: Prepared) -> Prepared:
     return replace(ready, to_fit=[without_holds(item) for item in ready.to_fit])
 
 
-def is_told(line: dict[str, Any], ripples: Sequence[dict[str, Any]]) -> bool:
-    """Whether a line over the position is the rest of a ripple that is told already."""
-    return line["kind"] == "ripple" and any(abs(line["pitch"] / each["pitch"] - 1.0) < SAME for each in ripples)
+def is_told(line: dict[str, Any], others: Sequence[dict[str, Any]]) -> bool:
+    """Whether a line is the rest of one that is told already."""
+    place = {"ripple": "pitch", "line": "frequency"}[line["kind"]]
+    return any(each["kind"] == line["kind"] and abs(line[place] / each[place] - 1.0) < SAME for each in others)
 
 
 def _items(ready: Prepared) -> list[Item]:
