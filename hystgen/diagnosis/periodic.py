@@ -23,6 +23,12 @@ SHARE, RULES = 0.03, 0.3
 hum or a ripple is taken out before effects are sought. What effects leave that are not found yet may look like a weak
 one."""
 
+COMMON = 0.6
+"""Share of the records, or of the ways, in which a line has to hold."""
+
+STAYS = 0.5
+"""A line is steady where what one half of a record tells of it takes so much of the other as their own one does."""
+
 OWN, PEAK = 1e-6, 10.0
 """A line is the drive's own where that has so much of its power there, and so many times its surroundings'."""
 
@@ -72,8 +78,8 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
-    """The same of lines that rule the errors and are none of the actuator: of the mains, and over the position."""
-    return _taken_out(items, errors, (_of_the_mains, _in_position), RULES)
+    """The same of lines that rule the errors and are none of the actuator: steady ones, and those over the position."""
+    return _taken_out(items, errors, (_steady, _in_position), RULES)
 
 
 def _taken_out(
@@ -155,10 +161,29 @@ def _in_time(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
     return Line(told, after, _share(errors, after))
 
 
-def _of_the_mains(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
-    """The strongest line, where it is hum: any other may be the ringing of a resonance."""
+def _steady(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
+    """The strongest line, where one half of a record tells what it is in the other, in most of those that have it.
+
+    An actuator answers with the lines of its drive, which are none of these, or rings and fades.
+    """
     line = _in_time(items, errors)
-    return line if line is not None and "mains" in line.told else None
+    if line is None:
+        return None
+    holds = 0
+    having = [k for k, item in enumerate(items) if item.name in line.told["records"]]
+    for k in having:
+        known = np.isfinite(errors[k])
+        phase, e = _phase(items[k], line.told["frequency"])[known], errors[k][known]
+        table = np.column_stack([np.cos(phase), np.sin(phase), np.ones(len(e))])
+        half = len(e) // 2
+        removed = 0.0
+        for here, there in ((slice(half), slice(half, None)), (slice(half, None), slice(half))):
+            wave = table[there, :2] @ np.linalg.lstsq(table[here], e[here], rcond=None)[0][:2]
+            rest = e[there] - e[there].mean()
+            removed += float(np.sum(rest**2) - np.sum((rest - wave) ** 2))
+        own = np.sum((e - e.mean()) ** 2) - np.nansum(_without(e, phase)[0] ** 2)
+        holds += bool(removed > STAYS * own)
+    return line if holds >= COMMON * len(having) else None
 
 
 def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
@@ -389,7 +414,7 @@ def _ripple(items: Sequence[Item], errors: Sequence[Array], courses: Sequence[_C
         told = np.linalg.lstsq(matrix - own, right - own_right, rcond=None)[0]
         holds += bool(np.sum((e - x @ told) ** 2) < (1.0 - SHARE) * np.sum(e**2))
     solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
-    if holds < 0.6 * len(pieces):
+    if holds < COMMON * len(pieces):
         return None
     share = _share([e for _, e in pieces], [e - x @ solution for x, e in pieces])
     if share < SHARE:
