@@ -41,6 +41,9 @@ PERIODS = 8
 
 MOST = 4
 
+PARTS = 8, 64
+"""Parts of a record whose mean spectra show what fades."""
+
 CLOSE = 0.02
 """Frequencies of ringing that differ by less are the same."""
 
@@ -233,14 +236,42 @@ def _carrier(power: Array) -> float | None:
 
 
 def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[float, ...]:
-    """The frequencies of narrow peaks in any record, the strongest first, close ones once."""
-    each = (peaks(item, error) for item, error in zip(items, errors, strict=True))
+    """The frequencies of narrow peaks in any record and of what fades, the strongest first, close ones once."""
+    each = ([*peaks(item, error), *_fading(item, error)] for item, error in zip(items, errors, strict=True))
     found = sorted(itertools.chain(*each), reverse=True)
     kept: list[float] = []
     for _, frequency in found:
         if len(kept) < most and all(abs(frequency / other - 1.0) > CLOSE for other in kept):
             kept.append(frequency)
     return tuple(kept)
+
+
+def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
+    """Share and frequency of the highest peaks in mean spectra of a record's parts.
+
+    What rings and fades is too broad to be a peak in the spectrum of the whole.
+    """
+    from scipy.signal import welch
+
+    known = np.isfinite(error)
+    n = len(error)
+    found: list[tuple[float, float]] = []
+    for parts in PARTS:
+        if n // parts < 256 or np.count_nonzero(known) < 256:
+            continue
+        step = float(np.median(np.diff(item.run.t)))
+        e = np.interp(np.arange(n), np.flatnonzero(known), error[known])
+        places, power = welch(e, 1.0 / step, nperseg=n // parts)
+        drive = welch(item.run.v, 1.0 / step, nperseg=n // parts)[1]
+        for k in np.argsort(power)[::-1][:5].tolist():
+            if k < PERIODS or power[k] < np.max(power[k - 1 : k + 2]):
+                continue
+            near = [slice(max(k - 12, 1), k - 3), slice(k + 4, k + 12)]
+            around, own = (np.median(np.concatenate([x[part] for part in near])) for x in (power, drive))
+            if power[k] > PEAK * around and not drive[k] > PEAK * own:
+                share = float(np.sum(power[k - 2 : k + 3]) / np.sum(power))
+                found.append((share, float(np.average(places[k - 1 : k + 2], weights=power[k - 1 : k + 2]))))
+    return found
 
 
 def repetition(v: Array) -> int | None:
