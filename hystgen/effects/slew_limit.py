@@ -11,8 +11,11 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 from hystgen.effects.recursions import code
 from hystgen.param_models import Positive
 
-BELOW = (0.3, 0.5, 0.7, 1.0)
+BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
 """Starts below the fastest recorded rate, in decades: a limit that is never met, or always, tells nothing of itself."""
+
+LEAST = 3.0
+"""The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
 
 
 class SlewLimit(Effect):
@@ -46,7 +49,7 @@ class SlewLimit(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One rate, then one for each direction, from 1 % of the fastest recorded one to that."""
+        """One rate, then one for each direction, up to the fastest recorded one."""
         fastest = np.log10(max(about.fastest, 1e-12))
 
         def build(x: Array) -> SlewLimit:
@@ -55,7 +58,7 @@ class SlewLimit(Effect):
         def candidate(label: str, n: int, **more: Any) -> Candidate:
             none = np.full(n, fastest)
             start, *others = (none - below for below in BELOW)
-            return Candidate(label, none - 2.0, none, start, build, none, tuple(others), **more)
+            return Candidate(label, none - LEAST, none, start, build, none, tuple(others), **more)
 
         return [
             candidate("slew limit", 1),
