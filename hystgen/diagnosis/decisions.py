@@ -94,10 +94,7 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
         return None
     errors = _without_merit(now, best, records.held)
     equal = fits.rms(errors)
-    removed = apart(equal, best.held_out)
-    if least is None:
-        least = ABOVE_NOISE if now.bare else FURTHER
-    if removed < least * max(records.noise, best.held_out):
+    if not removes(now, best, records, least):
         return None
     p_value = difference(errors, best.errors)
     if p_value > REPEATED:
@@ -107,7 +104,15 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
     explained, unexplained = apart(fits.rms(without), fits.rms(fitted)), fits.rms(fitted)
     if not sure or explained < SEEN * max(records.noise, unexplained):
         return None
-    return Merit(removed, explained, best.held_out / equal, p_value)
+    return Merit(apart(equal, best.held_out), explained, best.held_out / equal, p_value)
+
+
+def removes(now: Fitted, best: Tried, records: Records, least: float | None = None) -> bool:
+    """Whether it removes enough of held-out records on equal terms, by chance or not; `least` as in `merit_of`."""
+    if least is None:
+        least = ABOVE_NOISE if now.bare else FURTHER
+    removed = apart(fits.rms(_without_merit(now, best, records.held)), best.held_out)
+    return removed >= least * max(records.noise, best.held_out)
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:

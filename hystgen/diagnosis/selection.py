@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -144,15 +145,20 @@ def _step(
 
     `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. What
     explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is the
-    next one's turn.
+    next one's turn. Where another explains far more on equal terms, only in too few places to be sure, none has a name.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
         return None
+    unsure = math.inf
     for best in decisions.simplest_first(tried, records):
         merit = decisions.merit_of(now, best, records, least)
         if merit is not None and merit.worth(gap, records):
+            if best.held_out > (1.0 + decisions.UNSURE) * unsure:
+                break
             return _Step(now, tried, best, merit)
+        if merit is None and decisions.removes(now, best, records, least):
+            unsure = min(unsure, best.held_out)
     return _Step(now, tried, tried[0], None)
 
 

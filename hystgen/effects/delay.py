@@ -10,6 +10,10 @@ from pydantic import Field
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 from hystgen.param_models import NotNegative
 
+FAR = (0.3, 0.4, 0.5, 0.55, 0.6, 0.7)
+"""Starts as shares of the way from no delay to the longest: the error is wavy over it, with valleys no wider than
+half a period of the fastest drive that is followed."""
+
 
 class Delay(Effect):
     """Pure delay `a(t) = v(t - T)` of the drive, T any number of seconds.
@@ -33,7 +37,7 @@ class Delay(Effect):
     def candidates(cls, about: About) -> list[Candidate]:
         """The time, from none to a tenth of the longest record."""
         low, high, start, value = from_zero(0.1 * about.sample_time, 0.1 * about.duration, about.sample_time)
-        far = tuple(low + share * (high - low) for share in (0.3, 0.5, 0.7))
+        far = tuple(low + share * (high - low) for share in FAR)
         return [
             Candidate(
                 "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), np.zeros(1), far
