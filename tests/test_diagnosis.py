@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -21,7 +22,18 @@ from scipy.signal import lfilter
 
 import hystgen
 from hystgen import parallel
-from hystgen.diagnosis import Diagnosis, _extended, believed, decisions, floor, options, structure, told, trials
+from hystgen.diagnosis import (
+    Diagnosis,
+    _extended,
+    believed,
+    decisions,
+    floor,
+    options,
+    selection,
+    structure,
+    told,
+    trials,
+)
 from hystgen.diagnosis.held_out import set_aside
 from hystgen.diagnosis.structure import Item
 from hystgen.effects.ageing import ExponentialAgeing
@@ -924,3 +936,64 @@ def test_a_model_with_a_bent_sensor_is_refitted(tmp_path: Path) -> None:
     found = hystgen.diagnose(path, record(v, bent, "r"), history=[0.0])
     assert found.verdict == "nothing_missing"
     assert found.content["gap"]["refitted"]["holdout"] < 0.0033
+
+
+def _slewed(v: Array, rate: float, step: float) -> Array:
+    """The drive followed at no more than a rate, in steps of a fiftieth of a sample."""
+    fine = np.interp(np.arange(50 * (len(v) - 1) + 1) / 50, np.arange(len(v)), v)
+    out, most = np.empty_like(fine), rate * step / 50
+    x = out[0] = fine[0]
+    for k in range(1, len(fine)):
+        x = out[k] = x + min(max(fine[k] - x, -most), most)
+    return np.asarray(out[::50])
+
+
+@pytest.mark.parametrize(("name", "key", "value"), [("slew_limit", "rate", 150.0), ("delay", "time", 0.06)])
+def test_numbers_far_from_where_drives_are_fast_are_found(tmp_path: Path, name: str, key: str, value: float) -> None:
+    """Steps from sample to sample are a hundred times as fast as the limit; sines have turned round by the delay."""
+    step, thresholds, weights = 2e-3, (0.0, 4.0, 10.0, 20.0), (0.08, 0.01, 0.01, 0.01)
+    t = np.asarray(np.arange(4000) * step, dtype=np.float64)
+    drives = {
+        "slow": 50.0 - 50.0 * np.cos(2 * np.pi * 0.25 * t),
+        "steps": np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 500),
+        "sines": 50.0 + 20.0 * np.sin(2 * np.pi * 1.1 * t) + 15.0 * np.sin(2 * np.pi * 7.3 * t),
+        "other": 50.0 + 25.0 * np.sin(2 * np.pi * 0.9 * t) + 12.0 * np.sin(2 * np.pi * 5.1 * t),
+        "more": np.repeat([0.0, 30.0, 90.0, 10.0, 70.0, 100.0, 50.0, 0.0], 500),
+    }
+    made = []
+    for k, (record_name, v) in enumerate(drives.items()):
+        seen = _slewed(v, value, step) if name == "slew_limit" else np.interp(t - value, t, v)
+        y = brute_output(np.concatenate([[100.0, 0.0], seen]), thresholds, weights, 0.0)[2:]
+        y = np.asarray(y) + np.random.default_rng(k).normal(0.0, 0.01, len(t))
+        made.append(Record(record_name, 20.0 * k + t, v, y))
+    stage = tmp_path / "stage.yaml"
+    stage.write_text(
+        "hystgen: 1\nname: stage\ninput_range: [0, 100]\n"
+        f"model: {{pi: {{thresholds: {list(thresholds)}, weights: {list(weights)}}}}}\n"
+    )
+    found = hystgen.diagnose(stage, made[:3], holdout=made[3:], history=[100.0, 0.0])
+    (effect,) = found.content["effects"]
+    assert effect["name"] == name
+    assert effect["parameters"][key] == pytest.approx(value, rel=0.02)
+
+
+def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it explains may be in too few places to be sure of it; what is sure of less is no better for that."""
+
+    def step(*held_out: float) -> object:
+        """The first of them is unsure, the second sure."""
+        tried = [SimpleNamespace(held_out=left) for left in held_out]
+        merit = decisions.Merit(1.0, 1.0, 0.5, 1e-6)
+        monkeypatch.setattr(decisions, "simplest_first", lambda found, _: found)
+        monkeypatch.setattr(decisions, "merit_of", lambda _, best, *__: None if best is tried[0] else merit)
+        monkeypatch.setattr(decisions, "removes", lambda *_: removes)
+        records = SimpleNamespace(extensions=lambda *_: tried, gap=1.0)
+        found = selection._step(object(), 1.0, records)  # type: ignore[arg-type]
+        assert found is not None
+        return None if found.merit is None else found.best.held_out
+
+    removes = True
+    assert step(0.287, 0.4167) is None
+    assert step(0.35, 0.4167) == 0.4167
+    removes = False  # it owes what it explains to what it leaves free
+    assert step(0.287, 0.4167) == 0.4167

@@ -237,6 +237,23 @@ class TestPeriodic:
         assert len(made["both"]) == 1
         assert made["turned"] == []
 
+    @pytest.mark.parametrize("damping", [0.004, 0.015, 0.03])
+    def test_what_rings_and_fades_in_a_long_record_is_no_line_but_is_heard(self, damping: float) -> None:
+        """Steps every five seconds for forty: the more it is damped, the more bins of a spectrum its peak is broad."""
+        t = np.asarray(np.arange(20_000) * 2e-3, dtype=np.float64)
+        v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 2500)
+        since, omega = t % 5.0, 2 * np.pi * 47.0
+        left = np.diff(v, prepend=0.0)[(np.arange(len(t)) // 2500) * 2500] * 0.05
+        left = left * np.exp(-damping * omega * since) * np.cos(omega * since) + noise(len(t), 3)
+        item = Item("steps.csv", Run(t, v), plant(v) + left, HISTORY, 10.0)
+        (heard, *_) = periodic.ringing([item], [left], 3)
+        assert heard == pytest.approx(47.0, rel=0.01)
+        assert periodic.ruling([item], [left])[0] == []
+        steady = 0.2 * np.sin(2 * np.pi * 47.0 * t) + noise(len(t), 3)
+        (line,), rest = periodic.ruling([item], [steady])
+        assert line["frequency"] == pytest.approx(47.0, abs=0.01)
+        assert np.std(rest[0]) == pytest.approx(NOISE, rel=0.02)
+
     def test_harmonics_of_a_periodic_drive_are_no_lines(self) -> None:
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
         v = 50.0 - 50.0 * np.cos(2 * np.pi * 5.0 * t)
