@@ -44,6 +44,12 @@ MOST = 4
 PARTS = 8, 64
 """Parts of a record whose mean spectra show what fades."""
 
+WHOLE, PART = 40, 12
+"""Bins on either side of a peak that are its surroundings, in the spectrum of a record and in those of its parts."""
+
+LEAST = 256
+"""Samples from which on a record, or a part of it, has a spectrum."""
+
 CLOSE = 0.02
 """Frequencies of ringing that differ by less are the same."""
 
@@ -61,7 +67,6 @@ BINS = 4096
 
 MAINS = (50.0, 60.0)
 
-
 REPEATS = 0.01
 """A drive repeats itself where it differs from itself a period later by less than this share of its range, rms."""
 
@@ -77,15 +82,15 @@ class Line:
 
 def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
     """Lines in the errors of several records, the strongest first, and the errors without them."""
-    return _taken_out(items, errors, (_in_time, _in_position), 0.0)
+    return _strongest_first(items, errors, (_in_time, _in_position), 0.0)
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[dict[str, Any]], list[Array]]:
     """The same of lines that rule the errors and are none of the actuator: steady ones, and those over the position."""
-    return _taken_out(items, errors, (_steady, _in_position), RULES)
+    return _strongest_first(items, errors, (_steady, _in_position), RULES)
 
 
-def _taken_out(
+def _strongest_first(
     items: Sequence[Item],
     errors: Sequence[Array],
     ways: Sequence[Callable[[Sequence[Item], Sequence[Array]], Line | None]],
@@ -191,32 +196,25 @@ def _steady(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
 
 def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     """Share and frequency of narrow peaks of one residual that are no multiples of what the drive does."""
-    known = np.isfinite(error)
-    n = len(error)
-    if np.count_nonzero(known) < 256:
+    filled = _filled(item, error)
+    if filled is None:
         return []
-    step = float(np.median(np.diff(item.run.t)))
-    e = np.interp(np.arange(n), np.flatnonzero(known), error[known])
+    e, step = filled
+    n = len(e)
     window = np.hanning(n)
     power = np.abs(np.fft.rfft((e - e.mean()) * window)) ** 2
     drive = np.abs(np.fft.rfft((item.run.v - item.run.v.mean()) * window)) ** 2
     total, driven = float(np.sum(power)), float(np.sum(drive))
-    if total == 0.0:
-        return []
     period = repetition(item.run.v)
     carrier = _carrier(drive)
     found: list[tuple[float, float]] = []
-    for k in np.argsort(power)[::-1][:5].tolist():
-        if k < PERIODS or power[k] < np.max(power[k - 1 : k + 2]):
-            continue
-        around = np.concatenate([power[max(k - 40, 1) : k - 3], power[k + 4 : k + 40]])
+    for k in _crests(power):
         beside = slice(max(k - 2, 0), k + 3)
         share = float(np.sum(power[beside])) / total
-        if not len(around) or power[k] <= STANDS * float(np.median(around)) or share <= SHARE:
+        if power[k] <= STANDS * _around(power, k, WHOLE) or share <= SHARE:
             continue
         # a line of the drive, which may be a small one of many harmonics
-        own = np.concatenate([drive[max(k - 40, 1) : k - 3], drive[k + 4 : k + 40]])
-        if float(np.sum(drive[beside])) >= OWN * driven and drive[k] > PEAK * float(np.median(own)):
+        if float(np.sum(drive[beside])) >= OWN * driven and drive[k] > PEAK * _around(drive, k, WHOLE):
             continue
         if period is not None and abs(k * period / n - round(k * period / n)) * n / period < 1.5:
             continue  # a harmonic of the drive
@@ -225,6 +223,26 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
         if not any(abs(other - k / (n * step)) < 4.0 / (n * step) for _, other in found):
             found.append((share, k / (n * step)))
     return found
+
+
+def _filled(item: Item, error: Array) -> tuple[Array, float] | None:
+    """An error with its gaps bridged, and the time between samples; None where too few of them are compared."""
+    known = np.isfinite(error)
+    if np.count_nonzero(known) < LEAST:
+        return None
+    step = float(np.median(np.diff(item.run.t)))
+    return np.interp(np.arange(len(error)), np.flatnonzero(known), error[known]), step
+
+
+def _crests(power: Array) -> list[int]:
+    """Bins of the highest local maxima of a spectrum."""
+    highest = np.argsort(power)[::-1][:5].tolist()
+    return [k for k in highest if k >= PERIODS and power[k] > 0.0 and power[k] >= np.max(power[k - 1 : k + 2])]
+
+
+def _around(power: Array, k: int, reach: int) -> float:
+    """The median of a spectrum on both sides of a bin."""
+    return float(np.median(np.concatenate([power[max(k - reach, 1) : k - 3], power[k + 4 : k + reach]])))
 
 
 def _carrier(power: Array) -> float | None:
@@ -253,22 +271,18 @@ def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
     """
     from scipy.signal import welch
 
-    known = np.isfinite(error)
-    n = len(error)
+    filled = _filled(item, error)
+    if filled is None:
+        return []
+    e, step = filled
     found: list[tuple[float, float]] = []
-    for parts in PARTS:
-        if n // parts < 256 or np.count_nonzero(known) < 256:
+    for size in (len(e) // parts for parts in PARTS):
+        if size < LEAST:
             continue
-        step = float(np.median(np.diff(item.run.t)))
-        e = np.interp(np.arange(n), np.flatnonzero(known), error[known])
-        places, power = welch(e, 1.0 / step, nperseg=n // parts)
-        drive = welch(item.run.v, 1.0 / step, nperseg=n // parts)[1]
-        for k in np.argsort(power)[::-1][:5].tolist():
-            if k < PERIODS or power[k] < np.max(power[k - 1 : k + 2]):
-                continue
-            near = [slice(max(k - 12, 1), k - 3), slice(k + 4, k + 12)]
-            around, own = (np.median(np.concatenate([x[part] for part in near])) for x in (power, drive))
-            if power[k] > PEAK * around and not drive[k] > PEAK * own:
+        places, power = welch(e, 1.0 / step, nperseg=size)
+        drive = welch(item.run.v, 1.0 / step, nperseg=size)[1]
+        for k in _crests(power):
+            if power[k] > PEAK * _around(power, k, PART) and drive[k] <= PEAK * _around(drive, k, PART):
                 share = float(np.sum(power[k - 2 : k + 3]) / np.sum(power))
                 found.append((share, float(np.average(places[k - 1 : k + 2], weights=power[k - 1 : k + 2]))))
     return found
@@ -363,7 +377,7 @@ class _Course:
 def _in_position(items: Sequence[Item], errors: Sequence[Array]) -> Line | None:
     """A ripple with a fixed pitch over the predicted position, of the same phase in all records."""
     courses = [_Course.of(item, error) for item, error in zip(items, errors, strict=True)]
-    if sum(len(course.places) for course in courses) < 256:
+    if sum(len(course.places) for course in courses) < LEAST:
         return None
     low = min(float(course.places.min()) for course in courses if len(course.places))
     span = max(float(course.places.max()) for course in courses if len(course.places)) - low

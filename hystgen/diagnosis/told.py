@@ -20,7 +20,6 @@ ONE_LOOP = (
 )
 """What to do about records that are that poor."""
 
-
 INTERPOLATION = "the sensor's interpolation error looks like this"
 
 
@@ -38,14 +37,14 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
         return (
             f"a line at {each['frequency']:.4g} Hz{what}, amplitude {each['amplitude']:.3g}{u}, in "
             f"{_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance there"
-            + _taken_out(each)
+            + _put_right(each)
         )
     if kind == "ripple":
         return (
             f"a ripple over the position with a pitch of {each['pitch']:.4g}{u}, amplitude {each['amplitude']:.3g}{u}, "
             f"in {_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance; "
             + ("its pitch is the step of the converter" if each["converter_step"] else INTERPOLATION)
-            + _taken_out(each)
+            + _put_right(each)
         )
     if kind == "stick_slip":
         return (
@@ -101,7 +100,7 @@ FAULTS = {
 """What is counted of each kind, and what goes with it."""
 
 
-def _taken_out(each: Mapping[str, Any]) -> str:
+def _put_right(each: Mapping[str, Any]) -> str:
     return "; taken out of the records before effects were sought" if each.get("repaired") else ""
 
 
