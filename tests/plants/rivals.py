@@ -342,7 +342,7 @@ def _sensed(data: Data, _: Array) -> Columns:
     """Powers of the measured output beside the plays: y + c_2 y^2 + .. = PI."""
     columns = _plays(data, data.course.v)
     h = _predicted(data, columns)
-    half = 0.5 * float(np.ptp(h))
+    half = 0.5 * float(np.ptp(data.y))  # a sum fitted to a drift alone need not move
     z = (data.y - _record_means(data, data.y) + _record_means(data, h) - h.mean()) / half
     return np.column_stack((columns, half * z**2, half * z**3, half * z**4)), 3
 
