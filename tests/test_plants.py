@@ -407,6 +407,13 @@ class TestRivals:
         assert against["asymmetry"] > 3.0
         assert against["delay"] > rivals.ALIKE
 
+    def test_an_output_that_falls_while_the_drive_rises(self, made: Made, monkeypatch: pytest.MonkeyPatch) -> None:
+        found = made("single", NAMES.index("sensor_nonlinearity"))
+        clean = [found.session.sampled(found.plant.respond(found.session), k) for k in found.session.records]
+        falling = replace(found, added=tuple(-2.0 * y for y in clean))  # no weight of a play sum is above 0
+        monkeypatch.setattr(rivals, "RIVALS", {"sensor_nonlinearity": rivals.RIVALS["sensor_nonlinearity"]})
+        assert 0.0 < labels.compared(falling, found.plant)["sensor_nonlinearity"] < math.inf
+
     def test_a_slow_record_leaves_lag_and_delay_open(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from tests.plants import drives, measure
 
