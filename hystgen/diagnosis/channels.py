@@ -37,6 +37,9 @@ GOES_WITH = 0.9
 FOREIGN, OWN = 0.95, 0.5
 """An output belongs to another record where it correlates so well with its prediction and no better with its own."""
 
+RIGHT_WAY = 0.3
+"""An output follows its drive where its loop runs the right way, with this share of the area that is expected."""
+
 SURE = 5.0
 """The area of a loop counts where it is so many times what the scatter of the output makes of it."""
 
@@ -45,13 +48,12 @@ SURE = 5.0
 class Against:
     """A record's output `factor * prediction + offset`, with the correlation of the two.
 
-    `gain`: the prediction over the drive. `sense`: area of the measured loop over that of the predicted one, which is
-    negative where the output is ahead of the drive; 0 where it is not significant.
+    `sense`: area of the measured loop over that of the predicted one, negative where the output is ahead of the drive,
+    0 where it is not significant.
     """
 
     factor: float
     correlation: float
-    gain: float
     sense: float
 
 
@@ -62,21 +64,30 @@ def checked(
 
     Exchanged columns are put right; a record in other units than the others, or with another's output, is left out.
     """
+    kept: list[Record | None] = list(records)
+    told: list[dict[str, Any]] = []
+    found: dict[int, Against] = {}
+    predicted: dict[int, Array] = {}
+    for k, record in enumerate(records):
+        if not _tells(record):
+            continue
+        predicted[k] = _predicted(record, actuator, weights, history)
+        found[k] = _against(record, predicted[k])
+        if found[k].sense > 0.0:
+            continue
+        assert record.y is not None
+        swapped = replace(record, v=record.y, y=record.v)
+        otherwise = _predicted(swapped, actuator, weights, history)
+        seen = _against(swapped, otherwise)
+        if _better(seen, found[k]):
+            kept[k], predicted[k], found[k] = swapped, otherwise, seen
+            told.append({"kind": "swapped_channels", "record": record.name, "repaired": True})
+    records = [record for record in kept if record is not None]
+    tells = list(found)
     widths = np.array([float(np.ptp(record.v)) for record in records])
     moving = widths[widths > 0.0]
     widest = float(np.max(moving[moving <= OTHER_UNIT * np.median(moving)], initial=0.0))
-    tells = [k for k, record in enumerate(records) if _tells(record)]
-    predicted = {k: _predicted(records[k], actuator, weights, history) for k in tells}
-    found = {k: _against(records[k], predicted[k]) for k in tells}
-    kept: list[Record | None] = list(records)
-    told: list[dict[str, Any]] = []
-    swapped = [k for k in tells if _swapped(found[k])]
-    for k in swapped:
-        record = records[k]
-        assert record.y is not None
-        kept[k] = replace(record, v=record.y, y=record.v)
-        told.append({"kind": "swapped_channels", "record": record.name, "repaired": True})
-    wide = [k for k in tells if k not in swapped and np.ptp(records[k].v) > MOVES * widest]
+    wide = [k for k in tells if np.ptp(records[k].v) > MOVES * widest]
     for k in wide:
         other = _other(k, records, predicted, found, tells)
         if other is not None:
@@ -86,7 +97,7 @@ def checked(
     usual = float(np.median([found[k].factor for k in sure])) if sure else 1.0
     if not 1.0 / ALL < usual < ALL:
         told.append({"kind": "scale", "record": "all", "factor": usual})
-    little = [k for k in tells if k not in swapped and k not in wide and found[k].correlation > GOES_WITH]
+    little = [k for k in tells if k not in wide and found[k].correlation > GOES_WITH]
     for k in (*sure, *little):
         factor = found[k].factor / usual
         if not (1.0 / ONE if k in sure else 0.0) < factor < (ONE if k in sure else OTHER_UNIT):
@@ -124,12 +135,11 @@ def _against(record: Record, predicted: Array) -> Against:
     assert record.y is not None
     y, v = np.asarray(record.y, dtype=np.float64), np.asarray(record.v, dtype=np.float64)
     factor, correlation, scatter = _line(predicted, y)
-    gain, _, _ = _line(v, predicted)
     own, model = _area(v, y), _area(v, predicted)
     # noise of the output, white, makes an area of this standard deviation
     around = scatter * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))) / 2.0
     expected = abs(factor) * model
-    return Against(factor, correlation, gain, own / expected if abs(own) > SURE * around and expected > 0.0 else 0.0)
+    return Against(factor, correlation, own / expected if abs(own) > SURE * around and expected > 0.0 else 0.0)
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
@@ -158,11 +168,16 @@ def _area(v: Array, y: Array) -> float:
     return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
 
 
-def _swapped(found: Against) -> bool:
-    """Whether drive and displacement are exchanged: the output is ahead, and the sensitivity is the inverse one."""
-    if abs(found.correlation) < GOES_WITH or found.sense > -0.3 or found.gain == 0.0:
+def _better(swapped: Against, found: Against) -> bool:
+    """Whether a record's columns are exchanged: with the output as drive, the drive is what the model predicts.
+
+    Its loop then runs the right way, as wide as expected; where none is to be seen, the sensitivity has to tell.
+    """
+    if swapped.correlation < max(GOES_WITH, found.correlation):
         return False
-    return bool(0.4 < found.factor * found.gain**2 < 2.5)
+    if swapped.sense == 0.0:
+        return not 1.0 / ALL < found.factor < ALL and 1.0 / ONE < swapped.factor < ONE
+    return swapped.sense > RIGHT_WAY and 1.0 / ALL < swapped.factor < ALL
 
 
 def _other(

@@ -19,6 +19,9 @@ FINE = 48
 
 RIDGE = 1e-9
 
+STILL = 1e-9
+"""A play that moves by less than this share of the one that moves most gets no weight."""
+
 
 @dataclass(frozen=True)
 class Track:
@@ -81,7 +84,8 @@ def centred(columns: Array, record: Ints) -> Array:
 
 def fit(columns: Array, y: Array, free: int = 0) -> Array:
     """Weights that are not negative but for the last `free`; columns (N, n) and y (N,) have no mean."""
-    scale = np.sqrt(np.mean(columns * columns, axis=0)) + 1e-300
+    rms = np.sqrt(np.mean(columns * columns, axis=0))
+    scale = np.where(rms > STILL * np.max(rms), rms, np.inf)
     scaled = columns / scale
     if free:
         scaled = np.hstack((scaled, -scaled[:, -free:]))
