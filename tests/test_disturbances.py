@@ -340,10 +340,12 @@ def records() -> list[Record]:
     ]
 
 
-def check(given: Sequence[Record]) -> tuple[list[Record | None], list[dict[str, Any]]]:
+def check(
+    given: Sequence[Record], weights: Sequence[float] | Array = WEIGHTS
+) -> tuple[list[Record | None], list[dict[str, Any]]]:
     """Against a believed model that is 20 % off."""
     actuator = Actuator(np.array(THRESHOLDS), (), ())
-    return channels.checked(given, actuator, 1.2 * np.array(WEIGHTS), HISTORY)
+    return channels.checked(given, actuator, 1.2 * np.array(weights), HISTORY)
 
 
 class TestWholeRecords:
@@ -394,6 +396,31 @@ class TestWholeRecords:
             assert one is not None
             np.testing.assert_array_equal(one.v, right.v)
             np.testing.assert_array_equal(np.asarray(one.y), np.asarray(right.y))
+
+    @pytest.mark.parametrize("which", [{2}, {0, 1, 2, 3, 4}])
+    @pytest.mark.parametrize("gain", [0.003, 0.1, 1.0, 30.0])
+    @pytest.mark.parametrize("weights", [WEIGHTS, (0.03, 0.02, 0.03, 0.05)])
+    def test_exchanged_columns_of_any_gain_and_loop(
+        self, weights: tuple[float, ...], gain: float, which: set[int]
+    ) -> None:
+        """In other units a prediction has hardly a loop, and of a wide loop it has another shape."""
+        believed = gain * np.array(weights)
+        given = []
+        for k, record in enumerate(records()):
+            out = brute_output(np.concatenate([HISTORY, record.v]), THRESHOLDS, tuple(believed.tolist()), 0.0)
+            given.append(replace(record, y=out[len(HISTORY) :] + gain * noise(len(record.v), 30 + k)))
+        wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
+        kept, told = check(wrong, believed)
+        assert [each["record"] for each in told] == [f"r{k}.csv" for k in sorted(which)]
+        assert {each["kind"] for each in told} == {"swapped_channels"}
+        assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
+
+    def test_exchanged_columns_without_a_loop(self) -> None:
+        """Less of a move than the least threshold: the sensitivity tells."""
+        small = [replace(r, v=50.0 + 0.01 * r.v, y=3.0 + 8e-4 * r.v + 0.01 * noise(len(r.v), 8)) for r in records()]
+        assert check(small)[1] == []
+        wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k == 3 else r for k, r in enumerate(small)]
+        assert [(each["kind"], each["record"]) for each in check(wrong)[1]] == [("swapped_channels", "r3.csv")]
 
     def test_outputs_exchanged_between_records(self) -> None:
         given = records()

@@ -173,11 +173,12 @@ def _better(swapped: Against, found: Against) -> bool:
 
     Its loop then runs the right way, as wide as expected; where none is to be seen, the sensitivity has to tell.
     """
-    if swapped.correlation < max(GOES_WITH, found.correlation):
+    if swapped.correlation < GOES_WITH:
         return False
     if swapped.sense == 0.0:
         return not 1.0 / ALL < found.factor < ALL and 1.0 / ONE < swapped.factor < ONE
-    return swapped.sense > RIGHT_WAY and 1.0 / ALL < swapped.factor < ALL
+    better = swapped.correlation > found.correlation
+    return better and swapped.sense > RIGHT_WAY and 1.0 / ALL < swapped.factor < ALL
 
 
 def _other(
