@@ -64,26 +64,19 @@ def checked(
 
     Exchanged columns are put right; a record in other units than the others, or with another's output, is left out.
     """
-    kept: list[Record | None] = list(records)
+    turned: list[Record] = []
     told: list[dict[str, Any]] = []
     found: dict[int, Against] = {}
     predicted: dict[int, Array] = {}
     for k, record in enumerate(records):
-        if not _tells(record):
-            continue
-        predicted[k] = _predicted(record, actuator, weights, history)
-        found[k] = _against(record, predicted[k])
-        if found[k].sense > 0.0:
-            continue
-        assert record.y is not None
-        swapped = replace(record, v=record.y, y=record.v)
-        otherwise = _predicted(swapped, actuator, weights, history)
-        seen = _against(swapped, otherwise)
-        if _better(seen, found[k]):
-            kept[k], predicted[k], found[k] = swapped, otherwise, seen
+        right = record
+        if _tells(record):
+            right, predicted[k], found[k] = _right_way_round(record, actuator, weights, history)
+        if right is not record:
             told.append({"kind": "swapped_channels", "record": record.name, "repaired": True})
-    records = [record for record in kept if record is not None]
-    tells = list(found)
+        turned.append(right)
+    records, tells = turned, list(found)
+    kept: list[Record | None] = list(turned)
     widths = np.array([float(np.ptp(record.v)) for record in records])
     moving = widths[widths > 0.0]
     widest = float(np.max(moving[moving <= OTHER_UNIT * np.median(moving)], initial=0.0))
@@ -166,6 +159,22 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:
 def _area(v: Array, y: Array) -> float:
     """Area that (v, y) runs around counterclockwise, the way of an output that is late."""
     return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
+
+
+def _right_way_round(
+    record: Record, actuator: Actuator, weights: Array, history: tuple[float, ...] | None
+) -> tuple[Record, Array, Against]:
+    """A record, with its columns exchanged if they were, what the model predicts of it, and how the two compare."""
+    predicted = _predicted(record, actuator, weights, history)
+    found = _against(record, predicted)
+    if found.sense <= 0.0:
+        assert record.y is not None
+        swapped = replace(record, v=record.y, y=record.v)
+        otherwise = _predicted(swapped, actuator, weights, history)
+        seen = _against(swapped, otherwise)
+        if _better(seen, found):
+            return swapped, otherwise, seen
+    return record, predicted, found
 
 
 def _better(swapped: Against, found: Against) -> bool:

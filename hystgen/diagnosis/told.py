@@ -62,7 +62,7 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
             "units of drive or output, another gain of the sensor, or a dead one"
         )
     if kind == "swapped_channels":
-        return f"{record}: drive and displacement are exchanged (the output is ahead of the drive); put right"
+        return f"{record}: drive and displacement are exchanged (the model fits them the other way round); put right"
     if kind == "history":
         return (
             f"the {counted(each['samples'], 'sample')} at the start, whose output depends on the history, are off by "
