@@ -37,14 +37,14 @@ def sentence(each: Mapping[str, Any], unit: str | None) -> str:
         return (
             f"a line at {each['frequency']:.4g} Hz{what}, amplitude {each['amplitude']:.3g}{u}, in "
             f"{_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance there"
-            + _put_right(each)
+            + _taken_out(each)
         )
     if kind == "ripple":
         return (
             f"a ripple over the position with a pitch of {each['pitch']:.4g}{u}, amplitude {each['amplitude']:.3g}{u}, "
             f"in {_several(each['records'])}: {100.0 * each['share']:.0f} % of the error's variance; "
             + ("its pitch is the step of the converter" if each["converter_step"] else INTERPOLATION)
-            + _put_right(each)
+            + _taken_out(each)
         )
     if kind == "stick_slip":
         return (
@@ -100,7 +100,7 @@ FAULTS = {
 """What is counted of each kind, and what goes with it."""
 
 
-def _put_right(each: Mapping[str, Any]) -> str:
+def _taken_out(each: Mapping[str, Any]) -> str:
     return "; taken out of the records before effects were sought" if each.get("repaired") else ""
 
 

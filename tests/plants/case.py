@@ -322,8 +322,7 @@ def _believe(rng: np.random.Generator, course: refit.Track, output: Array, span:
     weights = np.maximum(weights, 0.0)
     thresholds = thresholds * rng.uniform(0.97, 1.03)
     offset = float(np.mean(output) - np.mean(columns @ weights))
-    written = np.unique([float(f"{x:.5g}") for x in thresholds], return_index=True)  # two may be the same
-    weights = np.add.reduceat(weights, written[1])
-    return Believed(
-        tuple(written[0].tolist()), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}")
-    )
+    # As written, two thresholds may be the same
+    written, first = np.unique([float(f"{x:.5g}") for x in thresholds], return_index=True)
+    weights = np.add.reduceat(weights, first)
+    return Believed(tuple(written.tolist()), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}"))
