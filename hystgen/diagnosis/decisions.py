@@ -65,7 +65,7 @@ floor by less. What leaves more of records of one loop alone is not named either
 it as well as a wrong name, and no other loop tells which of the two it was."""
 
 AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
-"""A held-out error within this factor of the noise leaves nothing that would be enough for a name."""
+"""A held-out error within this factor of the noise leaves hardly anything to explain."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +110,18 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
 def removes(now: Fitted, best: Tried, records: Records, least: float | None = None) -> bool:
     """Whether it removes enough of held-out records on equal terms, by chance or not; `least` as in `merit_of`."""
     if least is None:
-        least = ABOVE_NOISE if now.bare else FURTHER
+        least = _least(now)
     removed = apart(fits.rms(_without_merit(now, best, records.held)), best.held_out)
     return removed >= least * max(records.noise, best.held_out)
+
+
+def _least(now: Fitted) -> float:
+    return ABOVE_NOISE if now.bare else FURTHER
+
+
+def leaves_enough(now: Fitted, records: Records) -> bool:
+    """Whether so much of held-out records is left that what removes all but the noise of it may have a name."""
+    return records.left(now) > math.sqrt(1.0 + _least(now) ** 2) * records.noise
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:

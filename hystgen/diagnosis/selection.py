@@ -88,7 +88,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
     latest: _Step | None = None
     rounds = ROUNDS if decisions.bear_two(records) else 1
     for _ in range(rounds):
-        if records.left(now) <= decisions.AT_FLOOR * records.noise:
+        if not decisions.leaves_enough(now, records):
             break
         step = _step(now, gap, records)
         if latest is not None and step is not None and not _explained(step, records):
