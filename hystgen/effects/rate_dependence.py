@@ -96,8 +96,8 @@ class ThresholdRate(_RateDependence):
         with np.errstate(over="ignore"):
             slope = np.minimum(np.abs(np.diff(w)) / run.steps, 1e300)
         rate = np.concatenate([[0.0], slope])
-        for i, row in zip(chosen.tolist(), out, strict=True):
-            code().dilated_play(w, rate, float(thresholds[i]), self.betas[i - 1], float(start[i]), row)
+        betas = np.array(self.betas)[chosen - 1]
+        code().dilated_plays(w, rate, thresholds[chosen], betas, start[chosen], out)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -89,21 +89,44 @@ def limit(u: Array, up: Array, down: Array, out: Array) -> None:
         out[k + 1] = x
 
 
+def rung(
+    y: float, rate: float, u: float, after: float, c: float, s: float, ramp: float, step: float, damping: float
+) -> tuple[float, float]:
+    """Output and rate of `ring` after a step in which its input goes from `u` to `after`."""
+    off = y - u
+    change = after - u
+    return (
+        u + (c + damping * s) * off + s * rate + ramp * change,
+        (c - damping * s) * rate - s * off + step * change,
+    )
+
+
 def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float, out: Array) -> None:
-    """Second-order low pass, from rest, over steps with straight `u`.
+    """Second-order low pass of every row of `u` (R, N), from rest, over steps with straight `u`.
 
     `c`, `s`: decaying cosine and sine of each step; `ramp`, `step`: what the output, and its rate, gain by a change of
     `u` by 1 over the step. Rates are per radian of the undamped oscillation.
     """
-    y = u[0]
-    rate = 0.0
-    out[0] = y
-    for k in range(len(u) - 1):
-        off = y - u[k]
-        change = u[k + 1] - u[k]
-        y = u[k] + (c[k] + damping * s[k]) * off + s[k] * rate + ramp[k] * change
-        rate = (c[k] - damping * s[k]) * rate - s[k] * off + step[k] * change
-        out[k + 1] = y
+    # Four side by side, since each by itself waits for its own last sample
+    rows, number = u.shape
+    fours = rows // 4 * 4
+    for i in range(0, fours, 4):
+        u0, u1, u2, u3 = u[i], u[i + 1], u[i + 2], u[i + 3]
+        y0, y1, y2, y3 = u0[0], u1[0], u2[0], u3[0]
+        v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0
+        out[i, 0], out[i + 1, 0], out[i + 2, 0], out[i + 3, 0] = y0, y1, y2, y3
+        for k in range(number - 1):
+            y0, v0 = rung(y0, v0, u0[k], u0[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            y1, v1 = rung(y1, v1, u1[k], u1[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            y2, v2 = rung(y2, v2, u2[k], u2[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            y3, v3 = rung(y3, v3, u3[k], u3[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            out[i, k + 1], out[i + 1, k + 1], out[i + 2, k + 1], out[i + 3, k + 1] = y0, y1, y2, y3
+    for i in range(fours, rows):
+        y, v = u[i, 0], 0.0
+        out[i, 0] = y
+        for k in range(number - 1):
+            y, v = rung(y, v, u[i, k], u[i, k + 1], c[k], s[k], ramp[k], step[k], damping)
+            out[i, k + 1] = y
 
 
 def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Array) -> None:
@@ -116,12 +139,28 @@ def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Arr
         total[k] += weight * (scale * xi * xi * value)
 
 
-def dilated_play(w: Array, rate: Array, r: float, beta: float, state: float, out: Array) -> None:
-    """Play whose threshold is `r + beta rate_k`."""
-    for k in range(len(w)):
-        reach = r + beta * rate[k]
-        state = min(max(state, w[k] - reach), w[k] + reach)
-        out[k] = state
+def within(state: float, x: float, reach: float) -> float:
+    """A play that reaches so far, after its input has gone to `x`."""
+    return min(max(state, x - reach), x + reach)
+
+
+def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, out: Array) -> None:
+    """Plays whose thresholds are `r + beta rate_k`, from `states`, into the rows of `out`."""
+    # Four side by side, since each by itself waits for its own last sample
+    fours = len(r) // 4 * 4
+    for i in range(0, fours, 4):
+        r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
+        b0, b1, b2, b3 = beta[i], beta[i + 1], beta[i + 2], beta[i + 3]
+        s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
+        for k in range(len(w)):
+            s0, s1 = within(s0, w[k], r0 + b0 * rate[k]), within(s1, w[k], r1 + b1 * rate[k])
+            s2, s3 = within(s2, w[k], r2 + b2 * rate[k]), within(s3, w[k], r3 + b3 * rate[k])
+            out[i, k], out[i + 1, k], out[i + 2, k], out[i + 3, k] = s0, s1, s2, s3
+    for i in range(fours, len(r)):
+        state = states[i]
+        for k in range(len(w)):
+            state = within(state, w[k], r[i] + beta[i] * rate[k])
+            out[i, k] = state
 
 
 def mean_decay(x: float) -> float:
@@ -327,7 +366,7 @@ def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    follow, creep, limit, ring, curve, dilated_play, mean_decay, bent_decay, taylor, stretch, relaxed,
+    follow, creep, limit, rung, ring, curve, within, dilated_plays, mean_decay, bent_decay, taylor, stretch, relaxed,
     relaxing_plays, rubbed, lost,
 ]  # fmt: skip
 
@@ -346,8 +385,8 @@ def load() -> None:
     first = np.zeros(1, dtype=np.intp)
     run.creep(u[:, None], first, *np.ones((3, 1, 1)), step, np.ones((1, 1)), out[:, None])
     run.limit(u, step, step, out)
-    run.ring(u, step, step, step, step, 1.0, out)
+    run.ring(u[None, :], step, step, step, step, 1.0, out[None, :])
     run.curve(u, 1.0, step, 1.0, out)
-    run.dilated_play(u, u, 1.0, 1.0, 0.0, out)
+    run.dilated_plays(u, u, step, step, np.zeros(1), out[None, :])
     run.lost(u, 1.0, np.empty(2), np.empty(1))
     run.relaxing_plays(u, step, step, 1.0, 1.0, 1.0, np.zeros(1), out[None, :])

@@ -63,8 +63,7 @@ class Resonance(Effect):
         rows = np.ascontiguousarray(np.atleast_2d(h))
         out = np.empty_like(rows)
         factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self._forced))
-        for row, answer in zip(rows, out, strict=True):
-            code().ring(row, *factors, self.damping, answer)
+        code().ring(rows, *factors, self.damping, out)
         return out.reshape(np.shape(h))
 
     def transients(self, run: Run) -> Array:
