@@ -220,10 +220,10 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
         selection.Found("c", "c", left["w"], left["cw"], 0.0, ("a", "b")),
     ]
     best: Any
-    best, unchanged = selection._exchanged(now, [*found], {"b", "c", "w"}, world.records)
+    best, unchanged = selection._exchanged(now, [*found], {}, {"b", "c", "w"}, world.records)
     assert best is now  # without `a` there is nothing better
     assert [each.name for each in unchanged] == ["w", "c"]
-    best, found = selection._exchanged(now, found, {"a", "b", "c", "w"}, world.records)
+    best, found = selection._exchanged(now, found, {}, {"a", "b", "c", "w"}, world.records)
     assert best.names == frozenset("ab")
     assert sorted(each.name for each in found) == ["a", "b"]
     assert found[0].before == gap

@@ -203,16 +203,21 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     n = len(e)
     window = np.hanning(n)
     power = np.abs(np.fft.rfft((e - e.mean()) * window)) ** 2
-    drive = np.abs(np.fft.rfft((item.run.v - item.run.v.mean()) * window)) ** 2
-    total, driven = float(np.sum(power)), float(np.sum(drive))
-    period = repetition(item.run.v)
-    carrier = _carrier(drive)
-    found: list[tuple[float, float]] = []
+    total = float(np.sum(power))
+    narrow: list[tuple[int, slice, float]] = []
     for k in _crests(power):
         beside = slice(max(k - 2, 0), k + 3)
         share = float(np.sum(power[beside])) / total
-        if power[k] <= STANDS * _around(power, k, WHOLE) or share <= SHARE:
-            continue
+        if power[k] > STANDS * _around(power, k, WHOLE) and share > SHARE:
+            narrow.append((k, beside, share))
+    if not narrow:
+        return []
+    drive = np.abs(np.fft.rfft((item.run.v - item.run.v.mean()) * window)) ** 2
+    driven = float(np.sum(drive))
+    period = repetition(item.run.v)
+    carrier = _carrier(drive)
+    found: list[tuple[float, float]] = []
+    for k, beside, share in narrow:
         # a line of the drive, which may be a small one of many harmonics
         if float(np.sum(drive[beside])) >= OWN * driven and drive[k] > PEAK * _around(drive, k, WHOLE):
             continue
@@ -280,9 +285,10 @@ def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
         if size < LEAST:
             continue
         places, power = welch(e, 1.0 / step, nperseg=size)
-        drive = welch(item.run.v, 1.0 / step, nperseg=size)[1]
-        for k in _crests(power):
-            if power[k] > PEAK * _around(power, k, PART) and drive[k] <= PEAK * _around(drive, k, PART):
+        high = [k for k in _crests(power) if power[k] > PEAK * _around(power, k, PART)]
+        drive = welch(item.run.v, 1.0 / step, nperseg=size)[1] if high else power
+        for k in high:
+            if drive[k] <= PEAK * _around(drive, k, PART):
                 share = float(np.sum(power[k - 2 : k + 3]) / np.sum(power))
                 found.append((share, float(np.average(places[k - 1 : k + 2], weights=power[k - 1 : k + 2]))))
     return found

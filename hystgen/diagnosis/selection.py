@@ -109,8 +109,8 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         accepted = _found(step, records)
         found.append(replace(accepted, before=found[-1].after) if found else accepted)
         now, latest = step.best.fitted, step
-        now, found = _without_needless(now, found, records)
-        now, found = _exchanged(now, found, {each.option.name for tried in rankings for each in tried}, records)
+        names = {each.option.name for tried in rankings for each in tried}
+        now, found = _exchanged(*_without_needless(now, found, records), names, records)
         if now is not step.best.fitted:
             latest = None
         if until(now):
@@ -239,8 +239,14 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
     return fits.begun(base, to_fit, start, near).now.best
 
 
-def _without_needless(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
-    """Drop effects accepted earlier that those accepted later have made needless."""
+def _without_needless(
+    now: Fitted, found: list[Found], records: Records
+) -> tuple[Fitted, list[Found], dict[str, Fitted]]:
+    """Drop effects accepted earlier that those accepted later have made needless.
+
+    With it the model less each of the others of these.
+    """
+    less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
         fitted = _without(now, found[k].name, records)
         if fitted is None:
@@ -248,21 +254,25 @@ def _without_needless(now: Fitted, found: list[Found], records: Records) -> tupl
         with_it, without = records.left(now), records.left(fitted)
         if decisions.apart(without, with_it) < 0.5 * decisions.ABOVE_NOISE * records.noise:
             return _without_needless(fitted, _rest(found, k, without), records)
-    return now, found
+        less[found[k].name] = fitted
+    return now, found, less
 
 
-def _exchanged(now: Fitted, found: list[Found], names: Collection[str], records: Records) -> tuple[Fitted, list[Found]]:
+def _exchanged(
+    now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
+) -> tuple[Fitted, list[Found]]:
     """Put another effect or shape in the place of one accepted earlier, where those accepted later make it the better.
 
     The first of two has been chosen while the second was missing, and may have taken part of its place; and the second
-    beside a wrong first one. Which names are alike shows beside all the others too. `names`: effects that were
-    followed up so far, since one that was among the best beside none of the others is not worth another search.
+    beside a wrong first one. Which names are alike shows beside all the others too. `less`: the model less an effect,
+    where that is known; `names`: effects that were followed up so far, since one that was among the best beside none of
+    the others is not worth another search.
     """
     latest, left = found[-1].name, EXCHANGES
     while left:
         left -= 1
         for k, old in enumerate(found):
-            fitted = None if old.name == latest else _without(now, old.name, records)
+            fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
             if fitted is None:
                 continue
             start = _left_as_it_is(now, old.name, records)  # the others' numbers without any may be far from all others
@@ -277,7 +287,7 @@ def _exchanged(now: Fitted, found: list[Found], names: Collection[str], records:
                 continue
             best = step.best.fitted
             chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
-            now, found = _without_needless(best, chain or [*_rest(found, k, other.before), other], records)
+            now, found, less = _without_needless(best, chain or [*_rest(found, k, other.before), other], records)
             latest = other.name
             break
         else:

@@ -39,6 +39,9 @@ MOVEMENTS = 5, 2**25
 DIFFERENCES = 12, 2**25
 """The same of what hypotheses leave of a record: those followed up in a round are compared with each other."""
 
+COMPARISONS = 40, 2**25
+"""And of the errors by which they are compared, with what each leaves free in the record."""
+
 FAR = 2.0
 """The start state may come from a drive so many times as wide as the recorded one."""
 
@@ -81,7 +84,8 @@ class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
     `session`: all records on one time axis, where they are of one session, and `part` what of it is this record.
-    `moved`: how the plays moved lately, since most numbers of a search do not change it; `left`: what was left of it.
+    `moved`: how the plays moved lately, since most numbers of a search do not change it; `left`: what was left of it;
+    `errors`: that with what is free in it fitted away.
     """
 
     name: str
@@ -93,6 +97,7 @@ class Item:
     part: slice = field(default_factory=lambda: slice(None))
     moved: Recent = field(default_factory=lambda: Recent(*MOVEMENTS), init=False, repr=False, compare=False)
     left: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
+    errors: Recent = field(default_factory=lambda: Recent(*COMPARISONS), init=False, repr=False, compare=False)
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
@@ -375,7 +380,7 @@ class Actuator:
                 break
             change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ left, rcond=1e-12)
             if np.any(np.abs(factors + change) > limits):
-                change = _within(slopes.T, left, -limits - factors, limits - factors)
+                change = _within(slopes, left, -limits - factors, limits - factors)
             factors += change
             shift = change @ free
             level = level + shift
@@ -424,20 +429,33 @@ class Actuator:
 
         `like`: another model whose `nuisances` are free in place of its own, to compare the two on equal terms.
         """
-        left, offset = self._left(item, p)
-        known = np.isfinite(left)
-        free = (self.nuisances(item, offset) if like is None else like.actuator.nuisances(item))[:, known].T
-        largest = self.largest(item, p) if like is None else like.actuator.largest(item, like.weights)
-        e = np.full(len(left), np.nan)
-        e[known] = left[known] - free @ _within(free, left[known], -largest, largest)
-        whole = np.full(len(item.y), np.nan)
-        whole[item.compared] = e
+        by = self.mark(p), None if like is None else like.mark
+        whole = item.errors.recalled(by)
+        if whole is None:
+            left, offset = self._left(item, p)
+            known = np.isfinite(left)
+            free = (self.nuisances(item, offset) if like is None else like.actuator.nuisances(item))[:, known]
+            largest = self.largest(item, p) if like is None else like.actuator.largest(item, like.weights)
+            e = np.full(len(left), np.nan)
+            e[known] = left[known] - _within(free, left[known], -largest, largest) @ free
+            whole = np.full(len(item.y), np.nan)
+            whole[item.compared] = e
+            whole.setflags(write=False)
+            item.errors.remember(by, whole)
         return whole
+
+    def mark(self, p: Array) -> object:
+        """All that a prediction depends on beside the record."""
+        return self._numbers, p.tobytes()
+
+    @cached_property
+    def _numbers(self) -> object:
+        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
+        return self.thresholds.tobytes(), self.stages, effects
 
     def _left(self, item: Item, p: Array) -> Array:
         """(2, N) of the compared samples: what is left before anything is fitted, and how the offset changes it."""
-        effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
-        by = (self.thresholds.tobytes(), self.stages, effects, p.tobytes())
+        by = self.mark(p)
         found = item.left.recalled(by)
         if found is None:
             rows, constant = self.columns(item, p)
@@ -452,16 +470,18 @@ class Actuator:
 
 
 def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
-    """Factors (k,) of columns (N, k) that fit y best between their limits; 0 lies between them."""
-    solution, *_ = np.linalg.lstsq(columns, y, rcond=1e-10)
+    """Factors (k,) of columns (k, N) that fit y best between their limits; 0 lies between them."""
+    table = np.empty((len(columns) + 1, len(y))).T
+    table[:, :-1], table[:, -1] = columns.T, y
+    triangle = reduction.reflected(table).triangle
+    solution, *_ = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=1e-10)
     if np.all((low <= solution) & (solution <= high)):
         return np.asarray(solution)
     from scipy.optimize import lsq_linear
 
     able = high > low
-    q, r = np.linalg.qr(columns[:, able])
     found = np.zeros(len(low))
-    found[able] = lsq_linear(r, q.T @ y, (low[able], high[able]), method="bvls").x
+    found[able] = lsq_linear(triangle[:, :-1][:, able], triangle[:, -1], (low[able], high[able]), method="bvls").x
     return found
 
 
@@ -563,10 +583,15 @@ class Fitted:
     weights: Array
     rms: float
 
-    @property
+    @cached_property
     def actuator(self) -> Actuator:
         """What was found."""
         return self.structure.actuator(self.shape)
+
+    @property
+    def mark(self) -> object:
+        """All that its errors depend on beside the record."""
+        return self.actuator.mark(self.weights)
 
     @property
     def bare(self) -> bool:
