@@ -1,31 +1,31 @@
 """The same work on several things, in processes that are copies of this one, or in threads of it.
 
-A copy (fork) sees all that this process has, so that nothing but results is sent, and they are those of a plain loop
-whatever the processes' order. Where processes cannot be copied safely it is a plain loop.
+A copy (fork) sees all that this process had when it was made, so that little has to be sent, and results are those of a
+plain loop whatever the processes' order. Where processes cannot be copied safely it is a plain loop.
 """
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
+    from multiprocessing.context import ForkProcess
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 MOST = 16
 """Processes at most; each has its own results in memory."""
-
-_NUMBER = 4
-"""Bytes of a number in the queue."""
-
 
 def cores() -> int:
     """How many processes may run here; 1 where they cannot be copied.
@@ -51,15 +51,130 @@ def each(
 
     What fails in a process, or takes it down, is repeated here: an exception is raised as in a plain loop.
     """
-    done = _elsewhere(work, items, jobs, tick) if min(jobs, len(items)) > 1 else {}
-    results = []
-    for k, item in enumerate(items):
-        if k in done:
-            results.append(done[k])
-        else:
-            results.append(work(item))
+    crew: Crew[int, R] = Crew(lambda k: work(items[k]), jobs)
+    with crew:
+        return [result for _, result in crew.each(range(len(items)), tick)]
+
+
+@dataclass(eq=False)
+class _Task(Generic[T, R]):
+    item: T
+    done: list[R] = field(default_factory=list)
+    """its result, once it is there"""
+    after: list[_Task[T, R]] = field(default_factory=list)
+
+
+class Crew(Generic[T, R]):
+    """Up to so many processes for the same work on things that come up one after the other; `with` lets them go.
+
+    They are made when the first things come, and see what this process had then; things and results are pickled.
+    """
+
+    def __init__(self, work: Callable[[T], R], jobs: int) -> None:
+        self._work, self._jobs = work, jobs
+        self._hands: dict[Connection, ForkProcess] = {}
+
+    def __enter__(self) -> Crew[T, R]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for reach, process in self._hands.items():
+            process.kill()
+            process.join()
+            reach.close()
+
+    def each(
+        self,
+        items: Iterable[T],
+        tick: Callable[[], None] = lambda: None,
+        then: Callable[[T, R], Iterable[T]] = lambda *_: (),
+    ) -> list[tuple[T, R]]:
+        """All the things with their results, in the order of a plain loop; `tick` is called for each of them.
+
+        `then`: what is to be done too, from a result; it goes first. What fails in a process, or takes it down, is
+        repeated here: an exception is raised as in a plain loop.
+        """
+        tasks = [_Task[T, R](item) for item in items]
+
+        def finish(task: _Task[T, R], result: R) -> list[_Task[T, R]]:
+            task.done.append(result)
+            task.after.extend(_Task(item) for item in then(task.item, result))
             tick()
-    return results
+            return task.after
+
+        if self._hands or min(self._jobs, len(tasks)) > 1:
+            self._elsewhere(deque(tasks), finish)
+        found = []
+        for task in tasks:  # which grows
+            if not task.done:
+                finish(task, self._work(task.item))
+            tasks.extend(task.after)
+            found.append((task.item, task.done[0]))
+        return found
+
+    def _elsewhere(self, waiting: deque[_Task[T, R]], finish: Callable[[_Task[T, R], R], list[_Task[T, R]]]) -> None:
+        """Have the tasks done by the processes; those behind a failure may be left."""
+        from multiprocessing import connection
+
+        self._gather(len(waiting))
+        free = list(self._hands)
+        busy: dict[Connection, _Task[T, R]] = {}
+        failed = False
+        while True:
+            while free and waiting and not failed:
+                reach, task = free.pop(), waiting.popleft()
+                busy[reach] = task
+                with contextlib.suppress(BrokenPipeError):  # which shows below
+                    reach.send(task.item)
+            if not busy:
+                return
+            ready = connection.wait(list(busy))
+            for reach in [each for each in busy if each in ready]:
+                task = busy.pop(reach)
+                try:
+                    result, failing = reach.recv()
+                except (EOFError, ConnectionResetError):
+                    self._hands.pop(reach).join()
+                    reach.close()
+                    continue
+                free.append(reach)
+                failed |= failing
+                if not failing:
+                    waiting.extendleft(finish(task, result))
+
+    def _gather(self, most: int) -> None:
+        """Make processes as long as there are fewer than things to do."""
+        import multiprocessing
+
+        fork = multiprocessing.get_context("fork")
+        # An interrupt is for this process; a copy that got it before it can ignore it would say so
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            while len(self._hands) < min(self._jobs, most):
+                here, there = fork.Pipe()
+                process = fork.Process(target=_serve, args=(self._work, there, [here, *self._hands]), daemon=True)
+                self._hands[here] = process
+                process.start()
+                there.close()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(work: Callable[[Any], Any], reach: Connection, others: Sequence[Connection]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.freeze()  # looking through what is the parent's would take long, and copy all of it
+    for each in others:  # its ends, which would keep one copy waiting for the other when the parent is gone
+        each.close()
+    while True:
+        try:
+            item = reach.recv()
+            try:
+                answer = work(item), False
+            except Exception:
+                answer = None, True
+            reach.send(answer)
+        except (EOFError, OSError):
+            return
 
 
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
@@ -73,60 +188,3 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
         for _ in pool.map(work, items):
             pass
 
-
-def _elsewhere(work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None]) -> dict[int, R]:
-    """Results by number; those behind a failure may be missing."""
-    import multiprocessing
-    from multiprocessing import connection
-
-    fork = multiprocessing.get_context("fork")
-    queue, filling = os.pipe()
-    os.write(filling, b"".join(k.to_bytes(_NUMBER, "little") for k in range(len(items))))
-    os.close(filling)
-    processes, readers = [], []
-    done: dict[int, R] = {}
-    # An interrupt is for this process; a copy that got it before it can ignore it would say so
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        try:
-            for _ in range(min(jobs, len(items))):
-                reader, writer = fork.Pipe(duplex=False)
-                readers.append(reader)
-                process = fork.Process(target=_work, args=(work, items, queue, writer, os.getpid()), daemon=True)
-                processes.append(process)
-                process.start()
-                writer.close()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        while readers:
-            for reader in [each for each in connection.wait(readers) if isinstance(each, connection.Connection)]:
-                try:
-                    k, result, failed = reader.recv()
-                except EOFError:
-                    readers.remove(reader)
-                    continue
-                if failed:
-                    while os.read(queue, _NUMBER):
-                        pass
-                else:
-                    done[k] = result
-                    tick()
-    finally:
-        os.close(queue)
-        for process in processes:
-            if process.pid is not None:
-                process.kill()
-                process.join()
-    return done
-
-
-def _work(work: Callable[[Any], Any], items: Sequence[Any], queue: int, results: Connection, parent: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    gc.freeze()  # looking through what is the parent's would take long, and copy all of it
-    while os.getppid() == parent and (number := os.read(queue, _NUMBER)):
-        k = int.from_bytes(number, "little")
-        try:
-            answer = (k, work(items[k]), False)
-        except Exception:
-            answer = (k, None, True)
-        results.send(answer)

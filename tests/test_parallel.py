@@ -90,6 +90,65 @@ class TestEach:
                 os.kill(process, 0)
 
 
+class TestCrew:
+    @pytest.mark.parametrize("jobs", [1, 2, 3])
+    def test_what_follows_from_a_result_is_done_in_the_order_of_a_plain_loop(self, jobs: int) -> None:
+        def work(k: int) -> int:
+            time.sleep(0.01 * (k % 3 == 0))
+            return k * k
+
+        def then(k: int, square: int) -> list[int]:
+            assert square == k * k
+            return [10 * k, 10 * k + 1] if k % 2 and k < 100 else []
+
+        ticks: list[int] = []
+        with parallel.Crew(work, jobs) as crew:
+            found = crew.each([1, 2, 3, 5], lambda: ticks.append(1), then)
+        order = [1, 2, 3, 5, 10, 11, 30, 31, 50, 51, 110, 111, 310, 311, 510, 511]
+        assert found == [(k, k * k) for k in order]
+        assert len(ticks) == len(order)
+
+    def test_the_same_processes_do_what_comes_later(self) -> None:
+        here: list[int] = []
+
+        def work(k: int) -> tuple[int, int]:
+            here.append(k)
+            return os.getpid(), len(here)
+
+        with parallel.Crew(work, 2) as crew:
+            first = crew.each(range(6))
+            second = crew.each(range(6, 20))
+            assert crew.each([]) == []
+        done = {process: 0 for _, (process, _) in first}
+        for _, (process, n) in [*first, *second]:
+            assert n == done[process] + 1
+            done[process] = n
+        assert not here
+        for process in done:
+            with pytest.raises(ProcessLookupError):
+                os.kill(process, 0)
+
+    @pytest.mark.parametrize("taken", [1, 2])
+    def test_goes_on_with_fewer_processes(self, taken: int) -> None:
+        first = os.getpid()
+
+        def work(k: int) -> bool:
+            if k < taken and os.getpid() != first:
+                os.kill(os.getpid(), signal.SIGKILL)
+            return os.getpid() == first
+
+        with parallel.Crew(work, 2) as crew:
+            crew.each(range(2))
+            later = crew.each(range(5, 15))
+        assert [k for k, _ in later] == list(range(5, 15))
+        assert sum(here for _, here in later) == 0
+
+    @pytest.mark.parametrize("jobs", [1, 2])
+    def test_a_failure_of_what_follows_is_raised(self, jobs: int) -> None:
+        with parallel.Crew(lambda k: 1 // (3 - k), jobs) as crew, pytest.raises(ZeroDivisionError):
+            crew.each([0, 1], then=lambda k, _: [k + 2])
+
+
 class TestThreads:
     def test_all_is_done_and_no_thread_is_left(self) -> None:
         done: list[tuple[int, threading.Thread]] = []

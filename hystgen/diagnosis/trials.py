@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,10 +166,10 @@ class Records:
         rough = _rough(now, self.thin)
         roughly = replace(known, thresholds=tuple(rough.structure.thresholds.tolist()))
         both = zip(options(now, known, self.user), options(rough, roughly, self.user), strict=True)
-        found = [(option, alike) for option, alike in both if worth is None or worth(option)]
-        wanted = {alike.label: option for option, alike in found}
-        kept = _screened(rough, self, [alike for _, alike in found])
-        return _followed_up(now, [replace(each, option=wanted[each.option.label]) for each in kept], self)
+        found = [_Pair(*each) for each in both if worth is None or worth(each[0])]
+        searches = _Searches(now, rough, found, self)
+        with parallel.Crew(searches, self.jobs) as crew:
+            return _followed_up(searches, _screened(searches, crew), crew)
 
     def left(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
@@ -195,42 +196,88 @@ def _jobs(to_fit: Sequence[Item]) -> int:
     return jobs
 
 
+class _Pair(NamedTuple):
+    """An option, and the same with fewer thresholds to tell shapes apart."""
+
+    option: Option
+    rough: Option
+
+
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """An option after the first steps, and its held-out rms."""
+    """An option, counted by its number, after the first steps, and its held-out rms."""
 
+    k: int
     option: Option
     fitted: Fitted
     left: float
 
 
-def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_Screened]:
-    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
+_SCREEN, _JOIN, _POLISH = range(3)
+"""What is done with an option: a few steps alone, a few of the whole hypothesis, and the search to its end."""
 
-    What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
-    a simpler one is tried where that takes something away, and goes on where it takes more.
+
+class _Task(NamedTuple):
+    what: int
+    k: int
+    """number of the option"""
+    shape: Array | None = None
+    """where the search begins; for a shape that contains a simpler one what was found for that"""
+    weights: Array | None = None
+    steps: int = 0
+
+
+class _Numbers(NamedTuple):
+    """What a search finds, and its rms error on records that took no part: no more than can be sent by a process.
+
+    What builds an effect of numbers cannot.
     """
-    without = fits.rms(now.errors(records.thin)), fits.rms(now.errors(records.thin_held))
-    simpler: dict[str, _Screened] = {}
 
-    def acting(searches: Sequence[Search]) -> Sequence[Search]:
-        return [each for each in searches if abs(each.now.rms - without[0]) > IDLE * without[0]] or searches
+    shape: Array
+    weights: Array
+    rms: float
+    left: float
 
-    def enough_of_it(option: Option, start: Array) -> Array:
-        if option.front or not option.alone.parts[-1].candidate.amounts:
-            return start
-        *others, last = option.alone.parts
-        amounts = replace(last, candidate=last.candidate.at(start))
-        structure = replace(option.alone, parts=(*others, amounts))
-        return fits.begun(structure, records.thin, start, now.weights).further(1, COARSE).now.shape
 
-    def begin(option: Option) -> Fitted:
+@dataclass(frozen=True)
+class _Searches:
+    """The searches of one round, for every option beside a hypothesis; `rough`: that with fewer thresholds."""
+
+    now: Fitted
+    rough: Fitted
+    found: Sequence[_Pair]
+    records: Records
+
+    def __call__(self, task: _Task) -> _Numbers:
+        """What one search finds."""
+        pair, records = self.found[task.k], self.records
+        if task.what == _SCREEN:
+            fitted, held = self._screen(pair.rough, task.shape), records.thin_held
+        else:
+            fitted, held = self._join(pair.option, task), records.held
+        left = fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
+        return _Numbers(fitted.shape, fitted.weights, fitted.rms, left)
+
+    def _screen(self, option: Option, simpler: Array | None) -> Fitted:
+        """A few steps from each start on thinned records, and a few more from the best of them."""
+        now, thin = self.rough, self.records.thin
+        without = fits.rms(now.errors(thin))
+
+        def acting(searches: Sequence[Search]) -> Sequence[Search]:
+            return [each for each in searches if abs(each.now.rms - without) > IDLE * without] or searches
+
+        def enough_of_it(start: Array) -> Array:
+            if option.front or not option.alone.parts[-1].candidate.amounts:
+                return start
+            *others, last = option.alone.parts
+            amounts = replace(last, candidate=last.candidate.at(start))
+            structure = replace(option.alone, parts=(*others, amounts))
+            return fits.begun(structure, thin, start, now.weights).further(1, COARSE).now.shape
+
         starts = list(option.starts)
-        if option.grown is not None:
-            starts.append(option.grown(simpler[option.beyond].fitted.shape))
-        begun = [
-            fits.begun(option.alone, records.thin, enough_of_it(option, start), now.weights) for start in starts
-        ]
+        if option.grown is not None and simpler is not None:
+            starts.append(option.grown(simpler))
+        begun = [fits.begun(option.alone, thin, enough_of_it(start), now.weights) for start in starts]
         if option.name.startswith(USER) and not any(math.isfinite(each.now.rms) for each in begun):
             raise EffectsError(f"the effect {option.name} gives no finite output wherever a search for it begins")
         near = TOO_FAR * min(each.now.rms for each in acting(begun))
@@ -243,23 +290,62 @@ def _screened(now: Fitted, records: Records, found: Sequence[Option]) -> list[_S
             best, search = search, search.further(SCREENING_STEPS, COARSE)
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
-    def first_steps(some: Sequence[Option]) -> list[_Screened]:
-        return _each(some, [option.alone for option in some], lambda k: begin(some[k]), records.thin_held, records)
+    def _join(self, option: Option, task: _Task) -> Fitted:
+        """The whole hypothesis fitted from a start, by so many steps."""
+        assert task.shape is not None
+        assert task.weights is not None
+        search = fits.begun(option.structure, self.records.quick, task.shape, task.weights)
+        little = COARSE if task.what == _JOIN else fits.POLISHED
+        return (search.further(task.steps, little) if task.steps else search).found(task.weights)
+
+
+_Crew = parallel.Crew[_Task, _Numbers]
+
+
+def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
+    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
+
+    What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
+    a simpler one is tried where that takes something away, and goes on where it takes more.
+    """
+    records, found = searches.records, [pair.rough for pair in searches.found]
+    without = [fits.rms(searches.rough.errors(items)) for items in (records.thin, records.thin_held)]
 
     def helps(each: _Screened, rms: float, left: float) -> bool:
         return each.fitted.rms < (1.0 - HELPS) * rms or each.left < (1.0 - HELPS) * left
 
-    tried = first_steps([option for option in found if not option.beyond])
+    def screened(k: int, numbers: _Numbers) -> _Screened:
+        return _Screened(k, found[k], Fitted(found[k].alone, *numbers[:3]), numbers.left)
+
+    def containing(option: Option) -> list[int]:
+        return [k for k, other in enumerate(found) if other.beyond == option.label]
+
+    def cost(k: int) -> int:
+        return _numbers(found[k].alone, found[k]) + max(map(cost, containing(found[k])), default=0)
+
+    def further(task: _Task, numbers: _Numbers) -> list[_Task]:
+        if found[task.k].beyond or not helps(screened(task.k, numbers), *without):
+            return []
+        return [_Task(_SCREEN, k, numbers.shape) for k in containing(found[task.k])]
+
+    first = sorted((k for k, option in enumerate(found) if not option.beyond), key=cost, reverse=True)
+    done = {task.k: numbers for task, numbers in crew.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
+    every = [screened(k, done[k]) for k in sorted(done)]
+    tried = [each for each in every if not each.option.beyond]
     simpler = {each.option.label: each for each in tried if helps(each, *without)}
-    for each in first_steps([option for option in found if option.beyond in simpler]):
-        less = simpler[each.option.beyond]
-        if helps(each, less.fitted.rms, less.left):
+    for each in every:
+        less = simpler.get(each.option.beyond)
+        if less is not None and helps(each, less.fitted.rms, less.left):
             tried.append(each)
     tried = [each for each in tried if math.isfinite(each.left)]
     kept = _kept(tried, [each for each in tried if helps(each, *without)])
     contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
-    kept += [each for each in contained if each not in kept]  # whether more numbers are worth it shows when all fit
-    return kept
+    return list(dict.fromkeys([*kept, *contained]))  # whether more numbers are worth it shows when all fit
+
+
+def _numbers(structure: Structure, option: Option) -> int:
+    """What a search costs, about: those with most numbers go first, so that no process is left alone with one."""
+    return len(structure.start) * (1 + len(option.starts))
 
 
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
@@ -285,57 +371,29 @@ def _twins(one: _Screened, other: _Screened) -> bool:
     return all(abs(a - b) <= TWIN * b for a, b in both)
 
 
-def _each(
-    found: Sequence[Option],
-    structures: Sequence[Structure],
-    search: Callable[[int], Fitted],
-    held: Sequence[Item],
-    records: Records,
-) -> list[_Screened]:
-    """What a search finds for each option, counted by its number, and its rms error on some records.
-
-    In several processes, from which only numbers come: what builds an effect of them cannot be sent.
-    """
-
-    def numbers(k: int) -> tuple[Array, Array, float, float]:
-        fitted = search(k)
-        left = fits.rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
-        return fitted.shape, fitted.weights, fitted.rms, left
-
-    # those with most numbers first, so that no process is left alone with one of them
-    order = sorted(range(len(found)), key=lambda k: -len(structures[k].start) * (1 + len(found[k].starts)))
-    done = dict(zip(order, parallel.each(numbers, order, records.jobs, records.tick), strict=True))
-    return [
-        _Screened(option, Fitted(structure, *done[k][:3]), done[k][3])
-        for k, (option, structure) in enumerate(zip(found, structures, strict=True))
-    ]
-
-
-def _followed_up(now: Fitted, kept: Sequence[_Screened], records: Records) -> list[Tried]:
+def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) -> list[Tried]:
     """The options fitted to everything and run over the held-out records, the best one first."""
-    whole = [each.option.structure for each in kept]
+    now, records = searches.now, searches.records
+    found = {each.k: searches.found[each.k].option for each in kept}
     by_held_out = PROMISING * min((each.left for each in kept), default=0.0)
     by_fit = PROMISING * min((each.fitted.rms for each in kept), default=0.0)
 
-    def begin(k: int) -> Fitted:
-        option, screened = kept[k].option, kept[k].fitted
-        structure, shape, p = option.structure, option.joined(now, screened.shape), now.weights
-        search = fits.begun(structure, records.quick, shape, p)
-        promising = kept[k].left <= by_held_out or screened.rms <= by_fit
-        return (search.further(JOINT_STEPS, COARSE) if promising else search).found(p)
+    def join(each: _Screened) -> _Task:
+        promising = each.left <= by_held_out or each.fitted.rms <= by_fit
+        shape = found[each.k].joined(now, each.fitted.shape)
+        return _Task(_JOIN, each.k, shape, now.weights, JOINT_STEPS if promising else 0)
 
-    def go_on(k: int) -> Fitted:
-        fitted = begun[k].fitted
-        if begun[k].left > hopeful:
-            return fitted
-        return fits.fit(fitted.structure, records.quick, fitted.shape, fitted.weights)
+    def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
+        order = sorted(tasks, key=lambda task: _numbers(found[task.k].structure, found[task.k]), reverse=True)
+        return {task.k: numbers for task, numbers in crew.each(order, records.tick)}
 
-    followed = [each.option for each in kept]
-    begun = _each(followed, whole, begin, records.held, records)
-    hopeful = HOPEFUL * min((each.left for each in begun), default=0.0)
+    done = all_of([join(each) for each in kept])
+    hopeful = HOPEFUL * min((numbers.left for numbers in done.values()), default=0.0)
+    going_on = {k: numbers for k, numbers in done.items() if not numbers.left > hopeful}
+    done |= all_of([_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS) for k, numbers in going_on.items()])
     tried = []
-    for each in _each(followed, whole, go_on, records.held, records):
-        option, fitted = each.option, each.fitted
+    for k, option in found.items():
+        fitted = Fitted(option.structure, *done[k][:3])
         if fitted.rms >= now.rms:
             continue
         errors = fitted.errors(records.held)
