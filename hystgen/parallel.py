@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import mmap
 import os
 import signal
 import sys
@@ -26,6 +27,9 @@ R = TypeVar("R")
 
 MOST = 16
 """Processes at most; each has its own results in memory."""
+
+_at_work: Sequence[int] | memoryview[int] = (0,)
+"""How many of the crew that this process is one of are at work."""
 
 def cores() -> int:
     """How many processes may run here; 1 where they cannot be copied.
@@ -73,6 +77,7 @@ class Crew(Generic[T, R]):
     def __init__(self, work: Callable[[T], R], jobs: int) -> None:
         self._work, self._jobs = work, jobs
         self._hands: dict[Connection, ForkProcess] = {}
+        self._at_work = memoryview(mmap.mmap(-1, mmap.PAGESIZE)).cast("i")  # shared with the copies
 
     def __enter__(self) -> Crew[T, R]:
         return self
@@ -126,6 +131,7 @@ class Crew(Generic[T, R]):
                 busy[reach] = task
                 with contextlib.suppress(BrokenPipeError):  # which shows below
                     reach.send(task.item)
+            self._at_work[0] = len(busy)
             if not busy:
                 return
             ready = connection.wait(list(busy))
@@ -152,7 +158,8 @@ class Crew(Generic[T, R]):
         try:
             while len(self._hands) < min(self._jobs, most):
                 here, there = fork.Pipe()
-                process = fork.Process(target=_serve, args=(self._work, there, [here, *self._hands]), daemon=True)
+                others = [here, *self._hands]
+                process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 self._hands[here] = process
                 process.start()
                 there.close()
@@ -160,7 +167,11 @@ class Crew(Generic[T, R]):
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _serve(work: Callable[[Any], Any], reach: Connection, others: Sequence[Connection]) -> None:
+def _serve(
+    work: Callable[[Any], Any], reach: Connection, others: Sequence[Connection], at_work: memoryview[int]
+) -> None:
+    global _at_work
+    _at_work = at_work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     gc.freeze()  # looking through what is the parent's would take long, and copy all of it
     for each in others:  # its ends, which would keep one copy waiting for the other when the parent is gone
@@ -180,11 +191,16 @@ def _serve(work: Callable[[Any], Any], reach: Connection, others: Sequence[Conne
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
     """`work(item)` for all items, in threads that are gone when it is done; compiled work runs side by side there.
 
-    Of use where a core has nothing else to do, as when the last of several processes is left with a long task.
+    Where other cores have nothing else to do, as when the last of a crew is left with a long task; else a plain loop.
     """
+    room = min(len(items), _cores() // max(1, _at_work[0]))
+    if room < 2:
+        for item in items:
+            work(item)
+        return
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(max(1, min(len(items), _cores()))) as pool:
+    with ThreadPoolExecutor(room) as pool:
         for _ in pool.map(work, items):
             pass
 

@@ -165,6 +165,19 @@ class TestThreads:
             parallel.in_threads(lambda k: 1 // k, [1, 0, 2])
 
 
+    def test_none_beside_a_crew_at_work(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(parallel, "_cores", lambda: 2)
+
+        def work(seconds: float) -> int:
+            time.sleep(seconds)
+            threads: set[int] = set()
+            parallel.in_threads(lambda _: threads.add(threading.get_ident()) or time.sleep(0.05), range(4))  # type: ignore[func-returns-value]
+            return len(threads)
+
+        with parallel.Crew(work, 2) as crew:
+            assert crew.each([0.0, 1.0]) == [(0.0, 1), (1.0, 2)]
+
+
 class TestInterrupt:
     @pytest.mark.parametrize("to_all", [True, False])
     def test_ends_all_processes_and_is_told_once(self, to_all: bool) -> None:
