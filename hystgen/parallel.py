@@ -83,8 +83,9 @@ class Crew(Generic[T, R]):
         return self
 
     def __exit__(self, *_: object) -> None:
-        for reach, process in self._hands.items():
+        for process in self._hands.values():
             process.kill()
+        for reach, process in self._hands.items():
             process.join()
             reach.close()
 
@@ -160,9 +161,14 @@ class Crew(Generic[T, R]):
                 here, there = fork.Pipe()
                 others = [here, *self._hands]
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
+                try:
+                    process.start()
+                except OSError:  # no room for another: those that there are will do, or none
+                    here.close()
+                    return
+                finally:
+                    there.close()
                 self._hands[here] = process
-                process.start()
-                there.close()
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

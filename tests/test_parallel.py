@@ -143,6 +143,23 @@ class TestCrew:
         assert [k for k, _ in later] == list(range(5, 15))
         assert sum(here for _, here in later) == 0
 
+    @pytest.mark.parametrize("able", [0, 1])
+    def test_does_with_the_processes_that_can_be_made(self, able: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        left, fork = able, os.fork
+
+        def limited() -> int:
+            nonlocal left
+            left -= 1
+            if left < 0:
+                raise BlockingIOError(11, "Resource temporarily unavailable")
+            return fork()
+
+        monkeypatch.setattr(os, "fork", limited)
+        found = parallel.each(lambda k: (k, os.getpid()), range(6), 3)
+        assert [k for k, _ in found] == list(range(6))
+        assert len({process for _, process in found}) == 1
+        assert (found[0][1] == os.getpid()) == (not able)
+
     @pytest.mark.parametrize("jobs", [1, 2])
     def test_a_failure_of_what_follows_is_raised(self, jobs: int) -> None:
         with parallel.Crew(lambda k: 1 // (3 - k), jobs) as crew, pytest.raises(ZeroDivisionError):

@@ -113,6 +113,12 @@ class Item:
             return found
         return slice(int(found[0]), int(found[-1]) + 1, int(steps[0]))
 
+    def picked(self, rows: Array) -> Array:
+        """Of rows (k, N) those samples, with nothing between them."""
+        if isinstance(self.compared, slice):
+            return np.ascontiguousarray(rows[:, self.compared])
+        return rows.take(self.compared, axis=1)
+
 
 @dataclass(frozen=True)
 class Part:
@@ -238,9 +244,11 @@ class Actuator:
             rows, constant = rows * gain, constant * gain + offset
         for effect in self.at(Place.LINEAR):
             if effect.order > 0:
-                rows, constant = effect.filtered(rows, run), effect.filtered(constant, run)
+                rows = effect.filtered(rows, run)
+                if self.at(Place.GAIN):  # of nothing a filter makes nothing
+                    constant = effect.filtered(constant, run)
         if self._needed == _RINGING:
-            rows, constant = rows[:, item.compared], constant[item.compared]
+            rows, constant = item.picked(rows), constant[item.compared]
         return rows, constant
 
     def compared(self, values: Array, item: Item) -> Array:
@@ -267,7 +275,7 @@ class Actuator:
             for effect in self._filters:
                 rows = effect.filtered(rows, item.run)
             if self._needed == _FILTERED:
-                rows = np.ascontiguousarray(rows[:, item.compared])
+                rows = item.picked(rows)
             item.moved.remember(by, rows)
         return rows
 
@@ -307,7 +315,7 @@ class Actuator:
         if rows is None:
             rows = chain.moved(self.at(Place.PLAYS), *self._input(item))
             if self._needed == _MOVED:
-                rows = np.ascontiguousarray(rows[:, item.compared])
+                rows = item.picked(rows)
             item.moved.remember(by, rows)
         return rows
 
@@ -395,7 +403,7 @@ class Actuator:
             total = total + effect.added(item.run)
         return total[item.compared]
 
-    @property
+    @cached_property
     def bends(self) -> bool:
         """Whether there is an output map."""
         return any(effect.place is Place.OUTPUT for effect in self.effects)
@@ -420,7 +428,7 @@ class Actuator:
 
     def largest(self, item: Item, p: Array) -> Array:
         """(k,) how large the factors of `nuisances` may be: an effect of little weight has little left from a start."""
-        span = FAR * float(np.sum(p)) * float(np.ptp((item.session or item.run).v))
+        span = FAR * float(np.sum(p)) * (item.session or item.run).drive_range
         limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self._starting(item))]
         return np.concatenate(limits)
 

@@ -68,6 +68,11 @@ class Run:
         return np.diff(self.t)
 
     @cached_property
+    def drive_range(self) -> float:
+        """Largest less smallest drive."""
+        return float(np.ptp(self.v))
+
+    @cached_property
     def travelled(self) -> Array:
         """Distance `sum |dv|` that the drive has moved up to each sample, input units."""
         if self.within is not None:
