@@ -205,9 +205,11 @@ def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
     t, h = uneven()
     other = np.sin(7 * t)
     run = record(t, h)
-    both = effect.filtered(np.stack([h, other, 2.0 * h - 3.0 * other]), run)
-    assert np.allclose(both[2], 2.0 * both[0] - 3.0 * both[1], atol=1e-11)
-    assert np.array_equal(both[0], effect.filtered(h, run))
+    rows = np.stack([h, other, 2.0 * h - 3.0 * other, h**2, other**2, h * other])
+    found = effect.filtered(rows, run)
+    assert np.allclose(found[2], 2.0 * found[0] - 3.0 * found[1], atol=1e-11)
+    for alone, beside in zip(rows, found, strict=True):
+        assert np.array_equal(beside, effect.filtered(alone, run))
     constant = effect.filtered(np.full(50, 2.0), Run(t[:50], t[:50]))
     assert np.allclose(constant, constant[0], rtol=1e-13), "at rest at the first sample"
 
@@ -488,16 +490,16 @@ def test_resonance_rings_at_its_damped_frequency() -> None:
 
 
 def test_threshold_rate_against_a_loop() -> None:
-    betas = (0.01, 0.0, 0.05)
+    betas = (0.01, 0.0, 0.05, 0.02, 0.01, 0.0)
     t, w = uneven()
-    start = np.array([0.0, 0.2, -0.3, 0.1])
-    found = make("rate_dependence", betas=betas).plays(w, Run(t, w), THRESHOLDS, start)
+    start, thresholds = np.array([0.0, 0.2, -0.3, 0.1, 0.0, -0.1, 0.2]), np.linspace(0.0, 0.9, 7)
+    found = make("rate_dependence", betas=betas).plays(w, Run(t, w), thresholds, start)
     state, expected = list(start), []
     for k in range(len(w)):
         rate = abs((w[k] - w[k - 1]) / (t[k] - t[k - 1])) if k else 0.0
         row = [w[k]]
-        for i in range(1, 4):
-            r = THRESHOLDS[i] + betas[i - 1] * rate
+        for i in range(1, 7):
+            r = thresholds[i] + betas[i - 1] * rate
             state[i] = max(w[k] - r, min(w[k] + r, state[i]))
             row.append(state[i])
         expected.append(row)

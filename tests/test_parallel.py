@@ -167,6 +167,10 @@ class TestCrew:
 
 
 class TestThreads:
+    @pytest.fixture(autouse=True)
+    def two_cores(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(parallel, "_cores", lambda: 2)
+
     def test_all_is_done_and_no_thread_is_left(self) -> None:
         done: list[tuple[int, threading.Thread]] = []
         parallel.in_threads(lambda k: done.append((k, threading.current_thread())), range(20))
@@ -182,9 +186,7 @@ class TestThreads:
             parallel.in_threads(lambda k: 1 // k, [1, 0, 2])
 
 
-    def test_none_beside_a_crew_at_work(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(parallel, "_cores", lambda: 2)
-
+    def test_none_beside_a_crew_at_work(self) -> None:
         def work(seconds: float) -> int:
             time.sleep(seconds)
             threads: set[int] = set()

@@ -126,6 +126,15 @@ def test_neither_of_two_is_a_further_one(monkeypatch: pytest.MonkeyPatch) -> Non
     assert step.merit is None
 
 
+@pytest.mark.parametrize(("bare", "enough"), [(True, 1.166), (False, 1.414)])
+@pytest.mark.parametrize("left", [1.0, 1.1, 1.3, 1.5])
+def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(bare: bool, enough: float, left: float) -> None:
+    """A first effect removes 0.6 times what it leaves, a further one as much as it leaves; neither less than noise."""
+    now: Any = SimpleNamespace(bare=bare)
+    records: Any = SimpleNamespace(noise=NOISE, left=lambda _: left * NOISE)
+    assert decisions.leaves_enough(now, records) is (left > enough)
+
+
 def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Sought from where both are, one does as well alone: the search had merely not found it."""
     assert together(World(BOTH, "ab"), monkeypatch, {"a": 0.021, "b": 0.021}) == []
