@@ -165,9 +165,13 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
         if each is best:
             continue
         like = None if each.name == best.name else best.fitted
-        left, errors = fits.rms(each.fitted.errors(held, like)), each.fitted.errors(to_fit, like)
+        left = fits.rms(each.fitted.errors(held, like))
+        if left > enough:
+            others.append(each)
+            continue
+        errors = each.fitted.errors(to_fit, like)
         more = fits.rms(errors)
-        if less > FAR_LESS * more and (left <= best.held_out or (left <= enough and as_good(errors, more))):
+        if less > FAR_LESS * more and (left <= best.held_out or as_good(errors, more)):
             near.append((each.numbers(held), _everywhere(each, best, records), each))
         else:
             others.append(each)

@@ -321,7 +321,7 @@ def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
         return [k for k, other in enumerate(found) if other.beyond == option.label]
 
     def cost(k: int) -> int:
-        return _numbers(found[k].alone, found[k]) + max(map(cost, containing(found[k])), default=0)
+        return sum(_cost(found[j].alone, found[j]) for j in (k, *containing(found[k])))
 
     def further(task: _Task, numbers: _Numbers) -> list[_Task]:
         if found[task.k].beyond or not helps(screened(task.k, numbers), *without):
@@ -343,8 +343,8 @@ def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
     return list(dict.fromkeys([*kept, *contained]))  # whether more numbers are worth it shows when all fit
 
 
-def _numbers(structure: Structure, option: Option) -> int:
-    """What a search costs, about: those with most numbers go first, so that no process is left alone with one."""
+def _cost(structure: Structure, option: Option) -> int:
+    """What a search costs, about: the longest go first, so that no process is left alone with one."""
     return len(structure.start) * (1 + len(option.starts))
 
 
@@ -384,7 +384,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) ->
         return _Task(_JOIN, each.k, shape, now.weights, JOINT_STEPS if promising else 0)
 
     def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
-        order = sorted(tasks, key=lambda task: _numbers(found[task.k].structure, found[task.k]), reverse=True)
+        order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
         return {task.k: numbers for task, numbers in crew.each(order, records.tick)}
 
     done = all_of([join(each) for each in kept])
