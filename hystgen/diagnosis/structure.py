@@ -39,7 +39,7 @@ MOVEMENTS = 5, 2**25
 DIFFERENCES = 12, 2**25
 """The same of what hypotheses leave of a record: those followed up in a round are compared with each other."""
 
-COMPARISONS = 40, 2**25
+COMPARISONS = 40, 2**23
 """And of the errors by which they are compared, with what each leaves free in the record."""
 
 FAR = 2.0
@@ -432,18 +432,19 @@ class Actuator:
         limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self._starting(item))]
         return np.concatenate(limits)
 
-    def error(self, item: Item, p: Array, like: Fitted | None = None) -> Array:
+    def error(self, item: Item, p: Array, like: tuple[Actuator, Array] | None = None) -> Array:
         """Measured less predicted, what is free in the record fitted away; NaN where it is not compared.
 
-        `like`: another model whose `nuisances` are free in place of its own, to compare the two on equal terms.
+        `like`: another actuator and its weights, whose `nuisances` are free in place of its own, to compare the two on
+        equal terms.
         """
-        by = self.mark(p), None if like is None else like.mark
+        by = self._mark(p), None if like is None else like[0]._mark(like[1])
         whole = item.errors.recalled(by)
         if whole is None:
             left, offset = self._left(item, p)
             known = np.isfinite(left)
-            free = (self.nuisances(item, offset) if like is None else like.actuator.nuisances(item))[:, known]
-            largest = self.largest(item, p) if like is None else like.actuator.largest(item, like.weights)
+            free = (self.nuisances(item, offset) if like is None else like[0].nuisances(item))[:, known]
+            largest = self.largest(item, p) if like is None else like[0].largest(item, like[1])
             e = np.full(len(left), np.nan)
             e[known] = left[known] - _within(free, left[known], -largest, largest) @ free
             whole = np.full(len(item.y), np.nan)
@@ -452,7 +453,7 @@ class Actuator:
             item.errors.remember(by, whole)
         return whole
 
-    def mark(self, p: Array) -> object:
+    def _mark(self, p: Array) -> object:
         """All that a prediction depends on beside the record."""
         return self._numbers, p.tobytes()
 
@@ -463,7 +464,7 @@ class Actuator:
 
     def _left(self, item: Item, p: Array) -> Array:
         """(2, N) of the compared samples: what is left before anything is fitted, and how the offset changes it."""
-        by = self.mark(p)
+        by = self._mark(p)
         found = item.left.recalled(by)
         if found is None:
             rows, constant = self.columns(item, p)
@@ -591,15 +592,10 @@ class Fitted:
     weights: Array
     rms: float
 
-    @cached_property
+    @property
     def actuator(self) -> Actuator:
         """What was found."""
         return self.structure.actuator(self.shape)
-
-    @property
-    def mark(self) -> object:
-        """All that its errors depend on beside the record."""
-        return self.actuator.mark(self.weights)
 
     @property
     def bare(self) -> bool:
@@ -609,7 +605,8 @@ class Fitted:
     def errors(self, items: Sequence[Item], like: Fitted | None = None) -> list[Array]:
         """Error signals over records; `like`: with what another model leaves free in them."""
         actuator = self.actuator
-        return [actuator.error(item, self.weights, like) for item in items]
+        other = None if like is None else (like.actuator, like.weights)
+        return [actuator.error(item, self.weights, other) for item in items]
 
 
 @dataclass(frozen=True, eq=False)
