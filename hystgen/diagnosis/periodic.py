@@ -286,7 +286,9 @@ def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
             continue
         places, power = welch(e, 1.0 / step, nperseg=size)
         high = [k for k in _crests(power) if power[k] > PEAK * _around(power, k, PART)]
-        drive = welch(item.run.v, 1.0 / step, nperseg=size)[1] if high else power
+        if not high:
+            continue
+        drive = welch(item.run.v, 1.0 / step, nperseg=size)[1]
         for k in high:
             if drive[k] <= PEAK * _around(drive, k, PART):
                 share = float(np.sum(power[k - 2 : k + 3]) / np.sum(power))
