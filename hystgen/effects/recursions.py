@@ -45,7 +45,7 @@ def creep(
     """Add the first-order filters of every column of `u` (N, R), times the weight of each, to `total`.
 
     `step` (N - 1): the row of `decay`, `early` and `late` (., T) that holds; `states` (T, R) are where the filters
-    begin. All side by side, since each by itself waits for its own last sample.
+    begin. Columns side by side, or of one column all filters, since each by itself waits for its own last sample.
     """
     taus, rows = states.shape
     for j in range(taus):
@@ -59,13 +59,14 @@ def creep(
             for j in range(taus):
                 total[k + 1, 0] += weights[j] * states[j, 0]
         return
-    for k in range(len(u) - 1):
-        s = step[k]
-        for j in range(taus):
+    for j in range(taus):
+        x, weight = states[j], weights[j]
+        for k in range(len(u) - 1):
+            s = step[k]
+            d, a, b = decay[s, j], early[s, j], late[s, j]
             for i in range(rows):
-                x = decay[s, j] * states[j, i] + early[s, j] * u[k, i] + late[s, j] * u[k + 1, i]
-                states[j, i] = x
-                total[k + 1, i] += weights[j] * x
+                x[i] = d * x[i] + a * u[k, i] + b * u[k + 1, i]
+                total[k + 1, i] += weight * x[i]
 
 
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
