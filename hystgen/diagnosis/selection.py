@@ -172,11 +172,14 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     """The latest step with another of those that cannot be told from its best, and the step that this makes possible.
 
     Which one of several it was shows beside the next effect: where nothing more qualifies behind the one that was
-    taken, or less, or no more by more numbers, it was the wrong one.
+    taken, or less, or no more by more numbers, it was the wrong one. Where the next one is itself one of them,
+    `_exchanged` asks what else there is beside it.
     """
     alike = decisions.rivals(latest.best, latest.tried, records)
     others = {each.name: each for each in reversed(alike)}  # of each name the best one
     left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
+    if step.merit is not None:
+        left = [each for each in left if each.name != step.best.name]
     names = {each.name for each in step.tried}
     pairs = []
     for first in decisions.simplest_first(left, records):
