@@ -28,7 +28,8 @@ class Hypothesis:
     def __init__(self, world: World, names: frozenset[str], left: float | None = None) -> None:
         self.world, self.names = world, names
         self.left = world.left.get(names, 1.0) if left is None else left
-        self.shape, self.weights, self.structure = np.zeros(len(names)), np.zeros(0), None
+        self.shape, self.weights = np.zeros(len(names)), np.zeros(0)
+        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0))
         self.bare = not names
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
 
@@ -238,6 +239,33 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
     assert found[0].before == gap
     assert found[-1].after == world.gap(best)
     assert not any(each.rivals for each in found)  # beside the other one nothing comes near
+
+
+@pytest.mark.parametrize("second", [0.1, 1.0])
+def test_a_rival_that_is_the_next_effect_is_not_followed_up(second: float) -> None:
+    """`a`, `b` and `c` are alike; beside `a` comes `b`, and beside `c` comes `d`, which leaves least.
+
+    Where nothing comes beside `a`, both rivals are asked.
+    """
+    left = {"a": 0.5, "b": 0.505, "c": 0.51, "d": 0.9, "ab": second, "bc": 0.5, "cd": 0.03}
+    world = World({frozenset(names): share for names, share in left.items()}, "abcd")
+    now: Any = Hypothesis(world, frozenset())
+    latest = selection._step(now, world.gap(now), world.records)
+    assert latest is not None
+    step = selection._step(latest.best.fitted, world.gap(now), world.records)
+    assert step is not None
+    assert (latest.best.name, step.merit is not None) == ("a", second < 1.0)
+    extended, extensions = [], world.extensions
+
+    def seen(now: Hypothesis, *more: Any) -> list[Any]:
+        extended.append("".join(now.names))
+        return extensions(now, *more)
+
+    world.extensions = seen  # type: ignore[method-assign]
+    pair = selection._with_rival(latest, step, world.gap(now), world.records)
+    assert pair is not None
+    assert [each.best.name for each in pair] == ["c", "d"]
+    assert sorted(extended) == (["c"] if second < 1.0 else ["b", "c"])
 
 
 @pytest.mark.parametrize(
