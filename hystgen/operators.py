@@ -19,7 +19,8 @@ from hystgen.checks import samples
 Array = NDArray[np.float64]
 
 
-def _followed(state: float, x: float, r: float) -> float:
+def followed(state: float, x: float, r: float) -> float:
+    """State of a play of threshold r after its input has gone to `x`."""
     low = x - r
     high = x + r
     if state > high:
@@ -31,7 +32,7 @@ def _followed(state: float, x: float, r: float) -> float:
 
 def _play_into(v: Array, r: float, state: float, out: Array) -> float:
     for k in range(len(v)):
-        state = _followed(state, v[k], r)
+        state = followed(state, v[k], r)
         out[k] = state
     return state
 
@@ -43,8 +44,8 @@ def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
         r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
         s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
         for k in range(len(v)):
-            s0, s1 = _followed(s0, v[k], r0), _followed(s1, v[k], r1)
-            s2, s3 = _followed(s2, v[k], r2), _followed(s3, v[k], r3)
+            s0, s1 = followed(s0, v[k], r0), followed(s1, v[k], r1)
+            s2, s3 = followed(s2, v[k], r2), followed(s3, v[k], r3)
             out[i, k], out[i + 1, k], out[i + 2, k], out[i + 3, k] = s0, s1, s2, s3
     for i in range(fours, len(r)):
         _play_into(v, r[i], states[i], out[i])
@@ -59,13 +60,13 @@ def _play_sum_into(v: Array, r: Array, states: Array, p: Array, out: Array) -> N
         s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
         p0, p1, p2, p3 = p[i], p[i + 1], p[i + 2], p[i + 3]
         for k in range(len(v)):
-            s0, s1 = _followed(s0, v[k], r0), _followed(s1, v[k], r1)
-            s2, s3 = _followed(s2, v[k], r2), _followed(s3, v[k], r3)
+            s0, s1 = followed(s0, v[k], r0), followed(s1, v[k], r1)
+            s2, s3 = followed(s2, v[k], r2), followed(s3, v[k], r3)
             out[k] = out[k] + p0 * s0 + p1 * s1 + p2 * s2 + p3 * s3
     for i in range(fours, len(r)):
         state = states[i]
         for k in range(len(v)):
-            state = _followed(state, v[k], r[i])
+            state = followed(state, v[k], r[i])
             out[k] += p[i] * state
 
 
@@ -89,7 +90,7 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED: list[Callable[..., Any]] = [_followed, _play_into, _plays_into, _play_sum_into, _weighted_into, _stop_into]
+COMPILED: list[Callable[..., Any]] = [followed, _play_into, _plays_into, _play_sum_into, _weighted_into, _stop_into]
 
 
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:

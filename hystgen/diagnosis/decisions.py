@@ -64,7 +64,12 @@ FAR_ABOVE = 2.0
 floor by less. What leaves more of records of one loop alone is not named either: a right name in a wrong shape leaves
 it as well as a wrong name, and no other loop tells which of the two it was."""
 
-AT_FLOOR = math.sqrt(1.0 + ABOVE_NOISE**2)
+def _above_noise(removed: float) -> float:
+    """An error over the noise, where noise and so many times as much are in it."""
+    return math.sqrt(1.0 + removed**2)
+
+
+AT_FLOOR = _above_noise(ABOVE_NOISE)
 """A held-out error within this factor of the noise leaves hardly anything to explain."""
 
 
@@ -121,7 +126,7 @@ def _least(now: Fitted) -> float:
 
 def leaves_enough(now: Fitted, records: Records) -> bool:
     """Whether so much of held-out records is left that what removes all but the noise of it may have a name."""
-    return records.left(now) > math.sqrt(1.0 + _least(now) ** 2) * records.noise
+    return records.left(now) > _above_noise(_least(now)) * records.noise
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:

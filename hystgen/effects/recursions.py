@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import compiled
+from hystgen.operators import followed
 
 Array = NDArray[np.float64]
 
@@ -140,11 +141,6 @@ def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Arr
         total[k] += weight * (scale * xi * xi * value)
 
 
-def within(state: float, x: float, reach: float) -> float:
-    """A play that reaches so far, after its input has gone to `x`."""
-    return min(max(state, x - reach), x + reach)
-
-
 def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, out: Array) -> None:
     """Plays whose thresholds are `r + beta rate_k`, from `states`, into the rows of `out`."""
     # Four side by side, since each by itself waits for its own last sample
@@ -154,13 +150,13 @@ def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, o
         b0, b1, b2, b3 = beta[i], beta[i + 1], beta[i + 2], beta[i + 3]
         s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
         for k in range(len(w)):
-            s0, s1 = within(s0, w[k], r0 + b0 * rate[k]), within(s1, w[k], r1 + b1 * rate[k])
-            s2, s3 = within(s2, w[k], r2 + b2 * rate[k]), within(s3, w[k], r3 + b3 * rate[k])
+            s0, s1 = followed(s0, w[k], r0 + b0 * rate[k]), followed(s1, w[k], r1 + b1 * rate[k])
+            s2, s3 = followed(s2, w[k], r2 + b2 * rate[k]), followed(s3, w[k], r3 + b3 * rate[k])
             out[i, k], out[i + 1, k], out[i + 2, k], out[i + 3, k] = s0, s1, s2, s3
     for i in range(fours, len(r)):
         state = states[i]
         for k in range(len(w)):
-            state = within(state, w[k], r[i] + beta[i] * rate[k])
+            state = followed(state, w[k], r[i] + beta[i] * rate[k])
             out[i, k] = state
 
 
@@ -367,7 +363,7 @@ def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    follow, creep, limit, rung, ring, curve, within, dilated_plays, mean_decay, bent_decay, taylor, stretch, relaxed,
+    follow, creep, limit, rung, ring, curve, followed, dilated_plays, mean_decay, bent_decay, taylor, stretch, relaxed,
     relaxing_plays, rubbed, lost,
 ]  # fmt: skip
 
