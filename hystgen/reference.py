@@ -546,20 +546,22 @@ def loop_solve(t: Tables, s: State, output: Any) -> Any:
     """Input of the plays that gives `output`, letting go of the largest thresholds one by one."""
     rising = output >= loop_output(t, s)
     tail = t.limits[ZERO]
-    k = len(s.play)
-    while k > 1:
-        last = k - 1
+    next_follows = t.limits[ZERO]
+    for last in range(len(s.play) - 1, -1, -1):
+        k = last + 1
         if rising:
+            first = s.play[last] + t.threshold[last]
             w = (output - (tail - t.lift[k])) * t.inverse_slope[k]
-            if w >= s.play[last] + t.threshold[last]:
-                return w
         else:
+            first = s.play[last] - t.threshold[last]
             w = (output - (tail + t.lift[k])) * t.inverse_slope[k]
-            if w <= s.play[last] - t.threshold[last]:
-                return w
+        if reached(w, first, rising):
+            if k < len(s.play) and past(w, next_follows, rising):
+                return next_follows
+            return w
         tail = tail + t.weight[last] * s.play[last]
-        k = last
-    return (output - tail) * t.inverse_slope[1]
+        next_follows = first
+    return s.play[0]
 
 
 # ---------------------------------------------------------------- envelope_*.c, dead_zone_*.c
