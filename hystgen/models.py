@@ -469,6 +469,12 @@ class Cascade:
         return low, high
 
     @cached_property
+    def reset_range(self) -> tuple[float, float]:
+        """Extremes of the output over every drive history inside `input_range` when all plays begin at 0."""
+        low, high = (self._after(w, start=(0.0,) * (self.pi.n + 1)) for w in self.play_range)
+        return low, high
+
+    @cached_property
     def swung(self) -> tuple[float, float]:
         """The output at either end of `input_range` after the other end: inside `output_range`, or right at its ends.
 
