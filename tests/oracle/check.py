@@ -237,7 +237,7 @@ def follow(cases: list[Case], folder: Path, calls: int = CALLS, shrink: float = 
     """Compile emitted cases into one library and run the oracle on each; `shrink` scales every stated bound."""
     source, library = folder / "batch.c", folder / "batch.so"
     source.write_text("".join(map(_shim, cases)))
-    _compile([source], library, "-O1", f"-I{folder}")
+    _compile([source], library, "-O0", f"-I{folder}")  # what counts is the time to compile
     loaded = ctypes.CDLL(str(library))
     oracle = _oracle()
     for case in cases:
@@ -270,7 +270,7 @@ def trace(case: Case, operator: str, calls: int) -> list[Call]:
         folder = Path(name)
         emit(case, folder)
         (folder / "one.c").write_text(_shim(case))
-        _compile([folder / "one.c"], folder / "one.so", "-O1", f"-I{folder}")
+        _compile([folder / "one.c"], folder / "one.so", "-O0", f"-I{folder}")
         loaded = ctypes.CDLL(str(folder / "one.so"))
         log = (Call * calls)()
         oracle = _oracle()

@@ -99,10 +99,20 @@ def _tanh(rng: Generator, low: float, high: float, two: bool) -> dict[str, Any]:
             down["a3"] = a3 + gap * a0 * (high - low) * a1
         if rng.random() < 0.5:
             down["a2"] = sign * (a2 + gap * a1 * (high - low))
+        if rng.random() < 0.3:  # of another shape, and lifted until it lies above
+            down["a0"] *= 1 + float(rng.uniform(-0.05, 0.05))
+            down["a1"] *= 1 + float(rng.uniform(-0.05, 0.05))
+            x = np.linspace(low, high, 1001)
+            below = min(0.0, float(np.min(_tanh_values(down, x) - _tanh_values(up, x))))
+            down["a3"] -= below - gap * a0 * 1e-2
         if down == up:
             down["a3"] = a3 + gap * a0
         stage["descending"] = down
     return stage
+
+
+def _tanh_values(a: dict[str, float], x: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    return np.asarray(a["a0"] * np.tanh(a["a1"] * x + a["a2"]) + a["a3"])
 
 
 def _image(stages: list[dict[str, Any]], low: float, high: float) -> tuple[float, float]:

@@ -181,7 +181,12 @@ static quad solve(const context_t *c, const exact_t *e, quad y)
         }
         slope += m->weight[i];
     }
-    return w + (y - at) / slope;
+    w += (y - at) / slope;
+    if (!(size_of(output_at(c, e, w) - y) <= (quad)1e-25 * (c->size + size_of(y)))) {
+        fprintf(stderr, "oracle: a solution does not solve\n");
+        abort();
+    }
+    return w;
 }
 
 static void begin(const context_t *c, exact_t *e, bool zero)
@@ -211,6 +216,7 @@ static void commit(const context_t *c, exact_t *e, quad v)
     e->repeat = false;
 }
 
+/* Whether going to v is a move of the branch that v was computed on. */
 static bool fits(const context_t *c, const exact_t *e, quad v, bool up)
 {
     v = drive_inside(c, v);
@@ -433,6 +439,13 @@ static int choice(feed_t *f, int n) { return (int)(random_bits(f) % (uint64_t)n)
 
 static int few(feed_t *f) { return choice(f, 3) - 1 + (choice(f, 8) == 0 ? choice(f, 9) - 4 : 0); }
 
+/* Beyond a range by up to a thousand times its length. */
+static double far_out(feed_t *f, double low, double high)
+{
+    const double by = (high - low) * pow(10, uniform(f, -3, 3));
+    return rounded(&f->c, choice(f, 2) ? high + by : low - by);
+}
+
 /* A value of the inputs of the plays at which some play begins to follow, or would after a turn. */
 static quad kink(feed_t *f, const exact_t *e)
 {
@@ -482,7 +495,7 @@ static double some_drive(feed_t *f, const exact_t *e)
         return neighbour(c, x, few(f));
     }
     case 13:
-        return choice(f, 3) ? rounded(c, uniform(f, low, high)) : rounded(c, uniform(f, 2 * low - high, 2 * high - low));
+        return choice(f, 3) ? rounded(c, uniform(f, low, high)) : far_out(f, low, high);
     case 14:
         return 0;
     default:
@@ -516,7 +529,7 @@ static double some_reference(feed_t *f, const exact_t *e)
     case 12:
         return rounded(c, f->reference[0] + (choice(f, 2) ? 1 : -1) * (high - low) * pow(10, uniform(f, -9, 0)));
     case 13:
-        return choice(f, 3) ? rounded(c, uniform(f, low, high)) : rounded(c, uniform(f, 2 * low - high, 2 * high - low));
+        return choice(f, 3) ? rounded(c, uniform(f, low, high)) : far_out(f, low, high);
     case 14: { /* what the limits of the drive give now */
         const bool up = choice(f, 2) == 1;
         const quad w = front(c, up ? c->high : c->low, c->branches ? choice(f, 2) == 1 : true);
@@ -541,7 +554,7 @@ static double next_sample(feed_t *f, const exact_t *e, bool inverse)
     double x;
     if (f->left-- <= 0) {
         f->left = 4 + choice(f, 40);
-        f->regime = choice(f, 7);
+        f->regime = choice(f, 8);
         f->from = f->last;
         f->to = some(f, e, inverse);
         f->steps = 1 + choice(f, 30);
@@ -565,6 +578,9 @@ static double next_sample(feed_t *f, const exact_t *e, bool inverse)
         if (!(x >= low && x <= high)) {
             x = rounded(c, uniform(f, low, high));
         }
+        break;
+    case 4: /* by last bits */
+        x = neighbour(c, f->last, few(f));
         break;
     default:
         x = some(f, e, inverse);
@@ -700,14 +716,15 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
     exact = output_at(&f.c, &e, e.s[0]) + f.c.offset;
     for (long k = 0; k < calls; ++k) {
         const int what = choice(&f, 120);
-        int call = what == 0 ? ORACLE_INIT : what <= 2 ? ORACLE_RESET : ORACLE_STEP;
-        double x = next_sample(&f, &e, false), answer = 0;
+        const int call = what == 0 ? ORACLE_INIT : what <= 2 ? ORACLE_RESET : ORACLE_STEP;
+        double x, answer = 0;
         unsigned status;
         if (call != ORACLE_STEP) {
             p->forward_init(self);
             begin(&f.c, &e, call == ORACLE_RESET);
             exact = output_at(&f.c, &e, e.s[0]) + f.c.offset;
         }
+        x = next_sample(&f, &e, false);
         if (call != ORACLE_INIT && isfinite(x) && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb))) {
             x = p->drive_min + p->drive_max - x; /* the stated bound begins off the start */
             if (uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb))) {
@@ -759,6 +776,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
     const double rounding = p->rounding_bound * p->drive_lsb * shrink;
     void *self = malloc(p->inverse_size);
     bool known = true;  /* which branch a drive so near to the start has moved on */
+    bool often = false;
     bool agreed = true; /* `own` and the module have moved on the same branches */
     prepare(&f, m, p, seed, r);
     sent = memory(&f.c);
@@ -767,7 +785,9 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
     for (long k = 0; k < calls; ++k) {
         const context_t *c = &f.c;
         const int what = choice(&f, 120);
-        const int call = what == 0 ? ORACLE_INIT : what <= 2 ? ORACLE_RESET : what < 20 ? ORACLE_COMMIT : ORACLE_STEP;
+        const int commits = often ? 50 : 18; /* of 120, more behind a commit and a held step */
+        const int call = what == 0 ? ORACLE_INIT : what <= 2 ? ORACLE_RESET : what < 3 + commits ? ORACLE_COMMIT
+            : ORACLE_STEP;
         double x, answer = 0;
         unsigned status;
         quad raw, at, exact, exact_own, ignored;
@@ -797,6 +817,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
                 commit(c, &own, physical(c, x, p->drive_lsb));
                 keep(&f, x, false);
             }
+            often = true;
             continue;
         }
         if (call != ORACLE_STEP) {
@@ -811,6 +832,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             agreed = agreed && known && sent.ascending == own.ascending;
         }
         x = next_sample(&f, &sent, true);
+        often = !isfinite(x);
         if (call == ORACLE_INIT) {
             p->inverse_init(self);
         } else if (call == ORACLE_RESET) {
@@ -852,7 +874,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         {
             const quad v = answer * (quad)p->drive_lsb;
             const bool moved_up = v > sent.applied ? true : v < sent.applied ? false : sent.ascending;
-            const bool same = known && (!fresh || moved_up == up);
+            const bool same = known && !uncertain_start(c, &sent, v) && (!fresh || moved_up == up);
             if (fresh && (same || !c->branches)) {
                 const quad *ends = c->end[up][m->stages], room = c->steepest * bound;
                 const bool must = at > ends[1] + room || at < ends[0] - room;
