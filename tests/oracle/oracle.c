@@ -223,9 +223,9 @@ static bool fits(const context_t *c, const exact_t *e, quad v, bool up)
     return v > e->applied ? up : v < e->applied ? !up : e->ascending == up;
 }
 
-/* The drive for the reference `asked` (finite), pending drives absorbed before. Unlimited drive and w to `raw`, `at`;
-   the branch to `up`. */
-static quad exact_answer(const context_t *c, exact_t *e, double asked, quad *raw, quad *at, bool *branch)
+/* The drive for the reference `asked` (finite), pending drives absorbed before; the input of the plays and the branch
+   that it was solved for to `at` and `branch`. */
+static quad exact_answer(const context_t *c, exact_t *e, double asked, quad *at, bool *branch)
 {
     const quad u = clip(c->p->kind == ORACLE_FIXED ? asked * (quad)c->p->output_lsb : asked,
         c->reference_end[0], c->reference_end[1]);
@@ -244,21 +244,21 @@ static quad exact_answer(const context_t *c, exact_t *e, double asked, quad *raw
             }
         }
     }
-    *raw = v;
     *branch = up;
     e->level = u;
     return drive_inside(c, v);
 }
 
 /* One sample of the exact inverse. */
-static quad exact_step(const context_t *c, exact_t *e, double asked, quad *raw, quad *at, bool *branch)
+static quad exact_step(const context_t *c, exact_t *e, double asked, quad *at, bool *branch)
 {
-    *raw = *at = 0;
+    *at = 0;
+    *branch = e->ascending;
     take_pending(c, e);
     if (!isfinite(asked)) {
         e->answer = drive_inside(c, e->stepped ? e->answer : e->applied);
     } else if (!(e->repeat && asked == e->reference)) {
-        e->answer = exact_answer(c, e, asked, raw, at, branch);
+        e->answer = exact_answer(c, e, asked, at, branch);
         e->reference = asked;
         e->repeat = true;
     }
@@ -790,8 +790,8 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             : ORACLE_STEP;
         double x, answer = 0;
         unsigned status;
-        quad raw, at, exact, exact_own, ignored;
-        bool up, up_own, fresh;
+        quad at, exact, exact_own, ignored, v;
+        bool up, up_own, fresh, moved_up, same;
         if (call == ORACLE_COMMIT) {
             x = rounded(c, choice(&f, 6) && isfinite((double)sent.pending)
                     ? neighbour(c, coded(c, sent.pending, p->drive_lsb), few(&f)) : some_drive(&f, &sent));
@@ -850,12 +850,17 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             continue;
         }
         fresh = isfinite(x) && !(sent.repeat && x == sent.reference);
-        exact = exact_step(c, &sent, x, &raw, &at, &up);
-        exact_own = exact_step(c, &own, x, &ignored, &ignored, &up_own);
+        exact = exact_step(c, &sent, x, &at, &up);
+        exact_own = exact_step(c, &own, x, &ignored, &up_own);
         if (call == ORACLE_RESET) { /* its drive is not returned; the same reference, or NaN, gets it again */
             answer = p->inverse_step(self, x);
             (void)p->inverse_status(self);
-            sent.answer = sent.pending = answer * (quad)p->drive_lsb;
+        }
+        v = answer * (quad)p->drive_lsb;
+        moved_up = v > sent.applied ? true : v < sent.applied ? false : sent.ascending;
+        same = known && !uncertain_start(c, &sent, v) && (!fresh || moved_up == up);
+        sent.answer = sent.pending = v; /* what the actuator sees */
+        if (call == ORACLE_RESET) {
             take_pending(c, &sent);
             take_pending(c, &own);
             sent.has_pending = own.has_pending = true;
@@ -871,28 +876,22 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             const bool out = isfinite(x) && (x < p->output_min || x > p->output_max);
             bits_are(r, k, status, INPUT_CLAMPED, out, out, "INPUT_CLAMPED");
         }
-        {
-            const quad v = answer * (quad)p->drive_lsb;
-            const bool moved_up = v > sent.applied ? true : v < sent.applied ? false : sent.ascending;
-            const bool same = known && !uncertain_start(c, &sent, v) && (!fresh || moved_up == up);
-            if (fresh && (same || !c->branches)) {
-                const quad *ends = c->end[up][m->stages], room = c->steepest * bound;
-                const bool must = at > ends[1] + room || at < ends[0] - room;
-                const bool may = at >= ends[1] - room || at <= ends[0] + room;
-                bits_are(r, k, status, OUTPUT_CLAMPED, must, may, "OUTPUT_CLAMPED");
-                bits_are(r, k, status, DOMAIN_LIMITED, false, may, "DOMAIN");
-            }
-            judge(r, k, "inverse, memory as sent", v, exact, bound, &r->over_single, &r->worst_single);
-            judge(r, k, "inverse, own memory", v, exact_own, bound, &r->over_own, &r->worst_own);
-            if (c->branches && same) {
-                judge(r, k, "inverse, memory as sent, same branch", v, exact, rounding, &r->over_same_branch,
+        if (fresh && (same || !c->branches)) {
+            const quad *ends = c->end[up][m->stages], room = c->steepest * bound;
+            const bool must = at > ends[1] + room || at < ends[0] - room;
+            const bool may = at >= ends[1] - room || at <= ends[0] + room;
+            bits_are(r, k, status, OUTPUT_CLAMPED, must, may, "OUTPUT_CLAMPED");
+            bits_are(r, k, status, DOMAIN_LIMITED, false, may, "DOMAIN");
+        }
+        judge(r, k, "inverse, memory as sent", v, exact, bound, &r->over_single, &r->worst_single);
+        judge(r, k, "inverse, own memory", v, exact_own, bound, &r->over_own, &r->worst_own);
+        if (c->branches && same) {
+            judge(r, k, "inverse, memory as sent, same branch", v, exact, rounding, &r->over_same_branch,
+                &r->worst_same_branch);
+            if (agreed && (!fresh || up == up_own)) {
+                judge(r, k, "inverse, own memory, same branches", v, exact_own, rounding, &r->over_same_branch,
                     &r->worst_same_branch);
-                if (agreed && (!fresh || up == up_own)) {
-                    judge(r, k, "inverse, own memory, same branches", v, exact_own, rounding, &r->over_same_branch,
-                        &r->worst_same_branch);
-                }
             }
-            sent.answer = sent.pending = v; /* what the actuator sees */
         }
     }
     free(sent.s);
