@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -49,15 +48,16 @@ def test_a_bound_that_is_too_small_is_noticed(arithmetic: str, engine: str, tmp_
         assert "times the bound" in finding.result.message.decode()
 
 
-CHANGES: dict[str, tuple[str, str, str]] = {
-    # what goes wrong: operator that shows it, text in the emitted C, text in its place
-    "a pending drive is forgotten": ("inverse", r"(_inverse_see\(self, self->pending\);)", "/* \\1 */"),
-    "a commit is not limited": ("inverse", r"v = plain_clamp_drive\(applied\)", "v = applied"),
-    "a commit does not count": ("inverse", r"(_inverse_commit\(plain_inverse_t \*self[^{]*\{)", r"\1 return;"),
-    "a limit has no bit": ("inverse", r"\|= PLAIN_STATUS_OUTPUT_CLAMPED", "|= 0u"),
-    "an input has no bit": ("forward", r"\|= PLAIN_STATUS_INPUT_CLAMPED", "|= 0u"),
-    "a limit is missed": ("forward", r"v = PLAIN_DRIVE_MIN;", "v = PLAIN_DRIVE_MIN / 2;"),
-    "an offset is added": ("forward", r"(return self->answer;\n)", r"return self->answer + 40;\n"),
+# What goes wrong: the operator that shows it, a pattern in the emitted C, the text in its place
+CHANGES = {
+    "a pending drive is forgotten": ("inverse", r"above_inverse_see\(self, self->pending\);", ";"),
+    "a commit is not limited": ("inverse", r"v = above_clamp_drive\(applied\)", "v = applied"),
+    "a commit does not count": ("inverse", r"(_inverse_commit\(above_inverse_t \*self[^{;]*\{)", r"\1 return;"),
+    "a limited drive has no bit": ("inverse", r"\|= ABOVE_STATUS_OUTPUT_CLAMPED", "|= 0u"),
+    "a limited reference has no bit": ("inverse", r"= ABOVE_STATUS_INPUT_CLAMPED;", "= 0u;"),
+    "a limited input has no bit": ("forward", r"\|= ABOVE_STATUS_INPUT_CLAMPED", "|= 0u"),
+    "a limit lies elsewhere": ("forward", r"v = ABOVE_DRIVE_MIN;", "v = (above_real_t)(ABOVE_DRIVE_MAX / 2);"),
+    "an output lies elsewhere": ("forward", r"(self->answer = [^;]*);", r"\1 + 2;"),
 }
 
 
@@ -65,9 +65,9 @@ CHANGES: dict[str, tuple[str, str, str]] = {
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_a_fault_in_the_c_is_noticed(change: str, arithmetic: str, tmp_path: Path) -> None:
     operator, old, new = CHANGES[change]
-    case = check.emit(check.Case("plain", FILES["plain"], arithmetic, "loop", 1), tmp_path)
+    case = check.emit(check.Case("above", FILES["above"], arithmetic, "loop", 1), tmp_path)
     assert case
-    path = tmp_path / "plain.c"
+    path = tmp_path / "above.c"
     text, count = re.subn(old, new, path.read_text())
     assert count
     path.write_text(text)
@@ -75,24 +75,15 @@ def test_a_fault_in_the_c_is_noticed(change: str, arithmetic: str, tmp_path: Pat
     assert found[operator].faults > 0
 
 
-def header(change: str) -> Callable[[str], str]:
-    """A number of the header, put in another place by about a thousandth of the range."""
-
-    def changed(text: str) -> str:
-        found = re.search(rf"#define PLAIN_{change} (\S+)", text)
-        assert found
-        value = found[1].removesuffix("f")
-        return text.replace(found[0], f"#define PLAIN_{change} ({value} + 1)")
-
-    return changed
-
-
 @pytest.mark.parametrize("limit", ["DRIVE_MIN", "DRIVE_MAX", "OUTPUT_MIN", "OUTPUT_MAX"])
-def test_a_limit_that_is_a_code_off_is_noticed(limit: str, tmp_path: Path) -> None:
-    case = check.emit(check.Case("plain", FILES["plain"], "q15", "corners", 1), tmp_path)
+@pytest.mark.parametrize("by", [-1, 1])
+def test_a_limit_that_is_a_code_off_is_noticed(limit: str, by: int, tmp_path: Path) -> None:
+    case = check.emit(check.Case("above", FILES["above"], "q15", "corners", 1), tmp_path)
     assert case
-    path = tmp_path / "plain.h"
-    path.write_text(header(limit)(path.read_text()))
+    path = tmp_path / "above.h"
+    text, count = re.subn(rf"(#define ABOVE_{limit}) (\S+)", rf"\1 (\2 + {by})", path.read_text())
+    assert count == 1
+    path.write_text(text)
     assert all(limit in finding.result.message.decode() for finding in check.follow([case], tmp_path))
 
 
