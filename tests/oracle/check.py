@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import itertools
+import platform
 import shutil
 import subprocess
 import tempfile
@@ -19,8 +20,7 @@ from ruamel.yaml import YAML
 import hystgen
 from hystgen.api import NotInvertibleError
 from hystgen.tables import FormatError
-
-from . import models
+from tests.oracle import models
 
 HERE = Path(__file__).parent
 COMBINATIONS = tuple(itertools.product(("float32", "float64", "q31", "q15"), ("corners", "loop")))
@@ -131,15 +131,11 @@ def _oracle() -> ctypes.CDLL:
 
 
 def _compile(sources: list[Path], library: Path, *flags: str) -> None:
-    quad = [] if "aarch64" in _machine() else ["-lquadmath"]
+    quad = [] if platform.machine() in ("aarch64", "arm64") else ["-lquadmath"]  # there long double has 113 bits
     command = ["gcc", "-std=gnu11", "-shared", "-fPIC", *flags, f"-I{HERE}", "-o", library, *sources, *quad, "-lm"]
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"gcc failed:\n{done.stderr}")
-
-
-def _machine() -> str:
-    return subprocess.run(["gcc", "-dumpmachine"], capture_output=True, text=True, check=True).stdout
 
 
 def _doubles(values: Iterable[Any]) -> Any:
@@ -372,7 +368,9 @@ def keep(faults: list[Finding], folder: Path) -> list[str]:
         words = ("init", "reset", "step", "commit")
         lines = [f"{words[call.call]},{call.x!r},{call.answer!r}" for call in calls]
         (folder / f"{stem}.csv").write_text("\n".join(["call,argument,answer", *lines]) + "\n")
+        again = f"--arithmetic {case.arithmetic} --engine {case.engine} --first {case.seed} --models 1"
         sentences.append(
-            f"{stem}: seed {case.seed}, {r.faults} of {r.samples} calls, first {r.first}: {r.message.decode()}"
+            f"{stem}: {r.faults} of {r.samples} calls, first {r.first}: {r.message.decode()} "
+            f"(python -m tests.oracle {again})"
         )
     return sentences

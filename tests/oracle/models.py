@@ -19,7 +19,7 @@ def parameters(rng: Generator, arithmetic: str, name: str) -> dict[str, Any]:
     fixed = arithmetic in ("q15", "q31")
     unit_in, unit_out = (10.0 ** (rng.uniform(-9, 9) if rng.random() < 0.5 else rng.uniform(-1, 2)) for _ in range(2))
     low, high = _range(rng, fixed)
-    stages = _stages(rng, low, high, arithmetic)
+    stages = _stages(rng, low, high)
     w = _image(stages, low, high)
     pi = _plays(rng, arithmetic, w, with_inverse=bool(rng.random() < 0.97))
     offset = 0.0
@@ -50,7 +50,7 @@ def _range(rng: Generator, fixed: bool) -> tuple[float, float]:
     return (away, away + 1.0) if kind == 4 else (-away - 1.0, -away)
 
 
-def _stages(rng: Generator, low: float, high: float, arithmetic: str) -> list[dict[str, Any]]:
+def _stages(rng: Generator, low: float, high: float) -> list[dict[str, Any]]:
     kinds = rng.choice(
         ["", "dead_zone", "tanh", "branches", "dead_zone tanh", "tanh dead_zone", "dead_zone branches",
          "branches dead_zone", "tanh tanh", "dead_zone dead_zone"],
