@@ -142,7 +142,7 @@ class _Builder:
     def _codes(self) -> None:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
-        low, high = (Fraction(end) / self.output_lsb for end in self.cascade.output_range)
+        low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
         self.output = (math.ceil(low), math.floor(high))
         for (first, last), key, far in (
             (self.drive, "drive_lsb", ("input_range",)),

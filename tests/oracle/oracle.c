@@ -701,11 +701,19 @@ static exact_t memory(const context_t *c)
 }
 
 /* Whether v is so near to the drive a start memory stands for that rounding decides whether and where it moves. */
-static bool uncertain_start(const context_t *c, const exact_t *e, quad v)
+static bool uncertain_start(const context_t *c, const exact_t *e, quad v, quad near)
 {
-    const quad near = (c->high - c->low) / 1000 + 4 * physical(c, 1, c->p->drive_lsb) * (c->p->kind == ORACLE_FIXED);
     return c->branches && !e->moved && size_of(drive_inside(c, v) - e->applied) <= near;
 }
+
+/* The inverse starts at a number of its type, where it may stay. */
+static quad about_a_number(const context_t *c)
+{
+    return (c->high - c->low) / 1000 + 4 * physical(c, 1, c->p->drive_lsb) * (c->p->kind == ORACLE_FIXED);
+}
+
+/* The forward operator knows the start drive as it is, to double precision. */
+static quad about_a_double(const context_t *c) { return (c->high - c->low) / 1000000000; }
 
 void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t seed, long calls, double shrink,
     oracle_call_t *log, oracle_result_t *r)
@@ -729,9 +737,10 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             exact = output_at(&f.c, &e, e.s[0]) + f.c.offset;
         }
         x = next_sample(&f, &e, false);
-        if (call != ORACLE_INIT && isfinite(x) && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb))) {
-            x = p->drive_min + p->drive_max - x; /* the stated bound begins off the start */
-            if (uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb))) {
+        if (call != ORACLE_INIT && isfinite(x)
+            && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb), about_a_double(&f.c))) {
+            x = p->drive_min + p->drive_max - x;
+            if (uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb), about_a_double(&f.c))) {
                 x = p->drive_min;
             }
         }
@@ -760,7 +769,21 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             const bool out = isfinite(x) && (x < p->drive_min || x > p->drive_max);
             bits_are(r, k, status, INPUT_CLAMPED, out, out, "INPUT_CLAMPED");
         }
-        bits_are(r, k, status, OUTPUT_CLAMPED | DOMAIN_LIMITED, false, false, "OUTPUT_CLAMPED or DOMAIN");
+        bits_are(r, k, status, DOMAIN_LIMITED, false, false, "DOMAIN");
+        {
+            /* behind a reset the output can be more than any code: then it is the last code, and a bit says so */
+            const double most = p->kind == ORACLE_FIXED ? (f.codes15 ? 32767 : 2147483647) : HUGE_VAL;
+            const quad size = size_of(exact) / p->output_lsb;
+            const bool may = isfinite(x) && size >= most - p->forward_bound;
+            bits_are(r, k, status, OUTPUT_CLAMPED, isfinite(x) && size > most + p->forward_bound, may, "OUTPUT_CLAMPED");
+            if (call == ORACLE_STEP && (status & OUTPUT_CLAMPED) != 0) {
+                if (answer != (exact > 0 ? most : -most)) {
+                    ++r->wrong;
+                    fault(r, k, "a limited output is %.17g, not the last code", answer);
+                }
+                continue;
+            }
+        }
         if (call == ORACLE_STEP) {
             judge(r, k, "forward", answer * (quad)p->output_lsb, exact, p->forward_bound * p->output_lsb * shrink,
                 &r->over_forward, &r->worst_forward);
@@ -830,7 +853,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             known = agreed = true;
         }
         if (sent.has_pending) {
-            known = known && !uncertain_start(c, &sent, sent.pending);
+            known = known && !uncertain_start(c, &sent, sent.pending, about_a_number(c));
             take_pending(c, &sent);
             take_pending(c, &own);
             agreed = agreed && known && sent.ascending == own.ascending;
@@ -862,9 +885,10 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         }
         v = answer * (quad)p->drive_lsb;
         moved_up = v > sent.applied ? true : v < sent.applied ? false : sent.ascending;
-        same = known && !uncertain_start(c, &sent, v) && (!fresh || moved_up == up);
+        same = known && !uncertain_start(c, &sent, v, about_a_number(c)) && (!fresh || moved_up == up);
         sent.answer = sent.pending = v; /* what the actuator sees */
         if (call == ORACLE_RESET) {
+            known = known && !uncertain_start(c, &sent, v, about_a_number(c));
             take_pending(c, &sent);
             take_pending(c, &own);
             sent.has_pending = own.has_pending = true;
