@@ -50,6 +50,7 @@ typedef struct {
        still, on the other branch: the ends there are the numbers in the header. */
     quad drive_end[2], reference_end[2];
     quad size;        /* nothing added up for an output exceeds it */
+    quad outer;       /* sum of the weights, the steepest slope of the plays */
 } context_t;
 
 static quad least_of(quad a, quad b) { return a < b ? a : b; }
@@ -357,6 +358,7 @@ static void set_up(context_t *c, const oracle_model_t *m, const oracle_probe_t *
         total += m->weight[i];
         c->size += (quad)m->weight[i] * m->threshold[i];
     }
+    c->outer = total;
     c->size += total * most_of(most_of(size_of(ends[0]), size_of(ends[1])), size_of(c->start[0]));
 }
 
@@ -652,7 +654,9 @@ static void check_limits(const context_t *c, oracle_result_t *r)
 {
     const oracle_probe_t *p = c->p;
     const double text = 1 + 4 * DBL_EPSILON; /* the LSB is printed as a double */
-    const quad slack = 64 * (quad)DBL_EPSILON * c->size; /* the package finds extremes in double */
+    /* the package finds extremes in double, where a stage may cancel most of its argument */
+    const quad drive = most_of(size_of(c->low), size_of(c->high));
+    const quad slack = 64 * (quad)DBL_EPSILON * (c->size + c->outer * c->steepest * drive);
     const struct { const char *name; double value, lsb; quad end; int inward; quad off; } rows[] = {
         {"DRIVE_MIN", p->drive_min, p->drive_lsb, c->low, 1, size_of(c->low) * (text - 1)},
         {"DRIVE_MAX", p->drive_max, p->drive_lsb, c->high, -1, size_of(c->high) * (text - 1)},
@@ -905,7 +909,9 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             bits_are(r, k, status, INPUT_CLAMPED, out, out, "INPUT_CLAMPED");
         }
         if (fresh && (same || !c->branches)) {
-            const quad *ends = c->end[up][m->stages], room = c->steepest * bound;
+            /* a bound that is the whole range says nothing of how far an answer can lie beyond it */
+            const bool open = p->inverse_bound >= (p->drive_max - p->drive_min) * 0.999;
+            const quad *ends = c->end[up][m->stages], room = open ? (quad)HUGE_VAL : c->steepest * bound;
             const bool must = at > ends[1] + room || at < ends[0] - room;
             const bool may = at >= ends[1] - room || at <= ends[0] + room;
             bits_are(r, k, status, OUTPUT_CLAMPED, must, may, "OUTPUT_CLAMPED");
