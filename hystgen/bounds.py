@@ -1,21 +1,19 @@
 """How far a compiled operator can be from the exact model: rounding-error bounds, derived once for every model.
 
-Forward: rounded thresholds, start memory and stage constants move a play by no more than their own error, because a
-play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
-roundoffs. In the corner list an output is computed from that of the corner below it, so that the roundings of up to n
-corners and of the output itself add up. With S = sum |p_i| max |w| + sum |p_i| r_i, which no play sum exceeds, one
-such step `(y + m z_(k-1)) + (w - (e + m r_(k-1))) slope_k` (m at most 2, z the start level) adds at most, in unit
-roundoffs, with a = |m r_(k-1)| and b the rest of the way from e to w, a + b at most 2 max |w|: sum |p_i| (2 a + 3 b)
-from the tables and products, S for the first sum, S for the anchor's, S for the last; together 9 S. A corner of a start
-memory that is a list adds less: 2 S from two slopes, 2 S for their difference and the product, S for the sum.
+Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own error,
+because a play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
+roundoffs.
+
+Engine `corners`: an answer is computed from the corner that it hangs on, which was an answer itself, so that the
+roundings of up to n + 1 corners and of the answer add up. `CornerRoundings` counts those of one of them.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
-residual eta: the forward error plus the rounding of the solution. That needs solving to stop where another play would
-follow: on the straight piece before, of slope P_k, rounding of eta is one of eta / P_k in w, which behind that place
-would count with a steeper slope. Both engines stop there, and neither answers a move with one the other way, which
-would do the same to the plays that follow behind a turn. The exact inverse turns a reference error eta into
-at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front into that over its smallest
-slope. A clamp or commit gives both the same drive and adds nothing.
+residual eta. That needs solving to stop where another play would follow: on the straight piece before, of slope P_k,
+rounding of eta is one of eta / P_k in w, which behind that place would count with a steeper slope. Engine `loop` stops
+there, engine `corners` goes over to the steeper piece as much earlier as rounding can carry; neither answers a move with
+one the other way, which would do the same to the plays that follow behind a turn. The exact inverse turns a reference
+error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front into that over
+its smallest slope. A clamp or commit gives both the same drive and adds nothing.
 
 With two branches two drives can give the same output, one on each, and rounding decides between them where the
 reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
@@ -74,6 +72,48 @@ def _stage_errors(
     return eps * (6 * slope * x + 2 * y), eps * (6 * y + 2 * slope * x), slope
 
 
+@dataclass(frozen=True)
+class CornerRoundings:
+    """Roundings of the corner engine, derived operation by operation from `c_runtime/corners_float.c`.
+
+    `forward`, `inverse`: what one answer adds to the difference between the sum of the plays and the exact one, for plays
+    that have seen the same inputs, in output units; `early`: how much earlier than exactly the inverse has plays follow,
+    in output units; `margin`: how far an answer along a line can lie beyond the exact one, in units of the plays' input.
+
+    With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays, T its travel: no output is larger
+    than C W, no change of it larger than C T. A table entry or an operation adds u times the size of its result; an
+    error of the plays' input counts C times in the output.
+    """
+
+    forward: float
+    inverse: float
+    early: float
+    margin: float
+
+    @classmethod
+    def of(cls, cascade: Cascade, kind: str) -> CornerRoundings:
+        """Those of a model in 'float32' or 'float64'; zero where the range of the drive is not bounded."""
+        if not all(math.isfinite(end) for end in cascade.input_range):
+            return cls(0.0, 0.0, 0.0, 0.0)
+        u = float(np.finfo(kind).eps) / 2
+        pi = cascade.pi
+        seen = (*cascade.play_range, *pi.start, 0.0)
+        w, travel = max(map(abs, seen)), max(seen) - min(seen)
+        c = math.fsum(abs(p) for p in pi.weights)
+        # inverse: begin (table, sum), its distance, gain and product; reach (table), two sums of drives
+        line = c * (w + travel) + 3 * c * travel
+        drives = 2 * w + travel
+        passed = c * (w + travel)  # where a block is passed: table and sum
+        early = line + passed
+        inverse = line + c * drives + early
+        # forward: begin (table, sum), its distance, gain and product; reach (table), two sums of outputs; blocks
+        forward = c * (w + travel) + 3 * c * travel + c * (2 * w + travel) + c * (w + travel)
+        # the place of the limit: two differences of drives, slope, product and sum; then as for an answer
+        least = min(abs(p) for p in np.cumsum(pi.weights)) if not cascade.inverse_problems() else math.inf
+        margin = drives + 2 * travel + (line + c * (w + 4 * travel) + early) / least
+        return cls(u * forward, u * inverse, u * early, SECOND_ORDER * u * margin)
+
+
 def _one(cascade: Cascade, kind: str, engine: str) -> tuple[float, float]:
     """Forward error, and the residual eta of the inverse in output units, for one arithmetic."""
     eps = float(np.finfo(kind).eps) / 2
@@ -93,12 +133,16 @@ def _one(cascade: Cascade, kind: str, engine: str) -> tuple[float, float]:
         front, front_inverse = max(front, error), max(front_inverse, residual)
 
     size = largest_sum(cascade)
-    states = front + eps * (4 * w + 5 * pi.thresholds[-1])
-    sums = (pi.n + 3) if engine == "loop" else 9 * (pi.n + 1)
-    forward = total * states + eps * (sums * size + 2 * (size + offset))
-    solving = eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
     underflow = (8 * pi.n + 16) * float(np.finfo(kind).smallest_subnormal) * (1 + total)
-    return forward + underflow, forward + solving + underflow
+    if engine == "loop":
+        forward = total * (front + eps * (4 * w + 5 * pi.thresholds[-1]))
+        forward += eps * ((pi.n + 3) * size + 2 * (size + offset)) + underflow
+        return forward, forward + eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
+    one = CornerRoundings.of(cascade, kind)
+    answers = pi.n + 2  # n + 1 corners below an answer
+    offsets = eps * (total * w + 2 * offset) + underflow
+    forward = answers * one.forward + total * front + offsets
+    return forward, answers * one.inverse + total * (front + front_inverse) + offsets
 
 
 def error_bounds(cascade: Cascade, arithmetic: str, engine: str) -> ErrorBounds:
@@ -118,26 +162,3 @@ def error_bounds(cascade: Cascade, arithmetic: str, engine: str) -> ErrorBounds:
         whole = cascade.input_range[1] - cascade.input_range[0]
         inverse, rounding = min(inverse, whole), min(rounding, whole)
     return ErrorBounds(SECOND_ORDER * (forward + own_forward), inverse, rounding)
-
-
-def straight_margin(cascade: Cascade, arithmetic: str) -> float:
-    """How far short of the next play's output a straight piece is left, so that rounding cannot lead beyond.
-
-    In unit roundoffs, with S the largest sum: 4 S for the two start levels in the tables, 6 S for the two sums with
-    them, 4 S and 2 S for the same of the thresholds, 2 S each for the difference, the reciprocal and the product, S
-    for the last sum, S for taking this off, 2 S and twice the offset for adding and taking off the offset: below 32.
-    """
-    return 16 * float(np.finfo(arithmetic).eps) * (largest_sum(cascade) + abs(cascade.output_offset))
-
-
-def limited(cascade: Cascade, arithmetic: str) -> tuple[float | None, float | None]:
-    """References below, above which the drive may be at its lower, its upper limit; None where rounding alone can.
-
-    No memory makes the output at a limit lie further inside than that after the other end of the range.
-    """
-    margin = straight_margin(cascade, arithmetic)
-    (low, high), (lowest, highest) = cascade.swung, cascade.output_range
-    return (
-        low + margin if low - lowest > margin else None,
-        high - margin if highest - high > margin else None,
-    )

@@ -99,29 +99,53 @@ def _listen() -> None:
 
 
 def reference(t: Tables | FixedTables, compiled: bool = True) -> types.SimpleNamespace:
-    """The bit reference of the tables' arithmetic (`hystgen.reference`, `hystgen.fixed`), compiled or plain Python."""
-    return _reference(type(t).__name__ == "FixedTables", compiled)
+    """The bit reference of the tables' arithmetic and engine, compiled or plain Python.
+
+    It has `new_state`, and of the functions it is made of `init`, `visit` and `run` are what a session needs.
+    """
+    fixed_point = type(t).__name__ == "FixedTables"
+    front = fixed_point or len(t.stage_kind) > 0  # type: ignore[union-attr]
+    return _reference(fixed_point, t.engine == 0, front, compiled)
 
 
 @functools.cache
-def _reference(fixed_point: bool, compiled: bool) -> types.SimpleNamespace:
+def _reference(fixed_point: bool, corners: bool, front: bool, compiled: bool) -> types.SimpleNamespace:
     from hystgen import fixed, kernels
     from hystgen import reference as plain
+    from hystgen.corners import corners_float, forward, forward_front, inverse, inverse_front, run
+    from hystgen.corners.memory import new_memory
 
     functions: list[Callable[..., Any]]
-    functions = fixed.COMPILED if fixed_point else [kernels.tanh, kernels.atanh, *plain.COMPILED]
-    if not compiled:
-        return bind_together(functions)
-    return compile_together(functions, fixed.INLINED if fixed_point else plain.INLINED)
+    inlined: set[Callable[..., Any]]
+    new_state: Callable[..., Any] = plain.new_state
+    if fixed_point:
+        functions, inlined = fixed.COMPILED, fixed.INLINED
+    elif not corners:
+        functions, inlined = [kernels.tanh, kernels.atanh, *plain.COMPILED], plain.INLINED
+    else:
+        operators = (forward_front, inverse_front) if front else (forward, inverse)
+        functions = [kernels.tanh, kernels.atanh, *plain.FRONT] if front else []
+        functions += corners_float.COMPILED
+        inlined = set(corners_float.INLINED)
+        for operator in operators:
+            functions += operator.COMPILED
+            inlined |= operator.INLINED
+        functions += run.COMPILED
+
+        def new_state(t: Any) -> Any:
+            return new_memory(len(t.threshold) - 1, t.threshold.dtype)
+
+    made = compile_together(functions, inlined) if compiled else bind_together(functions)
+    made.new_state = new_state
+    return made
 
 
 def answers(
     t: Tables | FixedTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
-    from hystgen.reference import new_state
-
-    code, state = reference(t, compiled), new_state(t)
+    code = reference(t, compiled)
+    state = code.new_state(t)
     code.init(t, state, int(inverse))
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)

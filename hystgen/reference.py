@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.corners.memory import Curve, Start
 from hystgen.kernels import AtanhTables, TanhTables, atanh, tanh
 
 Reals = NDArray[Any]
@@ -30,7 +31,6 @@ Bytes = NDArray[np.uint8]
 DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
 HOLD, REAL_MAX, ZERO, HALF = 7, 8, 9, 10
 MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
-LIMITED_LOW, LIMITED_HIGH = 16, 17  # floating point only, as are these
 
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
@@ -55,13 +55,20 @@ class Tables(NamedTuple):
     start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 where all start at the same value
-    limits: Reals  # DRIVE_MIN .. LIMITED_HIGH
+    limits: Reals  # DRIVE_MIN .. MULTIPLE and two
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Counts  # direction before the first move, likewise
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # where the stage's numbers begin in stage_data
     stage_size: Counts  # break points of a dead zone
     stage_data: Reals
+    forward: Curve  # of the corner engine, as what follows
+    inverse: Curve
+    forward_first: Start
+    forward_zero: Start
+    inverse_first: Start
+    inverse_zero: Start
+    begin: Reals  # input of the plays before the first move, as `applied`
     engine: int
     branches: int  # 1 where an ascending and a descending branch differ
     tanh: TanhTables
@@ -874,6 +881,14 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
         s.counts[STATUS] = 0
 
 
+def visit(t: Tables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
+    """Let the actuator be at drive v before the next sample."""
+    see_drive(t, s, v)
+    s.real[LEVEL] = output(t, s)
+
+
+FRONT: list[Callable[..., Any]] = [envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse]
+
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
@@ -881,7 +896,7 @@ COMPILED: list[Callable[..., Any]] = [
     corners_solve, loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward,
     envelope_inverse, dead_zone, front_forward, front_inverse, rest, absorb, output, solve, begin, init,
     see_drive, foretell, finite, forward_step, answer, clamp_drive, fits, choose_branch, tells_limit,
-    inverse_step, inverse_commit, reset, run,
+    inverse_step, inverse_commit, reset, visit, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through

@@ -38,10 +38,12 @@ class Session:
         if self._inverse:
             cascade.inverse()
         limited = clamp or arithmetic is not None
+        if engine == "corners" and min(cascade.pi.weights) < 0:  # outputs that fall in a rising move have no corners
+            engine = "loop"
         self.tables = tables.build(cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse))
         self._range = cascade.input_range
-        self.state = reference.new_state(self.tables)
         self._code = compiled.reference(self.tables)
+        self.state = self._code.new_state(self.tables)
         self.init()
 
     def init(self) -> None:
@@ -59,8 +61,7 @@ class Session:
     def visit(self, drives: Iterable[float]) -> None:
         """Let the actuator see these drive values before what comes next."""
         for drive in self._samples(list(drives)):
-            self._code.see_drive(self.tables, self.state, drive)
-        self.state.real[reference.LEVEL] = self._code.output(self.tables, self.state)
+            self._code.visit(self.tables, self.state, self._inverse, drive)
 
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import kernels, reference
-from hystgen.bounds import error_bounds, limited
+from hystgen.bounds import error_bounds
+from hystgen.corners import tables as corner_tables
 from hystgen.models import UNBOUNDED, Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import Path, Problem, path_text
 from hystgen.reference import Tables
@@ -140,6 +141,25 @@ def _stage_numbers(
     )
 
 
+def _corners(cascade: Cascade, dtype: Any, limits: Sequence[float] | None) -> dict[str, Any]:
+    """What `Tables` has of the corner engine; `limits` as there, up to OFFSET, None for none."""
+    forward = corner_tables.forward_curve(cascade, dtype)
+    inverse = forward
+    if not cascade.inverse_problems():
+        ends = None
+        if limits is not None:
+            low, high, least, most, offset = (dtype(end) for end in limits)
+            ends = (low, high, least - offset, most - offset)
+        inverse = corner_tables.inverse_curve(cascade, dtype, ends)
+    memories = {"first": cascade.pi.start, "zero": (0.0,) * len(cascade.pi.start)}
+    starts = {
+        f"{operator}_{name}": corner_tables.start(cascade, curve, states, operator == "inverse")
+        for operator, curve in (("forward", forward), ("inverse", inverse))
+        for name, states in memories.items()
+    }
+    return {"forward": forward, "inverse": inverse, "begin": np.zeros(4, dtype), **starts}
+
+
 def build(
     cascade: Cascade,
     arithmetic: str = "float64",
@@ -204,7 +224,7 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         sizes.append(size)
         numbers += data
 
-    limits = [0.0] * 18
+    limits = [0.0] * 16
     limits[reference.HALF] = 0.5
     limits[reference.MULTIPLE - 2 : reference.MULTIPLE + 3] = [-2.0, -1.0, 0.0, 1.0, 2.0]
     if bounded:
@@ -224,8 +244,8 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
             number = np.nextafter(number, dtype(-np.inf))
         return float(number), float(number) == v
 
-    drives = (limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX])
-    applied, ascending = first_moves(cascade, drives, below, lambda v: float(dtype(v)))
+    low, high = limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX]
+    applied, ascending = first_moves(cascade, (low, high), below, lambda v: float(dtype(v)))
     if cascade.branches_differ and not cascade.inverse_problems():
         limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits[reference.REAL_MAX] = largest
@@ -233,14 +253,6 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         reached = max(map(abs, limits))
         message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
         raise FormatError((("model",), message))
-    limits[reference.LIMITED_LOW], limits[reference.LIMITED_HIGH] = -largest, largest
-    if bounded and not cascade.stages and not cascade.inverse_problems():
-        below, above = limited(cascade, arithmetic)
-        if below is not None:
-            limits[reference.LIMITED_LOW] = float(upward(below - cascade.output_offset, dtype))
-        if above is not None:
-            limits[reference.LIMITED_HIGH] = -float(upward(cascade.output_offset - above, dtype))
-
     tables = Tables(
         threshold=reals(pi.thresholds, "thresholds", "pi", "thresholds"),
         weight=reals(pi.weights, "weights", "pi", "weights"),
@@ -258,6 +270,7 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         stage_first=np.array(firsts, dtype=np.int64),
         stage_size=np.array(sizes, dtype=np.int64),
         stage_data=reals(numbers, "numbers of the memoryless stages", "memoryless"),
+        **_corners(cascade, dtype, limits[: reference.OFFSET + 1] if bounded and not cascade.stages else None),
         engine=reference.CORNERS if engine == "corners" else reference.LOOP,
         branches=int(cascade.branches_differ),
         tanh=kernels.tanh_tables(dtype),
@@ -266,6 +279,10 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     for kind, first in zip(kinds, firsts, strict=True):
         if kind == reference.TANH:
             tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
+    for j, w in ((2, pi.start[0]), (3, 0.0)):  # plays at rest where the drive cannot be come to where it starts
+        tables.begin[j] = w
+        if cascade.stages and cascade.start_is_defined and not low <= float(dtype(float(cascade.front_inverse(float(w))))) <= high:
+            tables.begin[j] = reference.front_forward(tables, tables.applied[j], int(tables.ascending[j]))
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))
         output = w * sum(abs(p) for p in pi.weights) + abs(lift[-1]) + abs(cascade.output_offset)

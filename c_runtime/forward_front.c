@@ -1,0 +1,44 @@
+#include "hystgen_runtime.h"
+
+/* One sample. */
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
+{
+    if (!(v >= HYSTGEN_DRIVE_MIN && v <= HYSTGEN_DRIVE_MAX)) {
+        if (!(v >= -HYSTGEN_REAL_MAX && v <= HYSTGEN_REAL_MAX)) {
+            self->status |= HYSTGEN_STATUS_HELD;
+            return self->plays.here.output + HYSTGEN_OFFSET;
+        }
+        v = v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : HYSTGEN_DRIVE_MAX;
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
+    self->drive = v;
+    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, hystgen_front(v, self->ascending)) +
+           HYSTGEN_OFFSET;
+}
+
+static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start, const hystgen_drive_t *first)
+{
+    hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, start);
+    self->drive = first->drive;
+    self->ascending = first->ascending;
+    self->status = 0;
+}
+
+void hystgen_forward_init(hystgen_forward_t *self)
+{
+    hystgen_forward_begin(self, &hystgen_forward_first, &hystgen_forward_first_drive);
+}
+
+void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
+{
+    hystgen_forward_begin(self, &hystgen_forward_zero, &hystgen_forward_zero_drive);
+    (void)hystgen_forward_step(self, v);
+}
+
+unsigned int hystgen_forward_status(hystgen_forward_t *self)
+{
+    const unsigned int status = self->status;
+    self->status = 0;
+    return status;
+}

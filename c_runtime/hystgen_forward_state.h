@@ -1,0 +1,12 @@
+/* One forward operator without a memoryless part. */
+#ifndef HYSTGEN_FORWARD_STATE_H
+#define HYSTGEN_FORWARD_STATE_H
+
+/* One forward operator: drive in, output out. Plain data, owned by the caller. */
+typedef struct {
+    hystgen_plays_t plays;
+    unsigned int status;
+    hystgen_corner_t corner[HYSTGEN_CORNERS];
+} hystgen_forward_t;
+
+#endif

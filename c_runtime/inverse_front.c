@@ -1,0 +1,145 @@
+#include "hystgen_runtime.h"
+
+static hystgen_real_t hystgen_clamp_drive(hystgen_real_t v)
+{
+    return v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : v > HYSTGEN_DRIVE_MAX ? HYSTGEN_DRIVE_MAX : v;
+}
+
+/* The next step begins here. */
+static void hystgen_inverse_keep(hystgen_inverse_t *self)
+{
+    self->undo = self->plays.here;
+    self->undo_drive = self->drive;
+    self->undo_ascending = self->ascending;
+}
+
+/* The actuator is at drive v, which decides the direction of its move and so the branch. */
+static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
+    self->drive = v;
+}
+
+/* The actuator has gone to v in place of where the last step led. */
+HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    hystgen_put(&self->plays, &self->undo);
+    self->drive = self->undo_drive;
+    self->ascending = self->undo_ascending;
+    if (v < self->drive || v > self->drive) {
+        hystgen_inverse_arrive(self, v);
+        hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, hystgen_front(v, self->ascending));
+    }
+}
+
+/* A sample that is no number: the last answer once more. */
+static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self)
+{
+    hystgen_inverse_keep(self);
+    if (self->stepped && self->committed) {
+        hystgen_inverse_replace(self, self->returned);
+    }
+    self->stepped = true;
+    self->committed = false;
+    self->status |= HYSTGEN_STATUS_HELD;
+    return self->drive;
+}
+
+/* One sample. The memory takes the answer for applied at once; a commit, a limit or a drive that holds takes the step back
+   and puts the applied drive in its place.
+
+   stepped  committed   the memory is at        a commit puts another     a NaN answers and leaves
+                                                drive in place of
+   no       no          the start drive         nothing                   the start drive
+   no       yes         the committed drive     the committed drive       the committed drive
+   yes      no          the last answer         the last answer           the last answer
+   yes      yes         the committed drive     the committed drive       the last answer, `returned` */
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
+{
+    if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
+        return hystgen_inverse_hold(self);
+    }
+    hystgen_inverse_keep(self);
+    if (!self->repeat || u < self->reference || u > self->reference) {
+        const hystgen_real_t level = u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX : u;
+        const hystgen_real_t w =
+            hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, level - HYSTGEN_OFFSET);
+        bool limited = false;
+        bool moves = true;
+        const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &limited, &moves);
+        const hystgen_real_t inside = hystgen_clamp_drive(v);
+        self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
+        if (limited) {
+            self->bits |= HYSTGEN_STATUS_DOMAIN;
+        }
+        if (inside < v || inside > v) {
+            self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+            moves = false;
+        }
+        if (moves) {
+            hystgen_inverse_arrive(self, inside);
+        } else {
+            hystgen_inverse_replace(self, inside);
+        }
+        self->reference = u;
+        self->level = level;
+        self->repeat = true;
+    }
+    self->stepped = true;
+    self->committed = false;
+    self->status |= self->bits;
+    return self->drive;
+}
+
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
+{
+    const hystgen_real_t v = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
+    if (!(applied >= -HYSTGEN_REAL_MAX && applied <= HYSTGEN_REAL_MAX)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    if (v < applied || v > applied) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    if (self->stepped && !self->committed) {
+        self->returned = self->drive;
+    }
+    self->committed = true;
+    self->repeat = false;
+    hystgen_inverse_replace(self, v);
+}
+
+static void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start, const hystgen_drive_t *first)
+{
+    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
+    self->level = self->plays.here.input + HYSTGEN_OFFSET;
+    hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, first->w);
+    self->drive = first->drive;
+    self->ascending = first->ascending;
+    hystgen_inverse_keep(self);
+    self->returned = self->drive;
+    self->reference = 0;
+    self->stepped = false;
+    self->committed = false;
+    self->repeat = false;
+    self->bits = 0;
+    self->status = 0;
+}
+
+void hystgen_inverse_init(hystgen_inverse_t *self)
+{
+    hystgen_inverse_begin(self, &hystgen_inverse_first, &hystgen_inverse_first_drive);
+}
+
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
+{
+    hystgen_inverse_begin(self, &hystgen_inverse_zero, &hystgen_inverse_zero_drive);
+    (void)hystgen_inverse_step(self, u);
+}
+
+unsigned int hystgen_inverse_status(hystgen_inverse_t *self)
+{
+    const unsigned int status = self->status;
+    self->status = 0;
+    return status;
+}

@@ -1,0 +1,66 @@
+"""What the corner engine computes with in floating point: constants of an operator, and the memory of an instance."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Reals = NDArray[Any]
+Counts = NDArray[np.int64]
+
+# places in `Memory.real`: the plays, then what an operator keeps beside them
+(INPUT, OUTPUT, NEXT, CAP, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED, DRIVE,
+ UNDO_DRIVE, REFERENCE, LEVEL) = range(18)  # fmt: skip
+# and in `Memory.counts`
+(K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, UNDO_LIMITED, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
+ ASCENDING, UNDO_ASCENDING) = range(15)  # fmt: skip
+# and in `Curve.constant`
+MOST, ZERO, HALF, ONE = range(4)
+
+
+class Curve(NamedTuple):
+    """`hystgen_curve_t`: one operator; [0] is for falling moves, with signs changed, [1] for rising ones."""
+
+    way: Reals  # (n + 2): play k begins to follow when a move has come this far
+    reach: Reals  # (n + 2): the same in output
+    gain: Reals  # (n + 2)
+    slope: Reals  # (n + 2): 1 / gain
+    limit: Reals  # (2): of the output
+    inside: Reals  # (2): outputs up to here stay within the limit whatever rounding does
+    range: Reals  # (2): of the input
+    constant: Reals  # MOST, ZERO, HALF, ONE
+
+
+class Start(NamedTuple):
+    """`hystgen_start_t`: a start memory; plays below the last corner's block are at rest at the output."""
+
+    output: Reals  # (m): of each corner, as the three that follow
+    passed: Reals  # (m, 2)
+    top: Counts
+    rose: Counts
+    place: Reals  # input and output of the play sum
+
+
+class Memory(NamedTuple):
+    """One instance: plain arrays."""
+
+    real: Reals
+    counts: Counts
+    output: Reals  # (n + 1): of each corner, as the three that follow
+    passed: Reals  # (n + 1, 2): input at which a falling and a rising move have passed it, along the move
+    top: Counts
+    rose: Counts
+
+
+def new_memory(plays: int, dtype: Any) -> Memory:
+    """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
+    return Memory(
+        real=np.zeros(18, dtype),
+        counts=np.zeros(15, np.int64),
+        output=np.zeros(plays + 1, dtype),
+        passed=np.zeros((plays + 1, 2), dtype),
+        top=np.zeros(plays + 1, np.int64),
+        rose=np.zeros(plays + 1, np.int64),
+    )
