@@ -22,12 +22,12 @@ static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t
 
 void hystgen_forward_init(hystgen_forward_t *self)
 {
-    hystgen_forward_begin(self, &hystgen_forward_first);
+    hystgen_forward_begin(self, &hystgen_forward_start[0]);
 }
 
 void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
 {
-    hystgen_forward_begin(self, &hystgen_forward_zero);
+    hystgen_forward_begin(self, &hystgen_forward_start[1]);
     (void)hystgen_forward_step(self, v);
 }
 

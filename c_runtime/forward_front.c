@@ -27,12 +27,12 @@ static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t
 
 void hystgen_forward_init(hystgen_forward_t *self)
 {
-    hystgen_forward_begin(self, &hystgen_forward_first, &hystgen_forward_first_drive);
+    hystgen_forward_begin(self, &hystgen_forward_start[0], &hystgen_forward_drive[0]);
 }
 
 void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
 {
-    hystgen_forward_begin(self, &hystgen_forward_zero, &hystgen_forward_zero_drive);
+    hystgen_forward_begin(self, &hystgen_forward_start[1], &hystgen_forward_drive[1]);
     (void)hystgen_forward_step(self, v);
 }
 

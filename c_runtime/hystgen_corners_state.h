@@ -1,4 +1,3 @@
-/* What an instance of the corner engine remembers, in floating point. */
 #ifndef HYSTGEN_CORNERS_STATE_H
 #define HYSTGEN_CORNERS_STATE_H
 

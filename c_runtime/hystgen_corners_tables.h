@@ -1,12 +1,10 @@
-/* The constant tables of the corner engine, in floating point. */
 #ifndef HYSTGEN_CORNERS_TABLES_H
 #define HYSTGEN_CORNERS_TABLES_H
 
-/* Play k begins to follow when a move has come this far from its turning point; until play k + 1 does, outputs lie on a
-   line. The ways are 2 r_k of the drive and 2 z_k of the output. */
+/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a line. */
 typedef struct {
-    hystgen_real_t way;      /* of the input */
-    hystgen_real_t reach;    /* of the output */
+    hystgen_real_t way;      /* of the input: 2 r_k of the drive, or 2 z_k of the output */
+    hystgen_real_t reach;    /* of the output, the other one of them */
     hystgen_real_t gain;     /* of the output over the input from there on */
     hystgen_real_t slope;    /* 1 / gain */
 } hystgen_segment_t;
@@ -19,12 +17,12 @@ typedef struct {
     hystgen_real_t range[2];          /* of the input */
 } hystgen_curve_t;
 
-/* A start memory. Plays below the last corner's block are at rest at `output`. */
+/* A start memory. `center` is the input and output of the sum while plays 0 .. k hold what play k does: one for each
+   play (step 1), or one for all where they hold the same (step 0). */
 typedef struct {
-    const hystgen_corner_t *corner;   /* largest plays first; those from the first one's `top` on cannot move */
-    uint_least16_t depth;
-    hystgen_real_t input;
-    hystgen_real_t output;
+    const hystgen_real_t (*center)[2];
+    uint_least16_t step;
+    hystgen_corner_t bottom;          /* plays from its `top` on cannot move within the limits */
 } hystgen_start_t;
 
 /* The drive that a start memory stands for, within its range, and the input of the plays there. */

@@ -1,4 +1,3 @@
-/* One forward operator with a memoryless part. */
 #ifndef HYSTGEN_FORWARD_FRONT_STATE_H
 #define HYSTGEN_FORWARD_FRONT_STATE_H
 

@@ -1,4 +1,3 @@
-/* One forward operator without a memoryless part. */
 #ifndef HYSTGEN_FORWARD_STATE_H
 #define HYSTGEN_FORWARD_STATE_H
 

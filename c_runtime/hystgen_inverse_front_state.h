@@ -1,4 +1,3 @@
-/* One inverse operator with a memoryless part. */
 #ifndef HYSTGEN_INVERSE_FRONT_STATE_H
 #define HYSTGEN_INVERSE_FRONT_STATE_H
 

@@ -1,4 +1,3 @@
-/* One inverse operator without a memoryless part. */
 #ifndef HYSTGEN_INVERSE_STATE_H
 #define HYSTGEN_INVERSE_STATE_H
 

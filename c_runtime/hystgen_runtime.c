@@ -21,11 +21,7 @@
 #include "envelope_inverse.c"
 #include "dead_zone_forward.c"
 #include "dead_zone_inverse.c"
-#include "half_float.c"
-#include "corner_float.c"
-#include "corners_absorb.c"
-#include "corners_find_float.c"
-#include "corners_solve_float.c"
+#include "corners_float.c"
 #include "loop_absorb.c"
 #include "loop_solve.c"
 #endif

@@ -34,11 +34,17 @@ typedef hystgen_real_t hystgen_sum_t;
 #define HYSTGEN_SUM_MAX HYSTGEN_REACH_MAX
 #endif
 #define HYSTGEN_API
+#define HYSTGEN_KERNEL
 #define HYSTGEN_NOINLINE
+#if defined(__GNUC__)
+#define HYSTGEN_APART __attribute__((noinline)) static
+#else
+#define HYSTGEN_APART static
+#endif
 #define HYSTGEN_COPIES static inline
 
-#include "hystgen_state.h"
 #ifdef HYSTGEN_FIXED
+#include "hystgen_state.h"
 #include "hystgen_corner_fixed.h"
 #include "hystgen_tables_fixed.h"
 
@@ -48,10 +54,32 @@ int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *
                       unsigned int degree, int32_t x);
 hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
                                bool *limited);
+void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
+void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                          hystgen_play_t w);
+void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                           const hystgen_play_t *play);
+void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                            hystgen_play_t w);
+void hystgen_corners_foretell(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
+                              hystgen_play_t w);
+hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
+hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
+                                      hystgen_corner_t *corner, hystgen_sum_t output);
 hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
                                            hystgen_sum_t here, hystgen_sum_t output);
 #else
-#include "hystgen_corner_float.h"
+/* Whether each operation of a number is a call of a library. */
+#ifdef HYSTGEN_REAL_IS_DOUBLE
+#define HYSTGEN_HALF 0.5
+#define HYSTGEN_SOFT_FLOAT 0
+#else
+#define HYSTGEN_HALF 0.5f
+#define HYSTGEN_SOFT_FLOAT 0
+#endif
+#define HYSTGEN_REAL_MAX HYSTGEN_REACH_MAX
+#include "hystgen_corners_state.h"
+#include "hystgen_corners_tables.h"
 #include "hystgen_tables_float.h"
 
 hystgen_real_t hystgen_tanh(hystgen_real_t x);
@@ -60,37 +88,17 @@ hystgen_real_t hystgen_envelope_forward(const hystgen_envelope_t *e, hystgen_rea
 hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_real_t y, bool *limited);
 hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_real_t x);
 hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y);
-bool hystgen_corners_begin(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                           hystgen_real_t output, unsigned int *depth, unsigned int *k, bool *rising,
-                           hystgen_real_t *w);
-hystgen_real_t hystgen_corners_rise(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
-                                    unsigned int depth, unsigned int k, hystgen_real_t output, bool *room);
-hystgen_real_t hystgen_corners_fall(const hystgen_tables_t *t, hystgen_memory_t *m, const hystgen_corner_t *corner,
-                                    unsigned int depth, unsigned int k, hystgen_real_t output, bool *room);
-hystgen_real_t hystgen_corners_rise_within(const hystgen_tables_t *t, hystgen_memory_t *m,
-                                           const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
-                                           hystgen_real_t output, hystgen_real_t beyond, hystgen_real_t limit,
-                                           bool *room, bool *limited);
-hystgen_real_t hystgen_corners_fall_within(const hystgen_tables_t *t, hystgen_memory_t *m,
-                                           const hystgen_corner_t *corner, unsigned int depth, unsigned int k,
-                                           hystgen_real_t output, hystgen_real_t beyond, hystgen_real_t limit,
-                                           bool *room, bool *limited);
+void hystgen_put(hystgen_plays_t *m, const hystgen_place_t *place);
+void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
+                            hystgen_real_t output);
+hystgen_real_t hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
+                                     hystgen_real_t input);
+hystgen_real_t hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
+                                     hystgen_real_t input);
+hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
+                                  hystgen_real_t input);
+void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner, const hystgen_start_t *start);
 #endif
-
-void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
-void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                          hystgen_play_t w);
-void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                           const hystgen_play_t *play);
-void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                            hystgen_play_t w);
-void hystgen_corners_go(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner, hystgen_play_t w,
-                        hystgen_place_t *p);
-void hystgen_corners_foretell(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                              hystgen_play_t w);
-hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
-hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
-                                      hystgen_corner_t *corner, hystgen_sum_t output);
 
 void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w);
 void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play, const hystgen_play_t *start);

@@ -2,15 +2,12 @@
 #ifndef HYSTGEN_TABLES_FLOAT_H
 #define HYSTGEN_TABLES_FLOAT_H
 
-/* Play operators; n + 1 thresholds and weights, n + 2 sums. */
+/* Play operators of engine loop; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {
     const hystgen_real_t *threshold;      /* r_0 = 0 .. r_n */
     const hystgen_real_t *weight;         /* p_0 .. p_n */
-    const hystgen_real_t *slope;          /* slope[k] = p_0 + ... + p_(k-1) */
-    const hystgen_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1), for engine loop */
-    const hystgen_real_t *start_level;    /* output gained by the time play k starts to follow: z_0 .. z_n */
-    const hystgen_real_t *inverse_slope;  /* 1 / slope[k]; entry 0 is not used */
-    hystgen_real_t all_lift;              /* p_0 r_0 + ... + p_n r_n */
+    const hystgen_real_t *lift;           /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
+    const hystgen_real_t *inverse_slope;  /* 1 / (p_0 + ... + p_(k-1)); entry 0 is not used */
     uint_least16_t n;                     /* plays without r_0 */
 } hystgen_tables_t;
 

@@ -1,57 +1,32 @@
 #include "hystgen_runtime.h"
 
-static hystgen_real_t hystgen_clamp_drive(hystgen_real_t v)
-{
-    return v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : v > HYSTGEN_DRIVE_MAX ? HYSTGEN_DRIVE_MAX : v;
-}
-
-/* A sample that is no number: the last answer once more. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self)
+/* Any other sample than a usual one. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_plays_t *m = &self->plays;
+    hystgen_real_t x = u - HYSTGEN_OFFSET;
+    unsigned int bits = 0;
     self->undo = m->here;
-    if (self->stepped && self->committed) {
-        hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, self->returned);
+    if (!(u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX)) {
+        bits = u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX ? HYSTGEN_STATUS_INPUT_CLAMPED : HYSTGEN_STATUS_HELD;
+        x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
+    }
+    if (bits == HYSTGEN_STATUS_HELD) { /* no number: the last answer once more */
+        if (self->stepped && self->committed) {
+            hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, self->returned);
+        }
+    } else {
+        const bool beyond = m->here.rising ? x > m->here.input : x < m->here.input;
+        if ((x < m->here.input || x > m->here.input) && !(m->here.limited && beyond)) {
+            (void)hystgen_move_to_input(&hystgen_inverse_curve, m, self->corner, x);
+        }
+        bits |= m->here.limited ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
     }
     self->before = m->here.input;
     self->stepped = true;
     self->committed = false;
-    self->status |= HYSTGEN_STATUS_HELD;
+    self->status |= bits;
     return m->here.output;
-}
-
-/* A sample for which another corner may count. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u)
-{
-    const hystgen_place_t *here = &self->plays.here;
-    hystgen_real_t x = u - HYSTGEN_OFFSET;
-    if (!(u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX)) {
-        if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
-            return hystgen_inverse_hold(self);
-        }
-        x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
-        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
-    }
-    self->undo = *here;
-    self->stepped = true;
-    self->committed = false;
-    if ((x < here->input || x > here->input) &&
-        !(here->limited && (here->rising ? x > here->input : x < here->input))) {
-        (void)hystgen_move_to_input(&hystgen_inverse_curve, &self->plays, self->corner, x);
-    }
-    if (here->limited) {
-        self->status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
-    }
-    self->before = here->input;
-    return here->output;
-}
-
-/* A sample in which more plays of the same block follow. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_go_on(hystgen_inverse_t *self, hystgen_real_t x)
-{
-    self->undo = self->plays.here;
-    self->before = x;
-    return hystgen_move_in_block(&hystgen_inverse_curve, &self->plays, self->corner, x);
 }
 
 /* One sample. The memory takes the answer for applied at once, so that the usual sample need not look back; a commit takes
@@ -77,7 +52,9 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
             return m->here.output;
         }
         if (m->here.rising ? x < m->cap : x > m->cap) {
-            return hystgen_inverse_go_on(self, x);
+            self->undo = m->here;
+            self->before = x;
+            return hystgen_move_in_block(&hystgen_inverse_curve, m, self->corner, x);
         }
     }
     return hystgen_inverse_search(self, u);
@@ -98,13 +75,12 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
         self->returned = m->here.output;
     }
     self->committed = true;
-    if (self->before < m->here.input || self->before > m->here.input) {
-        m->here.input = self->before;
-        m->here.output = m->start + (self->before - m->begin) * m->gain;
+    if (self->before < m->here.input || self->before > m->here.input) { /* the last step went on along its line */
         self->undo = m->here;
-    } else {
-        hystgen_put(m, &self->undo);
+        self->undo.input = self->before;
+        self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
+    hystgen_put(m, &self->undo);
     hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, v);
     self->before = m->here.input;
 }
@@ -113,10 +89,9 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t
 {
     hystgen_plays_t *m = &self->plays;
     hystgen_start(&hystgen_inverse_curve, m, self->corner, start);
-    hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, hystgen_clamp_drive(start->output));
+    hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, hystgen_clamp_drive(m->here.output));
     self->undo = m->here;
     self->before = m->here.input;
-    self->returned = m->here.output;
     self->stepped = false;
     self->committed = false;
     self->status = 0;
@@ -124,12 +99,12 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t
 
 void hystgen_inverse_init(hystgen_inverse_t *self)
 {
-    hystgen_inverse_begin(self, &hystgen_inverse_first);
+    hystgen_inverse_begin(self, &hystgen_inverse_start[0]);
 }
 
 void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
 {
-    hystgen_inverse_begin(self, &hystgen_inverse_zero);
+    hystgen_inverse_begin(self, &hystgen_inverse_start[1]);
     (void)hystgen_inverse_step(self, u);
 }
 

@@ -1,10 +1,5 @@
 #include "hystgen_runtime.h"
 
-static hystgen_real_t hystgen_clamp_drive(hystgen_real_t v)
-{
-    return v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : v > HYSTGEN_DRIVE_MAX ? HYSTGEN_DRIVE_MAX : v;
-}
-
 /* The next step begins here. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self)
 {
@@ -128,12 +123,12 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t
 
 void hystgen_inverse_init(hystgen_inverse_t *self)
 {
-    hystgen_inverse_begin(self, &hystgen_inverse_first, &hystgen_inverse_first_drive);
+    hystgen_inverse_begin(self, &hystgen_inverse_start[0], &hystgen_inverse_drive[0]);
 }
 
 void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
 {
-    hystgen_inverse_begin(self, &hystgen_inverse_zero, &hystgen_inverse_zero_drive);
+    hystgen_inverse_begin(self, &hystgen_inverse_start[1], &hystgen_inverse_drive[1]);
     (void)hystgen_inverse_step(self, u);
 }
 

@@ -245,7 +245,7 @@ _OWN: list[Callable[..., Any]] = [
     front_inverse, output, solve, finite, tells_limit,
 ]  # fmt: skip
 _NAMES = {function.__name__ for function in _OWN} | {
-    "envelope_forward", "envelope_inverse", "dead_zone", "may_be_limited", "taken", "corners_find_within",
+    "envelope_forward", "envelope_inverse", "dead_zone",
 }  # fmt: skip
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
 _LOWER = {

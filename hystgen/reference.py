@@ -405,116 +405,6 @@ def corners_foretell(t: PlayTables, s: State, w: Any) -> None:
         s.counts[HINT_K] = 0  # a move that goes on as it was
 
 
-# ---------------------------------------------------------------- corners_solve.c
-
-
-def may_be_limited(t: Tables, s: State, depth: int, rising: int, output: Any) -> bool:
-    """Whether a move to `output` may lead to the drive's limit, and among the lowest corners, as it does then.
-
-    A drive that is further inside the limit than by rounding is what the references on this side of LIMITED_LOW and
-    LIMITED_HIGH give. No turning point lies beyond the limit, so that all corners are left but those of the start and
-    the first one above them.
-    """
-    if not past(output, t.limits[LIMITED_HIGH if rising else LIMITED_LOW], rising):
-        return False
-    c = s.counts[START] + 1
-    return depth <= c or reached(output, level(t, s, c, s.end[c] - 1, rising), rising)
-
-
-def taken(t: Tables, s: State, c: int, output: Any, rising: int) -> bool:
-    """Whether a move to `output`, or to the drive's limit if that comes first, takes along all that corner c holds."""
-    last = s.end[c] - 1
-    limit = t.limits[DRIVE_MAX if rising else DRIVE_MIN]
-    return reached(output, level(t, s, c, last, rising), rising) and reached(
-        limit, activation(t, s, c, t.threshold[last], rising), rising
-    )
-
-
-def corners_find_within(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> tuple[int, int]:
-    """As `corners_find`, for a move that ends at the drive's limit if that comes before `output`."""
-    limit = t.limits[DRIVE_MAX if rising else DRIVE_MIN]
-    start = s.counts[START]
-    left = min(depth, start + 1)
-    if k > 1:
-        k = k - 1  # what the output tells to follow may lie beyond the limit
-    if left > start and taken(t, s, start, output, rising):
-        left = start
-    if left <= start:
-        low = 1
-        while low < left:
-            c = (low + left) // 2
-            if taken(t, s, c, output, rising):
-                left = c
-            else:
-                low = c + 1
-    if left < depth:
-        k = s.end[left]
-    c = left - 1
-    if left > 0 and opposite(s.side[c], rising):
-        last = left == 1 and start > 0
-        high = s.end[c] if last else s.end[c] - 1
-        most = not_reached(t.threshold, k, high, way(t, limit, s.extremum[c], s.side[c], rising))
-        if left <= start or not reached(output, level(t, s, c, high, rising), rising):
-            most = not_reached(t.start_level, k, most, way(t, output, s.output[c], s.side[c], rising))
-        k = most
-        if last and k == s.end[c]:
-            left = 0
-    return left, k
-
-
-def corners_locate(t: Tables, s: State, depth: int, k: int, rising: int, output: Any) -> Any:
-    """Input that gives `output` when plays 0 .. k-1 follow and `depth` corners hold the others.
-
-    Rounding is kept from leading out of the place that was found: then the plays that follow are those that will.
-    Where the drive's limit comes first, the place is that of the limit, and the input lies beyond it.
-    """
-    within = may_be_limited(t, s, depth, rising, output)
-    if within:
-        left, k = corners_find_within(t, s, depth, k, rising, output)
-    else:
-        left, k = corners_find(t, s, s.counts[START], depth, k, rising, output, s.output, t.start_level)
-    hint(t, s, left, k, rising)
-    w = s.real[HINT_ANCHOR] + (output - s.real[HINT_ANCHOR_OUTPUT]) * t.inverse_slope[k]
-    if within and past(w, t.limits[DRIVE_MAX if rising else DRIVE_MIN], rising):
-        return w
-    if left > 0:
-        last = activation(t, s, left - 1, t.threshold[k], rising)
-        if past(w, last, rising):
-            return last
-    if k > 1:
-        first = activation(t, s, entered_by(s, left, depth, k), t.threshold[k - 1], rising)
-        if not reached(w, first, rising):
-            s.real[HINT_ANCHOR] = first  # so that later answers of the same move do not lie before this one
-            s.real[HINT_ANCHOR_OUTPUT] = output
-            return first
-    return w
-
-
-def corners_solve(t: Tables, s: State, output: Any) -> Any:
-    """Input of the plays that gives `output`; moves nothing."""
-    k = s.counts[K]
-    rising = s.counts[RISING]
-    depth = s.counts[DEPTH]
-    if reached(output, s.real[NEXT_OUTPUT], rising):
-        k = k + 1
-    else:
-        w = s.real[ANCHOR] + (output - s.real[ANCHOR_OUTPUT]) * t.inverse_slope[k]
-        if reached(w, s.real[W], rising):
-            if reached(w, s.real[NEXT], rising):
-                return s.real[NEXT]
-            return w
-        if k > 1:
-            push_corner(t, s, depth)
-            depth = depth + 1
-        k = 1
-        rising = 1 - rising
-    w = corners_locate(t, s, depth, k, rising, output)
-    if not past(w, s.real[W], rising):  # rounding is kept from leading back
-        s.counts[HINT_K] = 0
-        return s.real[W]
-    return w
-
-
 # ---------------------------------------------------------------- loop_absorb.c, loop_solve.c
 
 
@@ -672,8 +562,6 @@ def output(t: Tables, s: State) -> Any:
 
 def solve(t: Tables, s: State, u: Any) -> Any:
     """Input of the plays that gives u, offset included."""
-    if t.engine == CORNERS:
-        return corners_solve(t, s, u - t.limits[OFFSET])
     return loop_solve(t, s, u - t.limits[OFFSET])
 
 
@@ -892,8 +780,7 @@ FRONT: list[Callable[..., Any]] = [envelope_forward, envelope_inverse, dead_zone
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
-    turns, corners_absorb, hint, corners_foretell, may_be_limited, taken, corners_find_within, corners_locate,
-    corners_solve, loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward,
+    turns, corners_absorb, hint, corners_foretell, loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward,
     envelope_inverse, dead_zone, front_forward, front_inverse, rest, absorb, output, solve, begin, init,
     see_drive, foretell, finite, forward_step, answer, clamp_drive, fits, choose_branch, tells_limit,
     inverse_step, inverse_commit, reset, visit, run,
@@ -901,6 +788,6 @@ COMPILED: list[Callable[..., Any]] = [
 
 # What every sample goes through
 INLINED: set[Callable[..., Any]] = {
-    multiple, reached, corners_output, push_corner, corners_absorb, corners_solve, absorb, output, solve, see_drive,
+    multiple, reached, corners_output, push_corner, corners_absorb, absorb, output, solve, see_drive,
     finite, forward_step, answer, clamp_drive,
 }  # fmt: skip

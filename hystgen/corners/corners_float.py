@@ -8,6 +8,7 @@ from typing import Any
 from hystgen.corners.memory import (
     BASE,
     BEGIN,
+    BOTTOM,
     CAP,
     DEPTH,
     FROM,
@@ -34,11 +35,6 @@ from hystgen.corners.memory import (
 def along(m: Memory, x: Any) -> Any:
     """x as the present move sees it: a falling move is a rising one with all signs changed."""
     return m.real[SIGN] * x
-
-
-def is_opposite(m: Memory, c: int) -> bool:
-    """Whether the plays of a corner begin to follow one after the other."""
-    return bool(m.rose[c] != m.counts[RISING])
 
 
 def forget_line(t: Curve, m: Memory) -> None:
@@ -82,6 +78,14 @@ def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
     return k
 
 
+def set_line(t: Curve, m: Memory, k: int) -> None:
+    """Set the line of segment k of the block that counts from FROM and BASE."""
+    m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
+    m.real[START] = m.real[BASE] + along(m, t.reach[k])
+    m.real[GAIN] = t.gain[k]
+    m.real[NEXT] = m.real[FROM] + along(m, t.way[k + 1])
+
+
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     """Move the plays to where their sum is `output`, as nearly as floating point can tell."""
     if along(m, output) < along(m, m.real[OUTPUT]):
@@ -91,7 +95,7 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     passed = m.counts[DEPTH]
     middle = passed - 1
     while passed - kept > 1:
-        reach = t.reach[m.top[middle]] if is_opposite(m, middle) else t.constant[ZERO]
+        reach = t.constant[ZERO] if m.rose[middle] == rising else t.reach[m.top[middle]]
         if along(m, output - m.output[middle]) >= reach:
             passed = middle
             m.counts[K] = m.top[middle]
@@ -101,7 +105,7 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     m.counts[DEPTH] = passed
     reach = along(m, output - m.output[kept])
     x = m.passed[kept, rising]
-    if is_opposite(m, kept):
+    if m.rose[kept] != rising:
         k = find_segment(t.reach, m.counts[K], m.top[kept] - 1, reach)
         m.counts[K] = k
         reach = reach - t.reach[k]
@@ -133,39 +137,38 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> Any:
 
     c = m.counts[DEPTH] - 1
     k = m.counts[K]
-    begin = m.passed[c, rising]
-    after = begin
-    cap = begin
+    at_once = m.rose[c] == rising
+    origin = m.passed[c, rising] if at_once else -m.passed[c, 1 - rising]
+    cap = origin
+    m.real[FROM] = along(m, origin)
     m.real[BASE] = m.output[c]
-    m.real[START] = m.output[c]
-    if is_opposite(m, c):
+    if at_once:
+        m.real[BEGIN] = m.real[FROM]
+        m.real[START] = m.real[BASE]
+        m.real[GAIN] = t.gain[k]
+        m.real[NEXT] = m.real[FROM]
+    else:
         top = m.top[c]
-        origin = -m.passed[c, 1 - rising]
-        room = t.inside[rising] - along(m, m.output[c])
+        room = t.inside[rising] - along(m, m.real[BASE])
         k = find_segment(t.way, k, top - 1, x - origin)
-        m.real[FROM] = along(m, origin)
-        m.real[START] = m.output[c] + along(m, t.reach[k])
-        begin = origin + t.way[k]
-        after = origin + t.way[k + 1]
+        set_line(t, m, k)
         cap = origin + t.way[top]
         if t.reach[top] > room:
-            stop = begin + (room - t.reach[k]) * t.slope[k]
+            stop = along(m, m.real[BEGIN]) + (room - t.reach[k]) * t.slope[k]
             cap = stop if stop < cap else cap
-    m.real[GAIN] = t.gain[k]
-    m.real[BEGIN] = along(m, begin)
     output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
     if along(m, output) > t.limit[rising]:
         move_to_output(t, m, along(m, t.limit[rising]))
         m.real[INPUT] = m.real[INPUT] if along(m, m.real[INPUT]) < x else to
         m.counts[LIMITED] = 1
         return m.real[OUTPUT]
-    cap = t.range[rising] if t.range[rising] < cap else cap
-    m.real[CAP] = along(m, cap)
-    m.real[NEXT] = along(m, after if after < cap else cap)
     if along(m, output) < along(m, m.real[OUTPUT]):
-        forget_line(t, m)
+        cap = -t.constant[MOST]
     else:
         m.real[OUTPUT] = output
+    cap = t.range[rising] if t.range[rising] < cap else cap
+    m.real[CAP] = along(m, cap)
+    m.real[NEXT] = m.real[NEXT] if along(m, m.real[NEXT]) < cap else m.real[CAP]
     m.counts[K] = k
     m.real[INPUT] = to
     m.counts[LIMITED] = 0
@@ -176,20 +179,14 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> Any:
     """Move on to an input short of CAP: more plays of the same block follow."""
     way = along(m, to - m.real[FROM])
     k = m.counts[K]
-    steps = 8
-    while steps > 0 and way > t.way[k + 1]:
+    last = k + 8
+    while k < last and way > t.way[k + 1]:
         k += 1
-        steps -= 1
-    begin = m.real[FROM] + along(m, t.way[k])
-    start = m.real[BASE] + along(m, t.reach[k])
-    output = start + (to - begin) * t.gain[k]
-    if steps == 0 or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
+    set_line(t, m, k)
+    output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
+    if k == last or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
         return move_to_input(t, m, to)
-    after = m.real[FROM] + along(m, t.way[k + 1])
-    m.real[NEXT] = after if along(m, after - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
-    m.real[BEGIN] = begin
-    m.real[START] = start
-    m.real[GAIN] = t.gain[k]
+    m.real[NEXT] = m.real[NEXT] if along(m, m.real[NEXT] - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
     m.counts[K] = k
     m.real[INPUT] = to
     m.real[OUTPUT] = output
@@ -212,35 +209,33 @@ def plays_step(t: Curve, m: Memory, to: Any) -> Any:
 
 
 def start(t: Curve, m: Memory, s: Start) -> None:
-    """Start memory, the direction rising. Each play at rest is a block of its own."""
-    depth = len(s.output)
-    for c in range(depth):
-        m.output[c] = s.output[c]
-        m.passed[c, 0] = s.passed[c, 0]
-        m.passed[c, 1] = s.passed[c, 1]
-        m.top[c] = s.top[c]
-        m.rose[c] = s.rose[c]
-    m.counts[DEPTH] = depth
-    for k in range(s.top[depth - 1] - 1, 0, -1):
+    """Start memory. Each play is a block of its own."""
+    m.output[0] = s.bottom[0]
+    m.passed[0, 0] = s.bottom[1]
+    m.passed[0, 1] = s.bottom[2]
+    m.top[0] = s.top
+    m.rose[0] = BOTTOM
+    m.counts[DEPTH] = 1
+    for k in range(s.top - 1, 0, -1):
+        center = s.center[s.step * k]
         reach = t.reach[k] * t.constant[HALF]
-        way = t.way[k] * t.constant[HALF]
         m.counts[K] = k
-        m.counts[RISING] = 1 if s.place[1] + reach <= t.limit[1] else 0
+        m.counts[RISING] = 1 if center[1] + reach <= t.limit[1] else 0
         m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
-        m.real[INPUT] = s.place[0] + along(m, way)
-        m.real[OUTPUT] = s.place[1] + along(m, reach)
+        m.real[INPUT] = center[0] + along(m, t.way[k] * t.constant[HALF])
+        m.real[OUTPUT] = center[1] + along(m, reach)
         leave_corner(t, m)
     m.counts[K] = 0
     m.counts[RISING] = 1
     m.counts[LIMITED] = 0
     m.real[SIGN] = t.constant[ONE]
-    m.real[INPUT] = s.place[0]
-    m.real[OUTPUT] = s.place[1]
+    m.real[INPUT] = s.center[0, 0]
+    m.real[OUTPUT] = s.center[0, 1]
     forget_line(t, m)
 
 
 COMPILED: list[Callable[..., Any]] = [
-    along, is_opposite, forget_line, leave_corner, turn_back, find_segment, move_to_output, move_to_input,
+    along, forget_line, leave_corner, turn_back, find_segment, set_line, move_to_output, move_to_input,
     move_in_block, plays_step, start,
 ]  # fmt: skip  (callees before callers)
-INLINED: set[Callable[..., Any]] = {along, is_opposite, forget_line, plays_step}
+INLINED: set[Callable[..., Any]] = {along, forget_line, plays_step}

@@ -81,43 +81,28 @@ def set_undo(m: Memory) -> None:
     m.counts[UNDO_LIMITED] = m.counts[LIMITED]
 
 
-def inverse_hold(t: Tables, m: Memory) -> Any:
-    """A sample that is no number: the last answer once more."""
-    set_undo(m)
-    if m.counts[STEPPED] and m.counts[COMMITTED]:
-        move_to_output(t.inverse, m, m.real[RETURNED])
-    m.real[BEFORE] = m.real[INPUT]
-    m.counts[STEPPED] = 1
-    m.counts[COMMITTED] = 0
-    m.counts[STATUS] |= HELD
-    return m.real[OUTPUT]
-
-
 def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
-    """A sample that another corner may count for."""
+    """Any other sample than a usual one."""
     x = u - t.limits[OFFSET]
-    if not (t.limits[OUTPUT_MIN] <= u <= t.limits[OUTPUT_MAX]):
-        if not (-t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX]):
-            return inverse_hold(t, m)
-        x = (t.limits[OUTPUT_MIN] if u < t.limits[OUTPUT_MIN] else t.limits[OUTPUT_MAX]) - t.limits[OFFSET]
-        m.counts[STATUS] |= INPUT_CLAMPED
+    bits = 0
     set_undo(m)
+    if not (t.limits[OUTPUT_MIN] <= u <= t.limits[OUTPUT_MAX]):
+        bits = INPUT_CLAMPED if -t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX] else HELD
+        x = (t.limits[OUTPUT_MIN] if u < t.limits[OUTPUT_MIN] else t.limits[OUTPUT_MAX]) - t.limits[OFFSET]
+    if bits == HELD:
+        if m.counts[STEPPED] and m.counts[COMMITTED]:
+            move_to_output(t.inverse, m, m.real[RETURNED])
+    else:
+        beyond = x > m.real[INPUT] if m.counts[RISING] else x < m.real[INPUT]
+        if x != m.real[INPUT] and not (m.counts[LIMITED] and beyond):
+            move_to_input(t.inverse, m, x)
+        if m.counts[LIMITED]:
+            bits |= OUTPUT_CLAMPED
+    m.real[BEFORE] = m.real[INPUT]
     m.counts[STEPPED] = 1
     m.counts[COMMITTED] = 0
-    beyond = x >= m.real[INPUT] if m.counts[RISING] else x <= m.real[INPUT]
-    if x != m.real[INPUT] and not (m.counts[LIMITED] and beyond):
-        move_to_input(t.inverse, m, x)
-    if m.counts[LIMITED]:
-        m.counts[STATUS] |= OUTPUT_CLAMPED
-    m.real[BEFORE] = m.real[INPUT]
+    m.counts[STATUS] |= bits
     return m.real[OUTPUT]
-
-
-def inverse_go_on(t: Tables, m: Memory, x: Any) -> Any:
-    """A sample in which more plays of the same block follow."""
-    set_undo(m)
-    m.real[BEFORE] = x
-    return move_in_block(t.inverse, m, x)
 
 
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
@@ -131,7 +116,9 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
             m.real[OUTPUT] = m.real[START] + (x - m.real[BEGIN]) * m.real[GAIN]
             return m.real[OUTPUT]
         if x < m.real[CAP] if rising else x > m.real[CAP]:
-            return inverse_go_on(t, m, x)
+            set_undo(m)
+            m.real[BEFORE] = x
+            return move_in_block(t.inverse, m, x)
     return inverse_search(t, m, u)
 
 
@@ -147,11 +134,10 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
         m.real[RETURNED] = m.real[OUTPUT]
     m.counts[COMMITTED] = 1
     if m.real[BEFORE] != m.real[INPUT]:
-        m.real[INPUT] = m.real[BEFORE]
-        m.real[OUTPUT] = m.real[START] + (m.real[BEFORE] - m.real[BEGIN]) * m.real[GAIN]
         set_undo(m)
-    else:
-        put_undo(t.inverse, m)
+        m.real[UNDO_INPUT] = m.real[BEFORE]
+        m.real[UNDO_OUTPUT] = m.real[START] + (m.real[BEFORE] - m.real[BEGIN]) * m.real[GAIN]
+    put_undo(t.inverse, m)
     move_to_output(t.inverse, m, v)
     m.real[BEFORE] = m.real[INPUT]
 
@@ -159,10 +145,9 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
     """What init and reset have in common."""
     start(t.inverse, m, which)
-    move_to_output(t.inverse, m, clamp_drive(t, which.place[1]))
+    move_to_output(t.inverse, m, clamp_drive(t, m.real[OUTPUT]))
     set_undo(m)
     m.real[BEFORE] = m.real[INPUT]
-    m.real[RETURNED] = m.real[OUTPUT]
     m.counts[STEPPED] = 0
     m.counts[COMMITTED] = 0
     m.counts[STATUS] = 0
@@ -187,7 +172,7 @@ def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, put_undo, set_undo, inverse_hold, inverse_search, inverse_go_on, inverse_step, inverse_commit,
+    clamp_drive, put_undo, set_undo, inverse_search, inverse_step, inverse_commit,
     inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
 INLINED: set[Callable[..., Any]] = {inverse_step}

@@ -16,7 +16,8 @@ Counts = NDArray[np.int64]
 # and in `Memory.counts`
 (K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, UNDO_LIMITED, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
  ASCENDING, UNDO_ASCENDING) = range(15)  # fmt: skip
-# and in `Curve.constant`
+BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
+# places in `Curve.constant`
 MOST, ZERO, HALF, ONE = range(4)
 
 
@@ -34,13 +35,12 @@ class Curve(NamedTuple):
 
 
 class Start(NamedTuple):
-    """`hystgen_start_t`: a start memory; plays below the last corner's block are at rest at the output."""
+    """`hystgen_start_t`: a start memory."""
 
-    output: Reals  # (m): of each corner, as the three that follow
-    passed: Reals  # (m, 2)
-    top: Counts
-    rose: Counts
-    place: Reals  # input and output of the play sum
+    center: Reals  # (1 or n + 1, 2): input and output of the sum while plays 0 .. k hold what play k does
+    step: int  # 0: one for all plays, 1: one for each
+    bottom: Reals  # output, and the inputs that a falling and a rising move have passed it at
+    top: int  # plays from here on cannot move within the limits
 
 
 class Memory(NamedTuple):

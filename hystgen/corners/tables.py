@@ -14,8 +14,6 @@ from hystgen.bounds import CornerRoundings
 from hystgen.corners.memory import Curve, Start
 from hystgen.models import Cascade
 
-RISING, FALLING, BOTTOM = 1, 0, 2  # `rose` of a corner
-
 
 @dataclass(frozen=True)
 class Sums:
@@ -87,66 +85,36 @@ def _curve(rows: Sequence[Sequence[Fraction]], dtype: Any) -> Curve:
 
 
 def start(cascade: Cascade, curve: Curve, states: Sequence[float], inverse: bool) -> Start:
-    """The memory in which play k holds `states[k]`; `curve` is the operator's.
-
-    Plays that hold the same are left to the engine, which puts each of them into a block of its own; so are plays that
-    cannot move within the limits, which are part of the bottom.
-    """
+    """The memory in which play k holds `states[k]`; `curve` is the operator's."""
     s, dtype = sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]
-    n = len(held) - 1
-    rest = all(state == held[0] for state in held)
-
-    def fits(state: Fraction, k: int) -> tuple[bool, bool]:
-        """Whether play k can begin to follow a rising, a falling move; as the engine would compute it at rest."""
-        if not inverse:
-            return True, True
-        if rest:
-            w, reach = dtype(float(state)), curve.reach[k] * dtype(0.5)
-            return bool(w + reach <= curve.limit[1]), bool(reach - w <= curve.limit[0])
-        return dtype(float(state + s.r[k])) <= curve.limit[1], dtype(float(s.r[k] - state)) <= curve.limit[0]
-
-    top = next((k for k in range(1, n + 1) if not any(fits(held[k], k))), n + 1)
-    corners = [_bottom(s, held, top, inverse, dtype)]
-    if not rest:
-        for k in range(top - 1, 0, -1):
-            rising, falling = fits(held[k], k)
-            assert rising or falling
-            corners.append(_corner(s, held, k, rising, curve, inverse))
-    w, y = held[0], sum((p * state for p, state in zip(s.p, held, strict=True)), Fraction(0))
-    place = (y, w) if inverse else (w, y)
-    return Start(
-        output=np.array([corner[0] for corner in corners], dtype),
-        passed=np.array([corner[1] for corner in corners], dtype),
-        top=np.array([corner[2] for corner in corners], np.int64),
-        rose=np.array([corner[3] for corner in corners], np.int64),
-        place=np.array([float(x) for x in place], dtype),
-    )
-
-
-def _bottom(s: Sums, held: Sequence[Fraction], top: int, inverse: bool, dtype: Any) -> tuple[Any, Any, int, int]:
-    """Where plays 0 .. top-1 all follow, a rising move gives `C w - Q` and a falling one `C w + Q`, what the others hold
-    aside. Both lines are those behind a turning point with the same output; this gives that and the two inputs."""
-    c, q = s.c[top - 1], s.q[top - 1]
-    w = held[min(top, len(held) - 1)]
-    y = c * w + sum((p * state for p, state in zip(s.p[top:], held[top:], strict=True)), Fraction(0))
+    # input and output while plays 0 .. k hold what play k does
+    centers = [(w, c * w + aside) for w, c, aside in zip(held, s.c, _aside(s, held), strict=True)]
     if inverse:
-        output, rising, falling = w, y + q, y - q
-    else:
-        apart = q / c if c else Fraction(0)
-        output, rising, falling = y, w - apart, w + apart
-    return dtype(float(output)), (dtype(float(-rising)), dtype(float(falling))), top, BOTTOM
+        centers = [(y, w) for w, y in centers]
+    rest = all(state == held[0] for state in held)
+    points = np.array([[float(x) for x in point] for point in centers[: 1 if rest else None]], dtype)
+
+    def moves(k: int) -> bool:
+        """Whether play k begins to follow some move within the limits, as the engine computes it."""
+        center, reach = points[0 if rest else k, 1], curve.reach[k] * dtype(0.5)
+        return bool(center + reach <= curve.limit[1] or reach - center <= curve.limit[0])
+
+    top = next((k for k in range(1, len(held)) if not moves(k)), len(held))
+    # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one C w + Q, what the others hold
+    # aside: the lines behind two turning points of the same output, with inputs to either side of the center's
+    k = top - 1
+    to, output = centers[min(top, len(held) - 1)]
+    if 0 < top < len(held):
+        w = held[top]
+        y = s.c[k] * w + _aside(s, held)[k]
+        to, output = (y, w) if inverse else (w, y)
+    apart = s.q[k] if inverse else (-s.q[k] / s.c[k] if s.c[k] else Fraction(0))
+    bottom = np.array([float(output), float(-(to + apart)), float(to - apart)], dtype)
+    return Start(points, int(not rest), bottom, top)
 
 
-def _corner(s: Sums, held: Sequence[Fraction], k: int, rising: bool, curve: Curve, inverse: bool) -> tuple[Any, Any, int, int]:
-    """The block of play k alone: a move that ended where the play begins to follow has left it."""
-    sign = 1 if rising else -1
-    dtype = curve.way.dtype.type
-    w = held[k] + sign * s.r[k]
-    y = s.c[k] * w - sign * s.q[k] + sum((p * x for p, x in zip(s.p[k + 1 :], held[k + 1 :], strict=True)), Fraction(0))
-    to, output = (y, w) if inverse else (w, y)
-    own = dtype(float(sign * to))
-    room = curve.limit[1 - rising] + dtype(float(sign * output))
-    far = np.finfo(dtype).max if curve.reach[k] > room else curve.way[k] - own
-    passed = (far, own) if rising else (own, far)
-    return dtype(float(output)), passed, k, RISING if rising else FALLING
+def _aside(s: Sums, held: Sequence[Fraction]) -> list[Fraction]:
+    """What the plays above each play add to the sum."""
+    above = [p * w for p, w in zip(s.p, held, strict=True)]
+    return [*itertools.accumulate(above[:0:-1], initial=Fraction(0))][::-1]

@@ -38,6 +38,18 @@ _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "ui
 _STRUCTS = {"dead_zone_t": 28}  # of pointers and counts
 
 
+def _corner_structs(real: int) -> dict[str, int]:
+    """Bytes of the structures of the corner engine in floating point."""
+    fields = {
+        "segment_t": (real,) * 4,
+        "corner_t": (real,) * 3 + (2, 1),
+        "curve_t": (4,) + (real,) * 6,
+        "start_t": (4, 2) + (real,) * 3 + (2, 1),
+        "drive_t": (real, real, 1),
+    }
+    return {name: _struct(*((size, size) for size in sizes))[0] for name, sizes in fields.items()}
+
+
 def _constants(text: str, real: int, fixed: bool) -> int:
     """Bytes of the constants that the C text defines, alignment left out."""
     total = 0
@@ -51,7 +63,9 @@ def _constants(text: str, real: int, fixed: bool) -> int:
         elif kind.endswith("ends_t"):
             own = 16 + 2 * real + 8
         elif kind.endswith("tables_t"):
-            own = 40 + 2 * real if fixed else 24 + 2 * real
+            own = 40 + 2 * real if fixed else 20
+        elif not fixed and kind.endswith(tuple(_corner_structs(real))):
+            own = next(width for ending, width in _corner_structs(real).items() if kind.endswith(ending))
         elif own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
@@ -71,18 +85,20 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
     for op in ("forward", "inverse"):
         if not getattr(options, op):
             continue
+        if corners and not fixed:
+            sizes.append((op, _corner_instance(n, op, real, bool(cascade.stages))))
+            continue
         fields = [real] * (1 + branches) + [1] * branches + [4]
         if op == "inverse":
             fast = corners and not cascade.stages
             fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
             if fast:  # what stands before them
-                fields = ([8, 4, 4, play, play, 4, 4, 1] if fixed else [real] * 4) + fields
+                fields = [8, 4, 4, play, play, 4, 4, 1] + fields
         scalars = [(size, size) for size in fields]
         if corners:
             place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
             memory = _struct(place, place, (play, play), (2, 2))
-            levels = (sums,) if fixed else (sums, sums)
-            size, alignment = _struct(*((size, size) for size in (*levels, play, 2, 1)))
+            size, alignment = _struct(*((size, size) for size in (sums, play, 2, 1)))
             order = [*scalars, memory] if op == "inverse" else [memory, *scalars]
             whole = _struct(*order, (max(n, 1) * size, alignment))
         else:
@@ -90,6 +106,20 @@ def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | Fix
         sizes.append((op, whole[0]))
     worst = [(op, _worst(n, op, corners, numbers)) for op, _ in sizes]
     return Cost(_constants(text, reach if fixed else real, fixed), sizes, worst)
+
+
+def _corner_instance(n: int, op: str, real: int, front: bool) -> int:
+    """Bytes of an instance of the corner engine in floating point."""
+    place = _struct((real, real), (real, real), (2, 2), (2, 2), (1, 1), (1, 1))
+    plays = _struct(place, *[(real, real)] * 8)
+    corner = _corner_structs(real)["corner_t"]
+    if op == "forward":
+        beside = [(real, real), (1, 1), (4, 4)] if front else [(4, 4)]
+    elif front:
+        beside = [place, *[(real, real)] * 5, *[(1, 1)] * 5, (4, 4), (4, 4)]
+    else:
+        beside = [place, (real, real), (real, real), (1, 1), (1, 1), (4, 4)]
+    return _struct(plays, *beside, ((n + 1) * corner, real))[0]
 
 
 def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:

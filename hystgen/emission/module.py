@@ -68,7 +68,7 @@ def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[st
     single = options.layout == "single-header"
 
     made: dict[str, str] = {}
-    implementation = render("step.c.j2", values, tables=_tables(values))
+    implementation = _implementation(values)
     header = f"{name}.h"
     what = {"both": "forward and inverse operator", "forward": "forward operator", "inverse": "inverse operator"}
     made[header] = render(
@@ -91,8 +91,13 @@ def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[st
     return {file: _tidy(text) for file, text in made.items()}
 
 
-def _tables(values: SimpleNamespace) -> str:
-    return render("tables_fixed.c.j2" if values.fixed else "tables.c.j2", values)
+def _implementation(values: SimpleNamespace) -> str:
+    """The operators with all that they need of the run time, but what a shared one has."""
+    if values.fixed:
+        return render("step.c.j2", values, tables=render("tables_fixed.c.j2", values))
+    if values.engine == "loop":
+        return render("step.c.j2", values, tables=render("tables.c.j2", values))
+    return render("corners.c.j2", values, tables=render("tables_corners.c.j2", values))
 
 
 def _tidy(text: str) -> str:
@@ -140,7 +145,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         sha256="does not depend on any",
     )
     file = about["runtime_file"]
-    types = "\n".join(runtime.types(header, (), prefix, family) for header in (*family.states, family.tables))
+    types = "\n".join(runtime.types(header, (), prefix, family) for header in (*family.states, *family.tables))
     return {
         f"{file}.h": render(
             "runtime.h.j2",
@@ -184,10 +189,14 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
         inverse=options.inverse,
         branches=cascade.branches_differ,
     )
-    values.state_types = ""
+    values.state_types = values.operator_types = values.operators = ""
     if corners and not shared:
         headers = values.family.states
         values.state_types = "\n".join(runtime.types(header, (), prefix, values.family) for header in headers)
+    if corners and not values.fixed:
+        states, sources = _operator_files(values, options)
+        values.operator_types = runtime.operators(states, name, n + 1, prefix, values.family)
+        values.operators = runtime.operators(sources, name, n + 1, prefix, values.family)
     kernels = _kernels(values, options)
     values.kernels = "" if shared else kernels
     values.details = _details(parameters, cascade, options, values, kernels)
@@ -211,27 +220,57 @@ def _units(parameters: Parameters) -> SimpleNamespace:
     )
 
 
+def _operator_files(values: SimpleNamespace, options: Options) -> tuple[list[str], list[str]]:
+    """The files of the run time that have the operators of the corner engine: their types, and their functions."""
+    front = "_front" if values.fronts else ""
+    states, sources = [], []
+    if options.forward:
+        states.append(f"hystgen_forward{front}_state.h")
+        sources.append(f"forward{front}.c")
+    if options.inverse:
+        states.append(f"hystgen_inverse{front}_state.h")
+        sources.append("clamp_drive.c")
+        if values.fronts:
+            sources.append("inverse_two_branches.c" if values.branches else "inverse_one_branch.c")
+        sources.append(f"inverse{front}.c")
+    return states, sources
+
+
+def _corner_kernels(values: SimpleNamespace, options: Options) -> str:
+    """The same for the corner engine in floating point."""
+    family: runtime.Family = values.family
+    roots = {"hystgen_start"}
+    if options.forward or values.fronts:
+        roots.add("hystgen_plays_step")
+    if options.inverse:
+        roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put"}
+    types = {f"hystgen_{stage['kind']}_t" for stage in values.stages} | ({"hystgen_drive_t"} if values.fronts else set())
+    for stage in values.stages:
+        roots |= {f"hystgen_{stage['kind']}_{way}" for way in ("forward", *(["inverse"] if options.inverse else []))}
+    wanted = {"hystgen_segment_t", "hystgen_curve_t", "hystgen_start_t", *types}
+    pieces = runtime.needed(runtime.kernel_pieces(family), sorted(roots))
+    headers = "\n".join(runtime.types(header, wanted, values.rt, family) for header in family.tables)
+    return headers + "\n" + runtime.render(pieces, values.rt, family, static=True)
+
+
 def _kernels(values: SimpleNamespace, options: Options) -> str:
     """What the model needs of the run time, for a file of its own."""
     family: runtime.Family = values.family
     engine = options.engine
+    if engine == "corners" and not family.fixed:
+        return _corner_kernels(values, options)
     roots = {f"hystgen_{engine}_rest", f"hystgen_{engine}_absorb"}
     if values.start_list:
         roots.add(f"hystgen_{engine}_start")
     known = values.fast and family.fixed  # the output that a step begins at
     if options.forward or values.branches or known:
         roots.add(f"hystgen_{engine}_output")
-    if options.inverse and values.fast and not family.fixed:
-        roots |= {f"hystgen_corners_{part}" for part in ("begin", "go")}
-        roots.add("hystgen_corners_fall" + ("_within" if values.limited_low else ""))
-        roots.add("hystgen_corners_rise" + ("_within" if values.limited_high else ""))
-    elif options.inverse:
+    if options.inverse:
         roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
     if options.inverse and engine == "corners":
         roots.add("hystgen_corners_foretell")
     if values.fast:
         roots.add("hystgen_copy_place")
-    if values.fast and family.fixed:
         roots.add("hystgen_wide")
     types = {"hystgen_tables_t"} | {f"hystgen_{stage['kind']}_t" for stage in values.stages}
     for stage in values.stages:
@@ -246,7 +285,7 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
             types |= {"hystgen_ends_t"} if options.inverse else set()
     pieces = runtime.needed(runtime.kernel_pieces(family), sorted(roots))
     return (
-        runtime.types(family.tables, types, values.rt, family)
+        runtime.types(family.tables[-1], types, values.rt, family)
         + "\n"
         + runtime.render(pieces, values.rt, family, static=True)
     )
@@ -258,7 +297,7 @@ def _details(
     about = comment_text(parameters.description)
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in cascade.stages]
     model = f"{cascade.pi.n} plays" + (f" behind {', '.join(kinds)}" if kinds else "")
-    text = render("step.c.j2", values, tables=_tables(values)) + (kernels if values.shared else "")
+    text = _implementation(values) + (kernels if values.shared else "")
     estimate = cost.estimate(cascade, options, values.numbers, text)
     rounding = "" if values.fixed else (
         " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "

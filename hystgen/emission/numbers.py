@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hystgen import fixed, fixed_tables, reference, tables
-from hystgen.bounds import error_bounds, straight_margin
+from hystgen.bounds import error_bounds
+from hystgen.corners.memory import BOTTOM, Curve, Start
 from hystgen.emission.text import literal, operand, structure, table
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
@@ -73,31 +75,11 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     numbers = tables.build_float(cascade, options.arithmetic, options.engine, True, True)
     dtype = numbers.threshold.dtype.type
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
-    # what a search reads first: of long tables those behind are farther from the first than an instruction reaches
-    columns: list[tuple[str, str, bool]] = [
-        ("threshold", "threshold", True),
-        ("start_level", "start_level", corners),
-        ("inverse_slope", "reciprocal", options.inverse),
-        ("slope", "slope", corners),
-        ("weight", "weight", not corners),
-        ("lift", "lift", options.inverse and not corners),
-    ]
-    used = {field: own for field, own, wanted in columns if wanted}
-    members = [(own, list(getattr(numbers, field))) for field, own in used.items()]
-    arrays = [structure(real_t, f"{name}_play", members)]
-    fields = ("threshold", "weight", "slope", "lift", "start_level", "inverse_slope")
-    pointers = [f"{name}_play.{used[field]}" if field in used else "NULL" for field in fields]
-    pointers.append(literal(numbers.lift[-1]))
-    if len(numbers.start) > 1:
-        arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
-    fast = options.inverse and corners and not stages
-    low, high = (numbers.limits[place] for place in (reference.LIMITED_LOW, reference.LIMITED_HIGH))
-    largest = numbers.limits[reference.REAL_MAX]
+    engine = _corner_fields(numbers, name, prefix, options) if corners else _loop_fields(numbers, name, prefix, options)
     return {
         **_limits(numbers),
-        "arrays": arrays,
-        "pointers": pointers,
+        **engine,
         "stages": stages,
         "fronts": bool(stages),
         "front": bool(stages),
@@ -105,17 +87,81 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "forward_max_error": operand(tables.upward(bounds.forward, dtype)),
         "inverse_max_error": operand(tables.upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(tables.upward(bounds.rounding, dtype)) if options.inverse else "",
-        "fast": fast,
-        "shy": literal(tables.upward(straight_margin(cascade, options.arithmetic), dtype)),
-        "elsewhere": any(numbers.start) or not cascade.input_range[0] <= 0.0 <= cascade.input_range[1],
-        "limited_low": operand(low) if fast and low > -largest else "",
-        "limited_high": operand(high) if fast and high < largest else "",
-        "has_offset": bool(numbers.limits[reference.OFFSET]),
+        "fast": False,
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
         "saturates": False,
         "precision": [],
     }
+
+
+def _loop_fields(numbers: Tables, name: str, prefix: str, options: Options) -> dict[str, Any]:
+    """The tables of engine loop: arrays in one structure, pointers to them, and the start memory."""
+    real_t = f"{prefix}_real_t"
+    columns = [
+        ("threshold", "threshold", True),
+        ("inverse_slope", "reciprocal", options.inverse),
+        ("weight", "weight", True),
+        ("lift", "lift", options.inverse),
+    ]
+    used = {field: own for field, own, wanted in columns if wanted}
+    members = [(own, list(getattr(numbers, field))) for field, own in used.items()]
+    arrays = [structure(real_t, f"{name}_play", members)]
+    fields = ("threshold", "weight", "lift", "inverse_slope")
+    pointers = [f"{name}_play.{used[field]}" if field in used else "NULL" for field in fields]
+    if len(numbers.start) > 1:
+        arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
+    return {"arrays": arrays, "pointers": pointers}
+
+
+def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> dict[str, Any]:
+    """The tables of engine corners, one operator after the other."""
+    arrays = []
+    front = len(numbers.stage_kind) > 0
+    for operator, curve, starts, wanted in (
+        ("forward", numbers.forward, (numbers.forward_first, numbers.forward_zero), options.forward),
+        ("inverse", numbers.inverse, (numbers.inverse_first, numbers.inverse_zero), options.inverse),
+    ):
+        if wanted:
+            arrays += _curve_tables(curve, starts, f"{name}_{operator}", prefix)
+            if front:
+                first = 2 * (operator == "inverse")
+                drives = ", ".join(
+                    f"{{{literal(numbers.applied[j])}, {literal(numbers.begin[j])}, "
+                    f"{'true' if numbers.ascending[j] else 'false'}}}"
+                    for j in (first, first + 1)
+                )
+                arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
+    return {"arrays": arrays, "pointers": []}
+
+
+def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: str) -> list[str]:
+    """Segments, curve and start memories of one operator."""
+    rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
+    segments = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in rows)
+    pairs = [f"{{{literal(pair[0])}, {literal(pair[1])}}}" for pair in (curve.limit, curve.inside, curve.range)]
+    found = [
+        f"/* way, reach, gain and slope of each segment */\n"
+        f"static const {prefix}_segment_t {own}_segment[{len(curve.way)}] = {{\n{segments}\n}};\n",
+        f"static const {prefix}_curve_t {own}_curve = {{\n    {own}_segment, {', '.join(pairs)}\n}};\n",
+    ]
+    before: dict[str, str] = {}
+    memories = []
+    for start, memory in zip(starts, ("init", "reset"), strict=True):
+        points = [f"{{{literal(point[0])}, {literal(point[1])}}}" for point in start.center]
+        text = "\n".join(textwrap.wrap(", ".join(points), 110, initial_indent="    ", subsequent_indent="    "))
+        if text not in before:  # after init and after reset plays may hold the same
+            before[text] = f"{own}_{memory}_center"
+            found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{\n{text}\n}};\n")
+        output, falling, rising = map(literal, start.bottom)
+        memories.append(
+            f"    {{{before[text]}, {start.step}, {{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
+        )
+    found.append(
+        "/* start memories of init and reset */\n"
+        f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(memories) + "\n};\n"
+    )
+    return found
 
 
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,11 +21,7 @@ FLOAT_KERNELS = (
     "envelope_inverse.c",
     "dead_zone_forward.c",
     "dead_zone_inverse.c",
-    "half_float.c",
-    "corner_float.c",
-    "corners_absorb.c",
-    "corners_find_float.c",
-    "corners_solve_float.c",
+    "corners_float.c",
     "loop_absorb.c",
     "loop_solve.c",
 )
@@ -65,14 +61,19 @@ class Family:
         return bool(self.reach)
 
     @property
-    def tables(self) -> str:
-        """The header of the run time that has the types of its tables."""
-        return "hystgen_tables_fixed.h" if self.fixed else "hystgen_tables_float.h"
+    def half(self) -> str:
+        """1/2 as a number of a floating type."""
+        return "0.5f" if self.real == "float" else "0.5"
 
     @property
-    def states(self) -> tuple[str, str]:
+    def tables(self) -> tuple[str, ...]:
+        """The headers of the run time that have the types of its tables."""
+        return ("hystgen_tables_fixed.h",) if self.fixed else ("hystgen_corners_tables.h", "hystgen_tables_float.h")
+
+    @property
+    def states(self) -> tuple[str, ...]:
         """The headers of the run time that have the types of its memory."""
-        return "hystgen_corner_fixed.h" if self.fixed else "hystgen_corner_float.h", "hystgen_state.h"
+        return ("hystgen_corner_fixed.h", "hystgen_state.h") if self.fixed else ("hystgen_corners_state.h",)
 
 
 FAMILIES = {
@@ -91,7 +92,7 @@ SOFT = {
     "f64": "(defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0))"
     " || (defined(__riscv) && (!defined(__riscv_flen) || __riscv_flen < 64)) || defined(__AVR__)",
 }
-"""Where each operation of a number is a call of a library."""
+"""HYSTGEN_SOFT_FLOAT: where each operation of a number is a call of a library."""
 
 
 def data_folder(name: str) -> Path:
@@ -178,17 +179,32 @@ def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
     text = text.replace("HYSTGEN_NOINLINE ", NOINLINE)
-    text = text.replace("HYSTGEN_COPIES ", INLINE if family.fixed else f"{prefix.upper()}_COPIES ")
+    if family.fixed:
+        text = text.replace("HYSTGEN_COPIES ", INLINE)
     text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
+    text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
     text = text.replace("HYSTGEN_SUM_MAX", family.sum_max)
     return _named(text, prefix, family)
 
 
-def _named(text: str, prefix: str, family: Family) -> str:
+OPERATOR = re.compile(r"\bhystgen_((?:inverse|forward|front|clamp_drive)\w*)")
+"""What belongs to a model and not to a run time that models may share."""
+
+
+def operators(files: Sequence[str], name: str, corners: int, prefix: str, family: Family) -> str:
+    """Operators of files of the run time as C text of the model `name`; their kernels are named after `prefix`."""
+    pieces = [piece for file in files for piece in split_pieces(_read(file))]
+    text = OPERATOR.sub(rf"{name}_\1", "\n".join(piece.text for piece in pieces))
+    return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
+
+
+def _named(text: str, prefix: str, family: Family, name: str | None = None) -> str:
     if not family.fixed:  # one type for everything
         text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
-    return text.replace("hystgen_", prefix + "_")
+        text = text.replace("HYSTGEN_REAL_MAX", family.reach_max).replace("HYSTGEN_HALF", family.half)
+        text = text.replace("#if HYSTGEN_SOFT_FLOAT", f"#if {SOFT[family.bits]}")
+    return text.replace("hystgen_", prefix + "_").replace("HYSTGEN_", (name or prefix).upper() + "_")
 
 
 def types(file: str, wanted: Iterable[str], prefix: str, family: Family) -> str:
@@ -200,8 +216,9 @@ def types(file: str, wanted: Iterable[str], prefix: str, family: Family) -> str:
 
 def prototypes(prefix: str, family: Family) -> str:
     """Prototypes of all kernels."""
-    _, _, text = _read("hystgen_runtime.h").partition('#include "hystgen_state.h"')
+    _, _, text = _read("hystgen_runtime.h").partition('#include "hystgen_tables_fixed.h"')
     fixed, _, others = text.partition("#else")
+    _, _, others = others.partition('#include "hystgen_tables_float.h"')
     floating, _, both = others.partition("#endif")
     pieces = split_pieces((fixed if family.fixed else floating) + both)
     return _named("".join(piece.text for piece in pieces), prefix, family)
