@@ -204,8 +204,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, as if left by a move that ended where the play begins to follow, on a
-   side that the limits allow. */
+/* Start memory. Each play is a block of its own, as if left by a move that ended where the play begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
                                   const hystgen_start_t *start)
 {
@@ -213,11 +212,10 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, 
     corner[0] = start->bottom;
     for (p.k = (uint_least16_t)(start->bottom.top - 1u); p.k > 0; --p.k) {
         const hystgen_real_t *center = start->center[start->step * p.k];
-        const hystgen_real_t reach = t->segment[p.k].reach * HYSTGEN_HALF;
-        p.rising = center[1] + reach <= t->limit[1];
+        p.rising = p.k <= start->risen;
         hystgen_put(m, &p);
         m->here.input = center[0] + hystgen_along(m, t->segment[p.k].way * HYSTGEN_HALF);
-        m->here.output = center[1] + hystgen_along(m, reach);
+        m->here.output = center[1] + hystgen_along(m, t->segment[p.k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
         p.depth = m->here.depth;
     }

@@ -22,7 +22,8 @@ typedef struct {
 typedef struct {
     const hystgen_real_t (*center)[2];
     uint_least16_t step;
-    hystgen_corner_t bottom;          /* plays from its `top` on cannot move within the limits */
+    uint_least16_t risen;             /* plays up to this one are left by rising moves, the others by falling ones */
+    hystgen_corner_t bottom;          /* plays from its `top` on cannot move within the range */
 } hystgen_start_t;
 
 /* The drive that a start memory stands for, within its range, and the input of the plays there. */

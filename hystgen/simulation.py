@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -40,8 +41,11 @@ class Session:
         limited = clamp or arithmetic is not None
         if engine == "corners" and min(cascade.pi.weights) < 0:  # outputs that fall in a rising move have no corners
             engine = "loop"
-        self.tables = tables.build(cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse))
-        self._range = cascade.input_range
+        self._build = functools.partial(
+            tables.build, cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse)
+        )
+        self.tables = self._build()
+        self._range, self._cascade = cascade.input_range, cascade
         self._code = compiled.reference(self.tables)
         self.state = self._code.new_state(self.tables)
         self.init()
@@ -59,8 +63,13 @@ class Session:
         return self._range
 
     def visit(self, drives: Iterable[float]) -> None:
-        """Let the actuator see these drive values before what comes next."""
-        for drive in self._samples(list(drives)):
+        """Let the actuator see these drive values, in range or not, after `init` and before what comes next."""
+        seen = self._samples(list(drives))
+        if self.tables.threshold.dtype.kind == "f":
+            inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
+            self.tables = self._build(visited=[float(w) for w in inputs])
+            self.init()
+        for drive in seen:
             self._code.visit(self.tables, self.state, self._inverse, drive)
 
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:

@@ -141,8 +141,10 @@ def _stage_numbers(
     )
 
 
-def _corners(cascade: Cascade, dtype: Any, limits: Sequence[float] | None) -> dict[str, Any]:
-    """What `Tables` has of the corner engine; `limits` as there, up to OFFSET, None for none."""
+def _corners(
+    cascade: Cascade, dtype: Any, limits: Sequence[float] | None, seen: tuple[float, float]
+) -> dict[str, Any]:
+    """What `Tables` has of the corner engine; `limits` as there, up to OFFSET, None for none; `seen` by the plays."""
     forward = corner_tables.forward_curve(cascade, dtype)
     inverse = forward
     if not cascade.inverse_problems():
@@ -153,7 +155,7 @@ def _corners(cascade: Cascade, dtype: Any, limits: Sequence[float] | None) -> di
         inverse = corner_tables.inverse_curve(cascade, dtype, ends)
     memories = {"first": cascade.pi.start, "zero": (0.0,) * len(cascade.pi.start)}
     starts = {
-        f"{operator}_{name}": corner_tables.start(cascade, curve, states, operator == "inverse")
+        f"{operator}_{name}": corner_tables.start(cascade, curve, states, operator == "inverse", seen)
         for operator, curve in (("forward", forward), ("inverse", inverse))
         for name, states in memories.items()
     }
@@ -167,22 +169,25 @@ def build(
     clamp: bool = True,
     lsb: tuple[float | None, float | None] = (None, None),
     inverse: bool = True,
+    visited: Sequence[float] = (),
 ) -> Tables | FixedTables:
     """Tables of `cascade` in 'float32', 'float64', 'q31' or 'q15' for engine 'corners' or 'loop'.
 
     Without `clamp` the drive and output limits are those of the (float) arithmetic, and without `inverse` too the
-    stages are not cut to where they can be inverted; `lsb` are the physical units of a
-    drive and an output code in fixed point. Raises FormatError when the model does not fit the arithmetic.
+    stages are not cut to where they can be inverted; `lsb` are the physical units of a drive and an output code in fixed
+    point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises FormatError when the model does not fit the arithmetic.
     """
     if arithmetic in FLOAT_ARITHMETICS:
-        return build_float(cascade, arithmetic, engine, clamp, inverse)
+        return build_float(cascade, arithmetic, engine, clamp, inverse, visited)
     from hystgen import fixed_tables
 
     return fixed_tables.build(cascade, arithmetic, engine, *lsb)[0]
 
 
-def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inverse: bool) -> Tables:
-    """Tables of `cascade` in 'float32' or 'float64' for engine 'corners' or 'loop'.
+def build_float(
+    cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inverse: bool, visited: Sequence[float] = ()
+) -> Tables:
+    """Tables of `cascade` in 'float32' or 'float64' for engine 'corners' or 'loop'; `visited` as for `build`.
 
     Without `clamp` the drive and output limits are those of the arithmetic. Raises FormatError when a number or an
     intermediate result of the model does not fit the arithmetic.
@@ -253,6 +258,10 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         reached = max(map(abs, limits))
         message = f"the start memory or a limit reaches {reached:.3g}, too large for {arithmetic}"
         raise FormatError((("model",), message))
+    seen = (-math.inf, math.inf)
+    if bounded:
+        seen = cascade.play_range if cascade.stages else (low, high)
+        seen = (min([seen[0], *visited]), max([seen[1], *visited]))
     tables = Tables(
         threshold=reals(pi.thresholds, "thresholds", "pi", "thresholds"),
         weight=reals(pi.weights, "weights", "pi", "weights"),
@@ -270,7 +279,7 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         stage_first=np.array(firsts, dtype=np.int64),
         stage_size=np.array(sizes, dtype=np.int64),
         stage_data=reals(numbers, "numbers of the memoryless stages", "memoryless"),
-        **_corners(cascade, dtype, limits[: reference.OFFSET + 1] if bounded and not cascade.stages else None),
+        **_corners(cascade, dtype, limits[: reference.OFFSET + 1] if bounded and not cascade.stages else None, seen),
         engine=reference.CORNERS if engine == "corners" else reference.LOOP,
         branches=int(cascade.branches_differ),
         tanh=kernels.tanh_tables(dtype),

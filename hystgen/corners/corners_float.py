@@ -218,12 +218,11 @@ def start(t: Curve, m: Memory, s: Start) -> None:
     m.counts[DEPTH] = 1
     for k in range(s.top - 1, 0, -1):
         center = s.center[s.step * k]
-        reach = t.reach[k] * t.constant[HALF]
         m.counts[K] = k
-        m.counts[RISING] = 1 if center[1] + reach <= t.limit[1] else 0
+        m.counts[RISING] = 1 if k <= s.risen else 0
         m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
         m.real[INPUT] = center[0] + along(m, t.way[k] * t.constant[HALF])
-        m.real[OUTPUT] = center[1] + along(m, reach)
+        m.real[OUTPUT] = center[1] + along(m, t.reach[k] * t.constant[HALF])
         leave_corner(t, m)
     m.counts[K] = 0
     m.counts[RISING] = 1

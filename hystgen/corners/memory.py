@@ -39,8 +39,9 @@ class Start(NamedTuple):
 
     center: Reals  # (1 or n + 1, 2): input and output of the sum while plays 0 .. k hold what play k does
     step: int  # 0: one for all plays, 1: one for each
+    risen: int  # plays up to this one are left by rising moves, the others by falling ones
     bottom: Reals  # output, and the inputs that a falling and a rising move have passed it at
-    top: int  # plays from here on cannot move within the limits
+    top: int  # plays from here on cannot move within the range
 
 
 class Memory(NamedTuple):

@@ -84,8 +84,14 @@ def _curve(rows: Sequence[Sequence[Fraction]], dtype: Any) -> Curve:
     return Curve(way, reach, gain, slope, two, two.copy(), two.copy(), np.array([largest, 0, 0.5, 1], dtype))
 
 
-def start(cascade: Cascade, curve: Curve, states: Sequence[float], inverse: bool) -> Start:
-    """The memory in which play k holds `states[k]`; `curve` is the operator's."""
+def start(
+    cascade: Cascade, curve: Curve, states: Sequence[float], inverse: bool, seen: tuple[float, float]
+) -> Start:
+    """The memory in which play k holds `states[k]`; `curve` is the operator's, `seen` the range of the plays' input.
+
+    A play is left at that side of its state at which it can begin to follow within the range: far beyond it, lines would
+    lose digits. Those that can at neither side are part of the bottom, and so are all with larger thresholds.
+    """
     s, dtype = sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]
     # input and output while plays 0 .. k hold what play k does
@@ -94,24 +100,24 @@ def start(cascade: Cascade, curve: Curve, states: Sequence[float], inverse: bool
         centers = [(y, w) for w, y in centers]
     rest = all(state == held[0] for state in held)
     points = np.array([[float(x) for x in point] for point in centers[: 1 if rest else None]], dtype)
+    ways, axis = (curve.reach, 1) if inverse else (curve.way, 0)
 
-    def moves(k: int) -> bool:
-        """Whether play k begins to follow some move within the limits, as the engine computes it."""
-        center, reach = points[0 if rest else k, 1], curve.reach[k] * dtype(0.5)
-        return bool(center + reach <= curve.limit[1] or reach - center <= curve.limit[0])
+    def risen_to(k: int, sign: int) -> float:
+        """Where play k begins to follow a rising (falling) move, as the engine computes it."""
+        return float(points[0 if rest else k, axis] + dtype(sign) * (ways[k] * dtype(0.5)))
 
-    top = next((k for k in range(1, len(held)) if not moves(k)), len(held))
+    plays = range(1, len(held))
+    risen = next((k - 1 for k in plays if risen_to(k, 1) > seen[1]), len(held) - 1)
+    top = next((k for k in plays if k > risen and risen_to(k, -1) < seen[0]), len(held))
     # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one C w + Q, what the others hold
     # aside: the lines behind two turning points of the same output, with inputs to either side of the center's
     k = top - 1
-    to, output = centers[min(top, len(held) - 1)]
-    if 0 < top < len(held):
-        w = held[top]
-        y = s.c[k] * w + _aside(s, held)[k]
-        to, output = (y, w) if inverse else (w, y)
+    w = held[min(top, len(held) - 1)]
+    y = s.c[k] * w + _aside(s, held)[k]
+    to, output = (y, w) if inverse else (w, y)
     apart = s.q[k] if inverse else (-s.q[k] / s.c[k] if s.c[k] else Fraction(0))
     bottom = np.array([float(output), float(-(to + apart)), float(to - apart)], dtype)
-    return Start(points, int(not rest), bottom, top)
+    return Start(points, int(not rest), risen, bottom, top)
 
 
 def _aside(s: Sums, held: Sequence[Fraction]) -> list[Fraction]:

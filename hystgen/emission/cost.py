@@ -44,7 +44,7 @@ def _corner_structs(real: int) -> dict[str, int]:
         "segment_t": (real,) * 4,
         "corner_t": (real,) * 3 + (2, 1),
         "curve_t": (4,) + (real,) * 6,
-        "start_t": (4, 2) + (real,) * 3 + (2, 1),
+        "start_t": (4, 2, 2) + (real,) * 3 + (2, 1),
         "drive_t": (real, real, 1),
     }
     return {name: _struct(*((size, size) for size in sizes))[0] for name, sizes in fields.items()}

@@ -155,7 +155,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
             found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{\n{text}\n}};\n")
         output, falling, rising = map(literal, start.bottom)
         memories.append(
-            f"    {{{before[text]}, {start.step}, {{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
+            f"    {{{before[text]}, {start.step}, {start.risen}, {{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
         )
     found.append(
         "/* start memories of init and reset */\n"
