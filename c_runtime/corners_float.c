@@ -15,8 +15,8 @@ HYSTGEN_KERNEL void hystgen_put(hystgen_plays_t *m, const hystgen_place_t *place
 {
     m->here = *place;
     m->sign = (hystgen_real_t)(place->rising ? 1 : -1);
-    m->next = hystgen_along(m, -HYSTGEN_REAL_MAX);
-    m->cap = m->next;
+    m->next = m->here.input;
+    m->cap = m->here.input;
 }
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
@@ -41,6 +41,7 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hyst
         m->here.k = 0;
     }
     m->here.rising = !m->here.rising;
+    m->here.limited = false;
     m->sign = -m->sign;
 }
 
@@ -57,13 +58,25 @@ HYSTGEN_APART unsigned int hystgen_find_segment(const hystgen_real_t *step, unsi
     return k;
 }
 
-/* Sets the line of a segment of the block that counts from `from` and `base`. */
-static inline void hystgen_set_line(hystgen_plays_t *m, const hystgen_segment_t *s)
+/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if that comes first. */
+HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m, const hystgen_corner_t *corner,
+                                          hystgen_real_t output, hystgen_real_t input)
 {
-    m->begin = m->from + hystgen_along(m, s->way);
-    m->start = m->base + hystgen_along(m, s->reach);
-    m->gain = s->gain;
-    m->next = m->from + hystgen_along(m, s[1].way);
+    const hystgen_corner_t *c = &corner[m->here.depth - 1u];
+    hystgen_real_t reach = hystgen_along(m, output - c->output);
+    hystgen_real_t x = c->pass[m->here.rising];
+    unsigned int k = m->here.k;
+    if (c->rose != m->here.rising) {
+        k = hystgen_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+        reach = reach - t->segment[k].reach;
+        x = t->segment[k].way - c->pass[!m->here.rising];
+    }
+    x = x + reach * t->segment[k].slope;
+    m->here.input = x < hystgen_along(m, input) ? hystgen_along(m, x) : input;
+    m->here.output = output;
+    m->here.k = (uint_least16_t)k;
+    m->next = m->here.input;
+    m->cap = m->here.input;
 }
 
 /* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
@@ -73,34 +86,25 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
         hystgen_turn_back(t, m, corner);
     }
-    hystgen_place_t p = m->here;
-    unsigned int kept = 0; /* bisect the corners: `p.depth` is passed, `kept` is not; the top one is tried first */
-    for (unsigned int i = p.depth - 1u; i > kept; i = (kept + p.depth) / 2) {
-        const hystgen_real_t reach = corner[i].rose == p.rising ? 0 : t->segment[corner[i].top].reach;
-        if (hystgen_along(m, output - corner[i].output) >= reach) {
-            p.depth = (uint_least16_t)i;
-            p.k = corner[i].top;
+    unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
+    while (m->here.depth - kept > 1u) {
+        const unsigned int middle = (kept + m->here.depth) / 2;
+        const bool one_by_one = corner[middle].rose != m->here.rising;
+        const hystgen_real_t reach = one_by_one ? t->segment[corner[middle].top].reach : 0;
+        if (hystgen_along(m, output - corner[middle].output) >= reach) {
+            m->here.depth = (uint_least16_t)middle;
+            m->here.k = corner[middle].top;
         } else {
-            kept = i;
+            kept = middle;
         }
     }
-    const hystgen_corner_t *c = &corner[kept];
-    hystgen_real_t reach = hystgen_along(m, output - c->output);
-    p.input = c->pass[p.rising];
-    if (c->rose != p.rising) {
-        p.k = (uint_least16_t)hystgen_find_segment(&t->segment[1].reach, p.k, c->top - 1u, reach);
-        reach = reach - t->segment[p.k].reach;
-        p.input = t->segment[p.k].way - c->pass[!p.rising];
-    }
-    p.input = hystgen_along(m, p.input + reach * t->segment[p.k].slope);
-    p.output = output;
-    p.limited = false;
-    hystgen_put(m, &p);
+    m->here.limited = false;
+    hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
-/* Moves the plays to any input. */
-HYSTGEN_KERNEL hystgen_real_t hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                                    hystgen_corner_t *corner, hystgen_real_t input)
+/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop them there. */
+HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
+                                          hystgen_real_t input)
 {
     hystgen_real_t x = hystgen_along(m, input);
     if (x < hystgen_along(m, m->here.input)) {
@@ -108,9 +112,11 @@ HYSTGEN_KERNEL hystgen_real_t hystgen_move_to_input(const hystgen_curve_t *t, hy
         x = -x;
     }
     const bool rising = m->here.rising;
-    unsigned int passed = m->here.depth - 1u;
-    if (passed > 0 && x >= corner[passed].pass[rising]) {
-        for (unsigned int kept = 0; passed - kept > 1u;) { /* bisect: `passed` is passed, `kept` is not */
+    const hystgen_corner_t *c = &corner[m->here.depth - 1u];
+    if (m->here.depth > 1u && x >= c->pass[rising]) {
+        unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
+        unsigned int passed = m->here.depth - 1u;
+        while (passed - kept > 1u) {
             const unsigned int middle = (kept + passed) / 2;
             const bool beyond = x >= corner[middle].pass[rising];
             passed = beyond ? middle : passed;
@@ -118,48 +124,44 @@ HYSTGEN_KERNEL hystgen_real_t hystgen_move_to_input(const hystgen_curve_t *t, hy
         }
         m->here.k = corner[passed].top;
         m->here.depth = (uint_least16_t)passed;
+        c = &corner[kept];
     }
-    const hystgen_corner_t *c = &corner[m->here.depth - 1u];
-    const bool at_once = c->rose == rising; /* all plays of its block begin to follow, when the input is back there */
-    const hystgen_real_t from = at_once ? c->pass[rising] : -c->pass[!rising];
-    hystgen_real_t cap = from;
+    hystgen_real_t cap = c->pass[rising];
+    hystgen_real_t next = cap;
     unsigned int k = m->here.k;
-    m->from = hystgen_along(m, from);
-    m->base = c->output;
-    if (at_once) {
-        m->begin = m->from;
-        m->start = m->base;
-        m->gain = t->segment[k].gain;
-        m->next = m->from;
+    if (c->rose == rising) { /* no play follows before the input is back at the corner, then all of its block do */
+        m->begin = hystgen_along(m, cap);
+        m->start = c->output;
     } else {
+        k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x + c->pass[!rising]);
+        m->from = -hystgen_along(m, c->pass[!rising]);
+        m->base = c->output;
+        const hystgen_segment_t *s = &t->segment[k];
+        m->begin = m->from + hystgen_along(m, s->way);
+        m->start = m->base + hystgen_along(m, s->reach);
+        next = s[1].way - c->pass[!rising];
+        cap = t->segment[c->top].way - c->pass[!rising];
         const hystgen_real_t room = t->inside[rising] - hystgen_along(m, m->base);
-        k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x - from);
-        hystgen_set_line(m, &t->segment[k]);
-        cap = from + t->segment[c->top].way;
         if (t->segment[c->top].reach > room) { /* gains fall from segment to segment: the limit lies here or beyond */
-            const hystgen_real_t way = (room - t->segment[k].reach) * t->segment[k].slope;
-            cap = hystgen_along(m, m->begin) + way < cap ? hystgen_along(m, m->begin) + way : cap;
+            cap = hystgen_along(m, m->begin) + (room - s->reach) * s->slope;
         }
     }
+    m->gain = t->segment[k].gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
     if (hystgen_along(m, output) > t->limit[rising]) {
-        hystgen_move_to_output(t, m, corner, hystgen_along(m, t->limit[rising]));
-        m->here.input = hystgen_along(m, m->here.input) < x ? m->here.input : input;
-        m->here.limited = true;
-        return m->here.output;
+        return false;
     }
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) { /* by rounding: no move leads back */
-        cap = -HYSTGEN_REAL_MAX;
+        cap = x;
     } else {
         m->here.output = output;
     }
     cap = t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = hystgen_along(m, cap);
-    m->next = hystgen_along(m, m->next) < cap ? m->next : m->cap;
+    m->next = hystgen_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
     m->here.input = input;
-    m->here.limited = false;
-    return m->here.output;
+    return true;
 }
 
 /* Moves on to an input short of `cap`: more plays of the same block follow. */
@@ -167,17 +169,22 @@ HYSTGEN_KERNEL hystgen_real_t hystgen_move_in_block(const hystgen_curve_t *t, hy
                                                     hystgen_corner_t *corner, hystgen_real_t input)
 {
     const hystgen_real_t way = hystgen_along(m, input - m->from);
-    const unsigned int last = m->here.k + 8u; /* farther on, bisection is faster */
     unsigned int k = m->here.k;
-    while (k < last && way > t->segment[k + 1u].way) {
+    const unsigned int far = k + 8u; /* from there on bisection is faster */
+    do {
         ++k;
-    }
-    hystgen_set_line(m, &t->segment[k]);
+    } while (k < far && way > t->segment[k + 1u].way);
+    const hystgen_segment_t *s = &t->segment[k];
+    m->begin = m->from + hystgen_along(m, s->way);
+    m->start = m->base + hystgen_along(m, s->reach);
+    m->gain = s->gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
-    if (k == last || hystgen_along(m, output - m->here.output) < 0) {
-        return hystgen_move_to_input(t, m, corner, input);
+    if (k == far || hystgen_along(m, output - m->here.output) < 0) {
+        (void)hystgen_move_to_input(t, m, corner, input);
+        return m->here.output;
     }
-    m->next = hystgen_along(m, m->next - m->cap) < 0 ? m->next : m->cap;
+    const hystgen_real_t next = m->from + hystgen_along(m, s[1].way);
+    m->next = hystgen_along(m, next - m->cap) < 0 ? next : m->cap;
     m->here.k = (uint_least16_t)k;
     m->here.input = input;
     m->here.output = output;
@@ -199,7 +206,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
         }
     }
     if (input < m->here.input || input > m->here.input) {
-        return hystgen_move_to_input(t, m, corner, input);
+        (void)hystgen_move_to_input(t, m, corner, input);
     }
     return m->here.output;
 }

@@ -15,12 +15,14 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
         if (self->stepped && self->committed) {
             hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, self->returned);
         }
-    } else {
-        const bool beyond = m->here.rising ? x > m->here.input : x < m->here.input;
-        if ((x < m->here.input || x > m->here.input) && !(m->here.limited && beyond)) {
-            (void)hystgen_move_to_input(&hystgen_inverse_curve, m, self->corner, x);
-        }
-        bits |= m->here.limited ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
+    } else if (m->here.limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
+        bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    } else if ((x < m->here.input || x > m->here.input) &&
+               !hystgen_move_to_input(&hystgen_inverse_curve, m, self->corner, x)) {
+        hystgen_stop_in_block(&hystgen_inverse_curve, m, self->corner,
+                              m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
+        m->here.limited = true;
+        bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
     self->before = m->here.input;
     self->stepped = true;
@@ -29,17 +31,14 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return m->here.output;
 }
 
-/* One sample. The memory takes the answer for applied at once, so that the usual sample need not look back; a commit takes
-   the last step back and puts the applied drive in its place.
+/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive in
+   its place. While `limited` is set, references beyond `input` have the same answer, a limit of the drive.
 
-   stepped  committed   the memory is at        a commit puts another     a NaN answers and leaves
-                                                drive in place of
-   no       no          the start drive         nothing                   the start drive
-   no       yes         the committed drive     the committed drive       the committed drive
-   yes      no          the last answer         the last answer           the last answer
-   yes      yes         the committed drive     the committed drive       the last answer, `returned`
-
-   While `here.limited` is set, references beyond `here.input` have the same answer, a limit of the drive. */
+   stepped  committed  the memory is at      a commit replaces     a NaN answers, and leaves in memory
+   no       no         the start drive       nothing               the start drive
+   no       yes        the committed drive   the committed drive   the committed drive
+   yes      no         the last answer       the last answer       the last answer
+   yes      yes        the committed drive   the committed drive   the last answer, `returned` */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_plays_t *m = &self->plays;
@@ -85,7 +84,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->before = m->here.input;
 }
 
-static void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start)
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start)
 {
     hystgen_plays_t *m = &self->plays;
     hystgen_start(&hystgen_inverse_curve, m, self->corner, start);

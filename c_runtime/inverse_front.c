@@ -104,7 +104,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     hystgen_inverse_replace(self, v);
 }
 
-static void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start, const hystgen_drive_t *first)
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start, const hystgen_drive_t *first)
 {
     hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
     self->level = self->plays.here.input + HYSTGEN_OFFSET;

@@ -37,10 +37,10 @@ def along(m: Memory, x: Any) -> Any:
     return m.real[SIGN] * x
 
 
-def forget_line(t: Curve, m: Memory) -> None:
+def forget_line(m: Memory) -> None:
     """There is no line to go on along: the next sample searches."""
-    m.real[NEXT] = along(m, -t.constant[MOST])
-    m.real[CAP] = m.real[NEXT]
+    m.real[NEXT] = m.real[INPUT]
+    m.real[CAP] = m.real[INPUT]
 
 
 def leave_corner(t: Curve, m: Memory) -> None:
@@ -64,6 +64,7 @@ def turn_back(t: Curve, m: Memory) -> None:
         leave_corner(t, m)
         m.counts[K] = 0
     m.counts[RISING] = 1 - m.counts[RISING]
+    m.counts[LIMITED] = 0
     m.real[SIGN] = -m.real[SIGN]
 
 
@@ -78,12 +79,22 @@ def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
     return k
 
 
-def set_line(t: Curve, m: Memory, k: int) -> None:
-    """Set the line of segment k of the block that counts from FROM and BASE."""
-    m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
-    m.real[START] = m.real[BASE] + along(m, t.reach[k])
-    m.real[GAIN] = t.gain[k]
-    m.real[NEXT] = m.real[FROM] + along(m, t.way[k + 1])
+def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
+    """Stop the present move inside the top corner's block: where the sum is `output`, or at `to` if that comes first."""
+    c = m.counts[DEPTH] - 1
+    rising = m.counts[RISING]
+    reach = along(m, output - m.output[c])
+    x = m.passed[c, rising]
+    k = m.counts[K]
+    if m.rose[c] != rising:
+        k = find_segment(t.reach, k, m.top[c] - 1, reach)
+        reach = reach - t.reach[k]
+        x = t.way[k] - m.passed[c, 1 - rising]
+    x = x + reach * t.slope[k]
+    m.real[INPUT] = along(m, x) if x < along(m, to) else to
+    m.real[OUTPUT] = output
+    m.counts[K] = k
+    forget_line(m)
 
 
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
@@ -92,32 +103,20 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
         turn_back(t, m)
     rising = m.counts[RISING]
     kept = 0
-    passed = m.counts[DEPTH]
-    middle = passed - 1
-    while passed - kept > 1:
+    while m.counts[DEPTH] - kept > 1:
+        middle = (kept + m.counts[DEPTH]) // 2
         reach = t.constant[ZERO] if m.rose[middle] == rising else t.reach[m.top[middle]]
         if along(m, output - m.output[middle]) >= reach:
-            passed = middle
+            m.counts[DEPTH] = middle
             m.counts[K] = m.top[middle]
         else:
             kept = middle
-        middle = (kept + passed) // 2
-    m.counts[DEPTH] = passed
-    reach = along(m, output - m.output[kept])
-    x = m.passed[kept, rising]
-    if m.rose[kept] != rising:
-        k = find_segment(t.reach, m.counts[K], m.top[kept] - 1, reach)
-        m.counts[K] = k
-        reach = reach - t.reach[k]
-        x = t.way[k] - m.passed[kept, 1 - rising]
-    m.real[INPUT] = along(m, x + reach * t.slope[m.counts[K]])
-    m.real[OUTPUT] = output
     m.counts[LIMITED] = 0
-    forget_line(t, m)
+    stop_in_block(t, m, output, along(m, t.constant[MOST]))
 
 
-def move_to_input(t: Curve, m: Memory, to: Any) -> Any:
-    """Move the plays to an input that another corner may count for."""
+def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
+    """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
     x = along(m, to)
     if x < along(m, m.real[INPUT]):
         turn_back(t, m)
@@ -134,59 +133,57 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> Any:
                 kept = middle
         m.counts[K] = m.top[passed]
         m.counts[DEPTH] = passed
-
     c = m.counts[DEPTH] - 1
     k = m.counts[K]
-    at_once = m.rose[c] == rising
-    origin = m.passed[c, rising] if at_once else -m.passed[c, 1 - rising]
-    cap = origin
-    m.real[FROM] = along(m, origin)
-    m.real[BASE] = m.output[c]
-    if at_once:
-        m.real[BEGIN] = m.real[FROM]
-        m.real[START] = m.real[BASE]
-        m.real[GAIN] = t.gain[k]
-        m.real[NEXT] = m.real[FROM]
+    cap = m.passed[c, rising]
+    after = cap
+    if m.rose[c] == rising:
+        m.real[BEGIN] = along(m, cap)
+        m.real[START] = m.output[c]
     else:
         top = m.top[c]
+        k = find_segment(t.way, k, top - 1, x + m.passed[c, 1 - rising])
+        m.real[FROM] = -along(m, m.passed[c, 1 - rising])
+        m.real[BASE] = m.output[c]
+        m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
+        m.real[START] = m.real[BASE] + along(m, t.reach[k])
+        after = t.way[k + 1] - m.passed[c, 1 - rising]
+        cap = t.way[top] - m.passed[c, 1 - rising]
         room = t.inside[rising] - along(m, m.real[BASE])
-        k = find_segment(t.way, k, top - 1, x - origin)
-        set_line(t, m, k)
-        cap = origin + t.way[top]
         if t.reach[top] > room:
-            stop = along(m, m.real[BEGIN]) + (room - t.reach[k]) * t.slope[k]
-            cap = stop if stop < cap else cap
+            cap = along(m, m.real[BEGIN]) + (room - t.reach[k]) * t.slope[k]
+    m.real[GAIN] = t.gain[k]
     output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
     if along(m, output) > t.limit[rising]:
-        move_to_output(t, m, along(m, t.limit[rising]))
-        m.real[INPUT] = m.real[INPUT] if along(m, m.real[INPUT]) < x else to
-        m.counts[LIMITED] = 1
-        return m.real[OUTPUT]
+        return False
     if along(m, output) < along(m, m.real[OUTPUT]):
-        cap = -t.constant[MOST]
+        cap = x
     else:
         m.real[OUTPUT] = output
     cap = t.range[rising] if t.range[rising] < cap else cap
     m.real[CAP] = along(m, cap)
-    m.real[NEXT] = m.real[NEXT] if along(m, m.real[NEXT]) < cap else m.real[CAP]
+    m.real[NEXT] = along(m, after if after < cap else cap)
     m.counts[K] = k
     m.real[INPUT] = to
-    m.counts[LIMITED] = 0
-    return m.real[OUTPUT]
+    return True
 
 
 def move_in_block(t: Curve, m: Memory, to: Any) -> Any:
     """Move on to an input short of CAP: more plays of the same block follow."""
     way = along(m, to - m.real[FROM])
-    k = m.counts[K]
-    last = k + 8
-    while k < last and way > t.way[k + 1]:
+    k = m.counts[K] + 1
+    far = m.counts[K] + 8
+    while k < far and way > t.way[k + 1]:
         k += 1
-    set_line(t, m, k)
+    m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
+    m.real[START] = m.real[BASE] + along(m, t.reach[k])
+    m.real[GAIN] = t.gain[k]
     output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
-    if k == last or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
-        return move_to_input(t, m, to)
-    m.real[NEXT] = m.real[NEXT] if along(m, m.real[NEXT] - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
+    if k == far or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
+        move_to_input(t, m, to)
+        return m.real[OUTPUT]
+    after = m.real[FROM] + along(m, t.way[k + 1])
+    m.real[NEXT] = after if along(m, after - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
     m.counts[K] = k
     m.real[INPUT] = to
     m.real[OUTPUT] = output
@@ -204,7 +201,7 @@ def plays_step(t: Curve, m: Memory, to: Any) -> Any:
         if to < m.real[CAP] if rising else to > m.real[CAP]:
             return move_in_block(t, m, to)
     if to < m.real[INPUT] or to > m.real[INPUT]:
-        return move_to_input(t, m, to)
+        move_to_input(t, m, to)
     return m.real[OUTPUT]
 
 
@@ -230,11 +227,11 @@ def start(t: Curve, m: Memory, s: Start) -> None:
     m.real[SIGN] = t.constant[ONE]
     m.real[INPUT] = s.center[0, 0]
     m.real[OUTPUT] = s.center[0, 1]
-    forget_line(t, m)
+    forget_line(m)
 
 
 COMPILED: list[Callable[..., Any]] = [
-    along, forget_line, leave_corner, turn_back, find_segment, set_line, move_to_output, move_to_input,
-    move_in_block, plays_step, start,
+    along, forget_line, leave_corner, turn_back, find_segment, stop_in_block, move_to_output,
+    move_to_input, move_in_block, plays_step, start,
 ]  # fmt: skip  (callees before callers)
 INLINED: set[Callable[..., Any]] = {along, forget_line, plays_step}

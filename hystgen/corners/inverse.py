@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_float import forget_line, move_in_block, move_to_input, move_to_output, start
+from hystgen.corners.corners_float import forget_line, move_in_block, move_to_input, move_to_output, start, stop_in_block
 from hystgen.corners.memory import (
     BEFORE,
     BEGIN,
@@ -68,7 +68,7 @@ def put_undo(t: Curve, m: Memory) -> None:
     m.counts[RISING] = m.counts[UNDO_RISING]
     m.counts[LIMITED] = m.counts[UNDO_LIMITED]
     m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
-    forget_line(t, m)
+    forget_line(m)
 
 
 def set_undo(m: Memory) -> None:
@@ -92,12 +92,12 @@ def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
     if bits == HELD:
         if m.counts[STEPPED] and m.counts[COMMITTED]:
             move_to_output(t.inverse, m, m.real[RETURNED])
-    else:
-        beyond = x > m.real[INPUT] if m.counts[RISING] else x < m.real[INPUT]
-        if x != m.real[INPUT] and not (m.counts[LIMITED] and beyond):
-            move_to_input(t.inverse, m, x)
-        if m.counts[LIMITED]:
-            bits |= OUTPUT_CLAMPED
+    elif m.counts[LIMITED] and (x >= m.real[INPUT] if m.counts[RISING] else x <= m.real[INPUT]):
+        bits |= OUTPUT_CLAMPED
+    elif x != m.real[INPUT] and not move_to_input(t.inverse, m, x):
+        stop_in_block(t.inverse, m, t.limits[DRIVE_MAX] if m.counts[RISING] else t.limits[DRIVE_MIN], x)
+        m.counts[LIMITED] = 1
+        bits |= OUTPUT_CLAMPED
     m.real[BEFORE] = m.real[INPUT]
     m.counts[STEPPED] = 1
     m.counts[COMMITTED] = 0

@@ -141,7 +141,6 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
     segments = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in rows)
     pairs = [f"{{{literal(pair[0])}, {literal(pair[1])}}}" for pair in (curve.limit, curve.inside, curve.range)]
     found = [
-        f"/* way, reach, gain and slope of each segment */\n"
         f"static const {prefix}_segment_t {own}_segment[{len(curve.way)}] = {{\n{segments}\n}};\n",
         f"static const {prefix}_curve_t {own}_curve = {{\n    {own}_segment, {', '.join(pairs)}\n}};\n",
     ]
@@ -149,16 +148,16 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
     memories = []
     for start, memory in zip(starts, ("init", "reset"), strict=True):
         points = [f"{{{literal(point[0])}, {literal(point[1])}}}" for point in start.center]
-        text = "\n".join(textwrap.wrap(", ".join(points), 110, initial_indent="    ", subsequent_indent="    "))
+        lines = textwrap.wrap(", ".join(points), 105, initial_indent="    ", subsequent_indent="    ")
+        text = lines[0].strip() if len(points) == 1 else "\n" + "\n".join(lines) + "\n"
         if text not in before:  # after init and after reset plays may hold the same
             before[text] = f"{own}_{memory}_center"
-            found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{\n{text}\n}};\n")
+            found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{{text}}};\n")
         output, falling, rising = map(literal, start.bottom)
         memories.append(
             f"    {{{before[text]}, {start.step}, {start.risen}, {{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
         )
     found.append(
-        "/* start memories of init and reset */\n"
         f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(memories) + "\n};\n"
     )
     return found
