@@ -16,33 +16,37 @@ RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
 
 DRIVER = """
 #include "hystgen_runtime.h"
-void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_t *slope, const hystgen_real_t *lift,
-           const hystgen_real_t *start_level, const hystgen_real_t *inverse, unsigned short n, int loop, int invert,
-           const hystgen_real_t *x, hystgen_real_t *y, int count);
-void drive(const hystgen_real_t *r, const hystgen_real_t *p, const hystgen_real_t *slope, const hystgen_real_t *lift,
-           const hystgen_real_t *start_level, const hystgen_real_t *inverse, unsigned short n, int loop, int invert,
-           const hystgen_real_t *x, hystgen_real_t *y, int count)
+void loop(const double *r, const double *p, const double *lift, const double *inverse, unsigned short n, int invert,
+          const double *x, double *y, int count);
+void loop(const double *r, const double *p, const double *lift, const double *inverse, unsigned short n, int invert,
+          const double *x, double *y, int count)
 {
     hystgen_tables_t t;
-    hystgen_memory_t m;
-    hystgen_corner_t corner[64];
-    hystgen_real_t play[65];
+    double play[65];
     int i;
-    t.threshold = r; t.weight = p; t.slope = slope; t.lift = lift; t.start_level = start_level;
-    t.inverse_slope = inverse; t.all_lift = lift[n + 1]; t.n = n;
-    hystgen_corners_rest(&t, &m, corner, 0);
+    t.threshold = r; t.weight = p; t.lift = lift; t.inverse_slope = inverse; t.n = n;
     hystgen_loop_rest(&t, play, 0);
     for (i = 0; i < count; ++i) {
-        hystgen_real_t w = x[i];
-        if (invert) {
-            w = loop ? hystgen_loop_solve(&t, play, w) : hystgen_corners_solve(&t, &m, corner, w);
-        }
-        if (loop) {
-            hystgen_loop_absorb(&t, play, w);
-        } else {
-            hystgen_corners_absorb(&t, &m, corner, w);
-        }
-        y[i] = invert ? w : loop ? hystgen_loop_output(&t, play) : hystgen_corners_output(&t, &m);
+        double w = invert ? hystgen_loop_solve(&t, play, x[i]) : x[i];
+        hystgen_loop_absorb(&t, play, w);
+        y[i] = invert ? w : hystgen_loop_output(&t, play);
+    }
+}
+void corners(const double *segment, double falling, double rising, unsigned short n, const double *x, double *y,
+             int count);
+void corners(const double *segment, double falling, double rising, unsigned short n, const double *x, double *y,
+             int count)
+{
+    static const double center[1][2] = {{0, 0}};
+    const hystgen_curve_t t = {(const hystgen_segment_t *)segment, {DBL_MAX, DBL_MAX}, {DBL_MAX, DBL_MAX},
+                               {DBL_MAX, DBL_MAX}};
+    const hystgen_start_t start = {center, 0, n, {0, {falling, rising}, (unsigned short)(n + 1), 2}};
+    hystgen_plays_t m;
+    hystgen_corner_t corner[66];
+    int i;
+    hystgen_start(&t, &m, corner, &start);
+    for (i = 0; i < count; ++i) {
+        y[i] = hystgen_plays_step(&t, &m, corner, x[i]);
     }
 }
 """
@@ -79,8 +83,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> tuple[cffi.FFI, object]
     )  # fmt: skip
     ffi = cffi.FFI()
     ffi.cdef(
-        "void drive(const double *, const double *, const double *, const double *, const double *, const double *,"
-        "unsigned short, int, int, const double *, double *, int);"
+        "void loop(const double *, const double *, const double *, const double *, unsigned short, int, const double *,"
+        "double *, int); void corners(const double *, double, double, unsigned short, const double *, double *, int);"
     )
     return ffi, ffi.dlopen(str(folder / "driver.so"))
 
@@ -101,19 +105,26 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
     n = int(rng.integers(0, 65)) if seed else 0
     r = np.concatenate([[0], np.cumsum(rng.uniform(0.01, 0.3, n))])
     p = rng.uniform(0.05, 1, n + 1)
-    slope = np.concatenate([[0], np.cumsum(p)])
-    lift = np.concatenate([[0], np.cumsum(p * r)])
-    z = r * slope[:-1] - lift[:-1]
-    inverse = np.concatenate([[0], 1 / slope[1:]])
+    c, q = np.cumsum(p), np.cumsum(p * r)
+    lift, reciprocal = np.concatenate([[0], q]), np.concatenate([[0], 1 / c])
     walk = np.cumsum(rng.normal(0, 0.3, 3000))
     turns = np.interp(np.linspace(0, 300, 3000), np.arange(301), rng.uniform(-1, 1, 301)) * (r[-1] + 1)
     v = np.concatenate([walk, turns, np.repeat(rng.uniform(-2, 2, 200), 3)])
+    never = np.array([[1e300, 1e300, 0, 0]])
+
+    def pointer(a: np.ndarray) -> object:
+        return ffi.cast("double *", a.ctypes.data)
 
     def run(loop: int, invert: int, x: np.ndarray) -> np.ndarray:
         y = np.empty_like(x)
-        arrays = [ffi.cast("double *", a.ctypes.data) for a in (r, p, slope, lift, z, inverse)]
-        signals = [ffi.cast("double *", a.ctypes.data) for a in (x, y)]
-        lib.drive(*arrays, n, loop, invert, *signals, len(x))
+        if loop:
+            lib.loop(*map(pointer, (r, p, lift, reciprocal)), n, invert, pointer(x), pointer(y), len(x))
+            return y
+        drive, output = 2 * r, 2 * (r * c - q)
+        columns = (output, drive, 1 / c, c) if invert else (drive, output, c, 1 / c)
+        segments = np.concatenate([np.column_stack(columns), never])
+        bottom = -q[-1] if invert else q[-1] / c[-1]
+        lib.corners(pointer(segments), bottom, bottom, n, pointer(x), pointer(y), len(x))
         return y
 
     y = brute_output(v, r, p)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
 
-from hystgen import reference, tables
+from hystgen import compiled, reference, tables
 from hystgen.api import Model, cascade_of
 from hystgen.models import Cascade, TanhEnvelope
 from hystgen.params import parse_parameters
@@ -177,8 +177,9 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
-    state = reference.new_state(numbers)
-    reference.init(numbers, state, int(inverse))
+    code = compiled.reference(numbers, compiled=False)
+    state = code.new_state(numbers)
+    code.init(numbers, state, int(inverse))
     first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range
@@ -190,7 +191,7 @@ def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]
         ]
     )
     answers, status = np.zeros(len(x)), np.zeros(len(x), np.int64)
-    reference.run(numbers, state, int(inverse), op, x, answers, status)
+    code.run(numbers, state, int(inverse), op, x, answers, status)
     return x, answers, status, np.array([low, high])
 
 
