@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from hystgen import fixed, reference
-from hystgen.bounds import error_bounds
+from hystgen.bounds import error_bounds, largest_sum
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import Path
@@ -143,7 +143,11 @@ class _Builder:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
-        self.output = (math.ceil(low), math.floor(high))
+        # an end that double precision may have moved off a code is that code: 2^-50 is 8 roundoffs, and no more than
+        # a thousandth of a code where the rest of a sum cancels
+        size = Fraction(largest_sum(self.cascade)) + abs(Fraction(self.cascade.output_offset))
+        slack = min(size / 2**50 / self.output_lsb, Fraction(1, 1024))
+        self.output = (math.ceil(low - slack), math.floor(high + slack))
         for (first, last), key, far in (
             (self.drive, "drive_lsb", ("input_range",)),
             (self.output, "output_lsb", ("model", "output_offset")),
@@ -435,6 +439,7 @@ class _Builder:
         output_short = max(
             Fraction(c.output_range[1]) - self.output[1] * self.output_lsb,
             self.output[0] * self.output_lsb - Fraction(c.output_range[0]),
+            Fraction(0),
         )
         residual = (
             self._sum_error() * self.output_lsb
