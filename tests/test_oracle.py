@@ -137,7 +137,7 @@ hystgen: 1
 name: between_codes
 input_range: [-1.2, 1.2]
 model:
-  pi: {thresholds: [0, 0.2, 0.5], weights: [1, 0.8, 0.4], initial_state: 0.0123}
+  pi: {thresholds: [0, 0.2, 0.5], weights: [1, 0.8, 0.4], initial_state: 0.0125}
   memoryless:
     kind: tanh
     ascending: {a0: 4, a1: 0.1, a2: -0.05, a3: 0}
