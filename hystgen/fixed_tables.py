@@ -4,8 +4,8 @@ Everything is computed with fractions from the parameters as they are, so that t
 anywhere; only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
 
 Ranges. The drive is limited to `input_range`, so that the input w of the plays, every play and every corner stay
-between the least and largest of the range's images, the start memory and 0, where a reset begins. `Ranges` bounds every sum from there; a
-format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables).
+between the least and largest of the range's images, the start memory and 0, where a reset begins. That bounds every
+sum; a format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables).
 
 Errors. With the drive exact, as it is sent: rounded thresholds and start states move a play by no more than their own
 error (3); rounded sums of weights are summed by parts, because neighbouring plays differ by no more than their
@@ -379,8 +379,9 @@ class _Builder:
 
         Outputs after `init` fit the type but for rounding; those after `reset` may not.
         """
-        behind_reset = (abs(Fraction(y)) for y in self.cascade.reset_range)
-        return self.code_max if max(behind_reset) > (self.code_max + Fraction(1, 2)) * self.output_lsb else 2**SUM_BITS
+        largest = max(abs(Fraction(y)) for y in self.cascade.reset_range) / self.output_lsb
+        reported: int = self.code_max if largest > self.code_max + Fraction(1, 2) else 2**SUM_BITS
+        return reported
 
     def _play_errors(self) -> list[Fraction]:
         """How far each play can be from that of the exact model, in physical units of w."""
