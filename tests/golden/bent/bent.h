@@ -34,11 +34,20 @@
 #ifdef __ASSOCIATIVE_MATH__
 #error "bent: build without -fassociative-math, the order of additions is part of the answer"
 #endif
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's own macro stays. */
+#if defined(FLT_EVAL_METHOD)
+#define BENT_EVAL_METHOD FLT_EVAL_METHOD
+#elif defined(__FLT_EVAL_METHOD__)
+#define BENT_EVAL_METHOD __FLT_EVAL_METHOD__
+#else
+#error "bent: compile as C99 or C++11 or later; here <float.h> has no FLT_EVAL_METHOD"
+#define BENT_EVAL_METHOD 0
+#endif
+#if BENT_EVAL_METHOD != 0 && BENT_EVAL_METHOD != 16
+#error "bent: this target computes in another precision than double (FLT_EVAL_METHOD is not 0)"
+#endif
 #if DBL_MANT_DIG != 53
 #error "bent: double is not IEEE binary64 here"
-#endif
-#if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
-#error "bent: this target computes in another precision than double (FLT_EVAL_METHOD is not 0)"
 #endif
 
 #ifdef __cplusplus

@@ -174,8 +174,8 @@ static inline void curved_corners_settle(const curved_tables_t *t, curved_place_
     } else { /* every play follows */
         p->anchor = 0;
         p->anchor_output = rising ? -t->all_lift : t->all_lift;
-        p->next = rising ? INT32_MAX : -INT32_MAX;
-        p->next_output = rising ? (INT64_MAX / 2) : -(INT64_MAX / 2);
+        p->next = rising ? 2147483647 : -2147483647;
+        p->next_output = rising ? (((int64_t)1 << 62) - 1) : -(((int64_t)1 << 62) - 1);
     }
 }
 
@@ -211,14 +211,14 @@ static unsigned int curved_threshold_not_reached_near(const curved_play_t *step,
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `onward`: a move that goes on
    mostly takes one or two more plays along. */
 #if defined(__GNUC__)
 __attribute__((always_inline))
 #endif
 static inline unsigned int curved_find_by_input(const curved_tables_t *t, const curved_corner_t *corner,
                                                   unsigned int depth, unsigned int *k, curved_play_t w, bool rising,
-                                                  bool near)
+                                                  bool onward)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -244,8 +244,8 @@ static inline unsigned int curved_find_by_input(const curved_tables_t *t, const 
         if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
             const curved_sum_t on = rising ? (curved_sum_t)w - c->extremum : (curved_sum_t)c->extremum - w;
             const curved_sum_t way = c->side == 0 ? on : curved_half(on); /* in the measure of the thresholds */
-            *k = near ? curved_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                      : curved_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+            *k = onward ? curved_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                        : curved_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
         }
     }
     return left;
@@ -341,15 +341,16 @@ static inline void curved_corners_turn(const curved_tables_t *t, curved_memory_t
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
-    bool far;
+    bool takes_along;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         curved_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
-        far = curved_past(w, (curved_reach_t)curved_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+        takes_along =
+            curved_past(w, (curved_reach_t)curved_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
     } else {
-        far = depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising);
+        takes_along = depth > 0 && curved_past(w, curved_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (far) {
+    if (takes_along) {
         k = 2; /* right at its activation it would not follow yet */
         depth = curved_find_by_input(t, corner, depth, &k, w, rising, false);
     }
@@ -640,8 +641,8 @@ static const int32_t curved_slope[8] = {
 };
 
 static const curved_sum_t curved_start_level[7] = {
-    0, 14597222287639957, 41358796476613380, 77851851002392984, 121643517865312855, 170300925500845708,
-    221391203522685052
+    0, 14597222287639957LL, 41358796476613380LL, 77851851002392984LL, 121643517865312855LL,
+    170300925500845708LL, 221391203522685052LL
 };
 
 static const uint32_t curved_reciprocal[8] = {
@@ -655,7 +656,7 @@ static const uint8_t curved_shift[8] = {
 /* thresholds, weights, sums of weights, inverse thresholds, 1 / sums of weights and their shifts; the sum of weight times
    threshold; ends of the input of the plays; plays without r_0 */
 static const curved_tables_t curved_tables = {
-    curved_threshold, NULL, curved_slope, curved_start_level, curved_reciprocal, curved_shift, 86610185158410472, -389231414, 428259574, 6
+    curved_threshold, NULL, curved_slope, curved_start_level, curved_reciprocal, curved_shift, 86610185158410472LL, -389231414, 428259574, 6
 };
 
 /* w = G[v] */

@@ -195,11 +195,11 @@ static unsigned int plain_threshold_not_reached_near(const plain_real_t *step, u
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `onward`: a move that goes on
    mostly takes one or two more plays along. */
 PLAIN_COPIES unsigned int plain_find_by_input(const plain_tables_t *t, const plain_corner_t *corner,
                                                   unsigned int depth, unsigned int *k, plain_real_t w, bool rising,
-                                                  bool near)
+                                                  bool onward)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -225,8 +225,8 @@ PLAIN_COPIES unsigned int plain_find_by_input(const plain_tables_t *t, const pla
         if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
             const plain_real_t on = rising ? w - c->extremum : c->extremum - w;
             const plain_real_t way = c->side == 0 ? on : plain_half(on); /* in the measure of the thresholds */
-            *k = near ? plain_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                      : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+            *k = onward ? plain_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                        : plain_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
         }
     }
     return left;
@@ -316,15 +316,16 @@ PLAIN_COPIES void plain_corners_turn(const plain_tables_t *t, plain_memory_t *m,
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
-    bool far;
+    bool takes_along;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         plain_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
-        far = plain_past(w, plain_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+        takes_along =
+            plain_past(w, plain_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
     } else {
-        far = depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising);
+        takes_along = depth > 0 && plain_past(w, plain_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (far) {
+    if (takes_along) {
         k = 2; /* right at its activation it would not follow yet */
         depth = plain_find_by_input(t, corner, depth, &k, w, rising, false);
     }

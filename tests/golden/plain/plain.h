@@ -32,11 +32,20 @@
 #ifdef __ASSOCIATIVE_MATH__
 #error "plain: build without -fassociative-math, the order of additions is part of the answer"
 #endif
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's own macro stays. */
+#if defined(FLT_EVAL_METHOD)
+#define PLAIN_EVAL_METHOD FLT_EVAL_METHOD
+#elif defined(__FLT_EVAL_METHOD__)
+#define PLAIN_EVAL_METHOD __FLT_EVAL_METHOD__
+#else
+#error "plain: compile as C99 or C++11 or later; here <float.h> has no FLT_EVAL_METHOD"
+#define PLAIN_EVAL_METHOD 0
+#endif
+#if PLAIN_EVAL_METHOD != 0 && PLAIN_EVAL_METHOD != 16
+#error "plain: this target computes in another precision than float (FLT_EVAL_METHOD is not 0)"
+#endif
 #if FLT_MANT_DIG != 24
 #error "plain: float is not IEEE binary32 here"
-#endif
-#if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
-#error "plain: this target computes in another precision than float (FLT_EVAL_METHOD is not 0)"
 #endif
 
 #ifdef __cplusplus

@@ -33,11 +33,20 @@
 #ifdef __ASSOCIATIVE_MATH__
 #error "two_branches: build without -fassociative-math, the order of additions is part of the answer"
 #endif
+/* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's own macro stays. */
+#if defined(FLT_EVAL_METHOD)
+#define TWO_BRANCHES_EVAL_METHOD FLT_EVAL_METHOD
+#elif defined(__FLT_EVAL_METHOD__)
+#define TWO_BRANCHES_EVAL_METHOD __FLT_EVAL_METHOD__
+#else
+#error "two_branches: compile as C99 or C++11 or later; here <float.h> has no FLT_EVAL_METHOD"
+#define TWO_BRANCHES_EVAL_METHOD 0
+#endif
+#if TWO_BRANCHES_EVAL_METHOD != 0 && TWO_BRANCHES_EVAL_METHOD != 16
+#error "two_branches: this target computes in another precision than float (FLT_EVAL_METHOD is not 0)"
+#endif
 #if FLT_MANT_DIG != 24
 #error "two_branches: float is not IEEE binary32 here"
-#endif
-#if !defined(FLT_EVAL_METHOD) || (FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16)
-#error "two_branches: this target computes in another precision than float (FLT_EVAL_METHOD is not 0)"
 #endif
 
 #ifdef __cplusplus
@@ -275,6 +284,7 @@ static const two_branches_real_t two_branches_atanh_row[8][5] = {
 static two_branches_real_t two_branches_atanh(two_branches_real_t x)
 {
     two_branches_real_t a = x < 0.0f ? -x : x;
+    unsigned int step;
     if (a <= 0.5f) {
         const two_branches_real_t *p = two_branches_atanh_odd;
         const two_branches_real_t z = x * x;
@@ -287,7 +297,7 @@ static two_branches_real_t two_branches_atanh(two_branches_real_t x)
     const uint_least32_t whole = (uint_least32_t)(u * 16777216.0f);
     uint_least32_t m = whole << 1; /* to be brought to 2^24 .. 2^25 - 1 */
     unsigned int k = 1u;
-    for (unsigned int step = 16u; step > 0u; step >>= 1) {
+    for (step = 16u; step > 0u; step >>= 1) {
         if (m < (uint_least32_t)1u << (25u - step)) {
             m <<= step;
             k += step;
@@ -476,11 +486,11 @@ static unsigned int two_branches_threshold_not_reached_near(const two_branches_r
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `onward`: a move that goes on
    mostly takes one or two more plays along. */
 TWO_BRANCHES_COPIES unsigned int two_branches_find_by_input(const two_branches_tables_t *t, const two_branches_corner_t *corner,
                                                   unsigned int depth, unsigned int *k, two_branches_real_t w, bool rising,
-                                                  bool near)
+                                                  bool onward)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -506,8 +516,8 @@ TWO_BRANCHES_COPIES unsigned int two_branches_find_by_input(const two_branches_t
         if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
             const two_branches_real_t on = rising ? w - c->extremum : c->extremum - w;
             const two_branches_real_t way = c->side == 0 ? on : two_branches_half(on); /* in the measure of the thresholds */
-            *k = near ? two_branches_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                      : two_branches_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+            *k = onward ? two_branches_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                        : two_branches_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
         }
     }
     return left;
@@ -597,15 +607,16 @@ TWO_BRANCHES_COPIES void two_branches_corners_turn(const two_branches_tables_t *
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
-    bool far;
+    bool takes_along;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         two_branches_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
-        far = two_branches_past(w, two_branches_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+        takes_along =
+            two_branches_past(w, two_branches_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
     } else {
-        far = depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising);
+        takes_along = depth > 0 && two_branches_past(w, two_branches_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (far) {
+    if (takes_along) {
         k = 2; /* right at its activation it would not follow yet */
         depth = two_branches_find_by_input(t, corner, depth, &k, w, rising, false);
     }
