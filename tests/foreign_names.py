@@ -11,7 +11,8 @@ IAR, TI and Microchip (XC8) take as keywords. Of names beyond macros, types and 
 from __future__ import annotations
 
 
-def _words(text: str) -> frozenset[str]:
+def words(text: str) -> frozenset[str]:
+    """The words of a text."""
     return frozenset(text.split())
 
 
@@ -19,7 +20,7 @@ def _numbered(text: str, last: int) -> frozenset[str]:
     return frozenset(f"{word}{k}" for word in text.split() for k in range(last + 1))
 
 
-WINDOWS = _words(
+WINDOWS = words(
     """
     near far NEAR FAR huge pascal PASCAL cdecl CDECL small hyper interface IN OUT OPTIONAL CONST VOID BOOL TRUE FALSE
     BYTE WORD DWORD INT UINT CHAR SHORT LONG FLOAT min max STRICT WIN32 CALLBACK WINAPI WINAPIV APIENTRY APIPRIVATE
@@ -28,7 +29,7 @@ WINDOWS = _words(
     """
 )
 
-ARDUINO = _words(
+ARDUINO = words(
     """
     HIGH LOW INPUT OUTPUT INPUT_PULLUP INPUT_PULLDOWN PI HALF_PI TWO_PI DEG_TO_RAD RAD_TO_DEG EULER SERIAL DISPLAY
     LSBFIRST MSBFIRST CHANGE FALLING RISING DEFAULT EXTERNAL INTERNAL INTERNAL1V1 INTERNAL2V56 min max abs constrain
@@ -38,9 +39,9 @@ ARDUINO = _words(
     portModeRegister NOT_A_PIN NOT_A_PORT NOT_AN_INTERRUPT NOT_ON_TIMER DEC HEX OCT BIN F PSTR PROGMEM _NOP _BV sbi cbi
     SDA SCL MOSI MISO SCK SS LED_BUILTIN Serial Wire SPI EEPROM F_CPU ARDUINO ICACHE_RAM_ATTR IRAM_ATTR
     """
-) | _words(" ".join(f"B{k:0{digits}b}" for digits in range(1, 9) for k in range(2**digits)))
+) | words(" ".join(f"B{k:0{digits}b}" for digits in range(1, 9) for k in range(2**digits)))
 
-CMSIS = _words(
+CMSIS = words(
     """
     __I __O __IO __IM __OM __IOM __ASM __INLINE __STATIC_INLINE __STATIC_FORCEINLINE __NO_RETURN __USED __WEAK __PACKED
     __ALIGNED __RESTRICT __NOP __WFI __DSB __ISB __DMB _VAL2FLD _FLD2VAL SCB SCnSCB SysTick NVIC ITM DWT TPI CoreDebug
@@ -50,7 +51,7 @@ CMSIS = _words(
     """
 ) | _numbered("TIM SPI I2C USART UART LPTIM", 17)
 
-ZEPHYR = _words(
+ZEPHYR = words(
     """
     BIT BIT64 BIT_MASK BIT64_MASK MIN MAX CLAMP IN_RANGE ARRAY_SIZE ARRAY_INDEX ARRAY_INDEX_FLOOR ARRAY_FOR_EACH
     ARRAY_FOR_EACH_PTR IS_ARRAY IS_ARRAY_ELEMENT PART_OF_ARRAY CONTAINER_OF CONTAINER_OF_VALIDATE SAME_TYPE CONCAT
@@ -64,16 +65,16 @@ ZEPHYR = _words(
     """
 )
 
-ESP_IDF = _numbered("BIT", 63) | _words("BIT BIT64 IRAM_ATTR DRAM_ATTR RTC_DATA_ATTR UNUSED likely unlikely")
+ESP_IDF = _numbered("BIT", 63) | words("BIT BIT64 IRAM_ATTR DRAM_ATTR RTC_DATA_ATTR UNUSED likely unlikely")
 
-COMPILERS = _words(
+COMPILERS = words(
     """
     near far huge tiny interrupt bit bank0 bank1 bank2 bank3 banked persistent eeprom control fortran cregister ioport
     onchip monitor no_init intrinsic saddr callt
     """
 )
 
-C_LIBRARY = _words(
+C_LIBRARY = words(
     """
     I complex imaginary errno assert stdin stdout stderr EOF NAN INFINITY isnan isinf isfinite isnormal signbit
     fpclassify unix linux i386 arm sun major minor makedev st_atime sa_handler si_value s6_addr d_ino h_addr alloca

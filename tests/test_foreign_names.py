@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from foreign_names import NAMES
+from foreign_names import NAMES, words
 from modelfiles import FILES
 
 import hystgen
@@ -23,9 +23,11 @@ from hystgen.verification import compilers, targets
 
 REQUIRED = bool(os.environ.get("CI"))
 ARITHMETICS = ("float32", "float64", "q31", "q15")
-KEYWORDS = frozenset(
-    "auto bool break case char const continue default do double else enum extern false float for goto if inline int long "
-    "register return short signed sizeof static struct switch true typedef union unsigned void volatile while".split()
+KEYWORDS = words(
+    """
+    auto bool break case char const continue default do double else enum extern false float for goto if inline int
+    long register return short signed sizeof static struct switch true typedef union unsigned void volatile while
+    """
 )
 STANDARD = "".join(f"#include <{name}.h>\n" for name in ("float", "stdbool", "stddef", "stdint"))
 C_HEADERS = (
@@ -57,8 +59,8 @@ def identifiers(text: str, own: str) -> set[str]:
     text = re.sub(r"^#\s*(error|include|pragma)\b.*$", " ", text, flags=re.MULTILINE)
     text = re.sub(r'"[^"\n]*"|\'[^\'\n]*\'', " ", text)
     text = re.sub(r"(?<!\w)\.?\d[\w.]*", " ", text)
-    words = set(re.findall(r"[A-Za-z_]\w*", text))
-    return {word for word in words - KEYWORDS if not word.lower().startswith((f"{own}_", "hystgen_"))}
+    found = set(re.findall(r"[A-Za-z_]\w*", text))
+    return {word for word in found - KEYWORDS if not word.lower().startswith((f"{own}_", "hystgen_"))}
 
 
 @functools.cache

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from hystgen.api import Model, emit_options
+from hystgen.emission import module
 from hystgen.verification import avr, cores, host, sources
 from hystgen.verification.comparison import REALS, Expected, expected_records
 from hystgen.verification.report import Report
@@ -56,7 +57,9 @@ def verify_model(
                 wanted = functools.partial(records, length)
                 report.rows.extend(host.rows(written, wanted, real, compiler, folder, progress))
             elif isinstance(target, Board):
-                report.rows.extend(avr.rows(target, written, compiler, folder, progress))
+                memory = module.cost_of(model.parameters, model.cascade, options).avr
+                size = None if memory is None else avr.Size(model.cascade.pi.n, memory)
+                report.rows.extend(avr.rows(target, written, size, compiler, folder, progress))
             else:
                 wanted = functools.partial(records, target_length or target.calls)
                 report.rows.extend(cores.rows(target, written, wanted, compiler, folder, progress))

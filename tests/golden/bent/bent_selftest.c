@@ -18,6 +18,12 @@ typedef struct {
     unsigned int status;
 } bent_selftest_sample_t;
 
+/* Too large for some stacks; the operators run one after the other. */
+static union {
+    bent_forward_t forward;
+    bent_inverse_t inverse;
+} bent_selftest_instance;
+
 static bool bent_selftest_same(bent_real_t a, bent_real_t b)
 {
     const unsigned char *x = (const unsigned char *)&a;
@@ -404,32 +410,32 @@ int bent_selftest(void)
 {
     int index = 0;
     unsigned int i;
-    bent_forward_t forward;
-    bent_inverse_t inverse;
-    bent_forward_init(&forward);
+    bent_forward_init(&bent_selftest_instance.forward);
     for (i = 0; i < 178u; ++i) {
         const bent_selftest_sample_t *sample = &bent_selftest_forward[i];
         if (sample->kind == 'r') {
-            bent_forward_reset(&forward, sample->argument);
-        } else if (!bent_selftest_same(bent_forward_step(&forward, sample->argument), sample->answer)) {
+            bent_forward_reset(&bent_selftest_instance.forward, sample->argument);
+        } else if (!bent_selftest_same(
+                       bent_forward_step(&bent_selftest_instance.forward, sample->argument), sample->answer)) {
             return index + 1;
         }
-        if (bent_forward_status(&forward) != sample->status) {
+        if (bent_forward_status(&bent_selftest_instance.forward) != sample->status) {
             return index + 1;
         }
         ++index;
     }
-    bent_inverse_init(&inverse);
+    bent_inverse_init(&bent_selftest_instance.inverse);
     for (i = 0; i < 185u; ++i) {
         const bent_selftest_sample_t *sample = &bent_selftest_inverse[i];
         if (sample->kind == 'r') {
-            bent_inverse_reset(&inverse, sample->argument);
+            bent_inverse_reset(&bent_selftest_instance.inverse, sample->argument);
         } else if (sample->kind == 'c') {
-            bent_inverse_commit(&inverse, sample->argument);
-        } else if (!bent_selftest_same(bent_inverse_step(&inverse, sample->argument), sample->answer)) {
+            bent_inverse_commit(&bent_selftest_instance.inverse, sample->argument);
+        } else if (!bent_selftest_same(
+                       bent_inverse_step(&bent_selftest_instance.inverse, sample->argument), sample->answer)) {
             return index + 1;
         }
-        if (bent_inverse_status(&inverse) != sample->status) {
+        if (bent_inverse_status(&bent_selftest_instance.inverse) != sample->status) {
             return index + 1;
         }
         ++index;

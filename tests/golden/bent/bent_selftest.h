@@ -5,6 +5,8 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
+ *
+ * Cost (32-bit target): 11616 bytes of constants, 104 bytes of RAM for its own instance
  */
 #ifndef BENT_SELFTEST_H
 #define BENT_SELFTEST_H
@@ -13,7 +15,8 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not. */
+/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not.
+   Its instance is static: one call at a time. */
 int bent_selftest(void);
 
 #ifdef __cplusplus

@@ -18,6 +18,7 @@
  *     constant tables   2042 bytes
  *     inverse instance  192 bytes of RAM
  *     inverse step, worst case: 18 multiplications of 32 by 32 bits, 58 comparisons (46 + 4 b, b = 3 the bits of n)
+ * On an 8-bit AVR constants lie in RAM too: at most 2194 bytes of RAM in all, 36 of them for each play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0.

@@ -18,6 +18,9 @@ typedef struct {
     unsigned int status;
 } curved_selftest_sample_t;
 
+/* Too large for some stacks. */
+static curved_inverse_t curved_selftest_instance;
+
 static bool curved_selftest_same(curved_real_t a, curved_real_t b)
 {
     const unsigned char *x = (const unsigned char *)&a;
@@ -223,18 +226,18 @@ int curved_selftest(void)
 {
     int index = 0;
     unsigned int i;
-    curved_inverse_t inverse;
-    curved_inverse_init(&inverse);
+    curved_inverse_init(&curved_selftest_instance);
     for (i = 0; i < 185u; ++i) {
         const curved_selftest_sample_t *sample = &curved_selftest_inverse[i];
         if (sample->kind == 'r') {
-            curved_inverse_reset(&inverse, sample->argument);
+            curved_inverse_reset(&curved_selftest_instance, sample->argument);
         } else if (sample->kind == 'c') {
-            curved_inverse_commit(&inverse, sample->argument);
-        } else if (!curved_selftest_same(curved_inverse_step(&inverse, sample->argument), sample->answer)) {
+            curved_inverse_commit(&curved_selftest_instance, sample->argument);
+        } else if (!curved_selftest_same(
+                       curved_inverse_step(&curved_selftest_instance, sample->argument), sample->answer)) {
             return index + 1;
         }
-        if (curved_inverse_status(&inverse) != sample->status) {
+        if (curved_inverse_status(&curved_selftest_instance) != sample->status) {
             return index + 1;
         }
         ++index;

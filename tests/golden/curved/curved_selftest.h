@@ -5,6 +5,9 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
+ *
+ * Cost (32-bit target): 2220 bytes of constants, 192 bytes of RAM for its own instance
+ * On an 8-bit AVR constants lie in RAM too: 1465 bytes of RAM in all
  */
 #ifndef CURVED_SELFTEST_H
 #define CURVED_SELFTEST_H
@@ -13,7 +16,8 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not. */
+/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not.
+   Its instance is static: one call at a time. */
 int curved_selftest(void);
 
 #ifdef __cplusplus

@@ -12,6 +12,7 @@
  *     constant tables   152 bytes
  *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 7 multiplications, 51 comparisons (39 + 4 b, b = 3 the bits of n)
+ * On an 8-bit AVR constants lie in RAM too: at most 318 bytes of RAM in all, 31 of them for each play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Not for targets that flush denormal numbers to zero

@@ -18,6 +18,9 @@ typedef struct {
     unsigned int status;
 } plain_selftest_sample_t;
 
+/* Too large for some stacks. */
+static plain_inverse_t plain_selftest_instance;
+
 static bool plain_selftest_same(plain_real_t a, plain_real_t b)
 {
     const unsigned char *x = (const unsigned char *)&a;
@@ -223,18 +226,18 @@ int plain_selftest(void)
 {
     int index = 0;
     unsigned int i;
-    plain_inverse_t inverse;
-    plain_inverse_init(&inverse);
+    plain_inverse_init(&plain_selftest_instance);
     for (i = 0; i < 185u; ++i) {
         const plain_selftest_sample_t *sample = &plain_selftest_inverse[i];
         if (sample->kind == 'r') {
-            plain_inverse_reset(&inverse, sample->argument);
+            plain_inverse_reset(&plain_selftest_instance, sample->argument);
         } else if (sample->kind == 'c') {
-            plain_inverse_commit(&inverse, sample->argument);
-        } else if (!plain_selftest_same(plain_inverse_step(&inverse, sample->argument), sample->answer)) {
+            plain_inverse_commit(&plain_selftest_instance, sample->argument);
+        } else if (!plain_selftest_same(
+                       plain_inverse_step(&plain_selftest_instance, sample->argument), sample->answer)) {
             return index + 1;
         }
-        if (plain_inverse_status(&inverse) != sample->status) {
+        if (plain_inverse_status(&plain_selftest_instance) != sample->status) {
             return index + 1;
         }
         ++index;

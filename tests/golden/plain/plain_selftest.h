@@ -5,6 +5,9 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
+ *
+ * Cost (32-bit target): 2960 bytes of constants, 200 bytes of RAM for its own instance
+ * On an 8-bit AVR constants lie in RAM too: 2215 bytes of RAM in all
  */
 #ifndef PLAIN_SELFTEST_H
 #define PLAIN_SELFTEST_H
@@ -13,7 +16,8 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not. */
+/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not.
+   Its instance is static: one call at a time. */
 int plain_selftest(void);
 
 #ifdef __cplusplus

@@ -12,6 +12,7 @@
  *     constant tables   748 bytes
  *     inverse instance  184 bytes of RAM
  *     inverse step, worst case: 12 multiplications, 61 comparisons (49 + 4 b, b = 3 the bits of n), 1 tanh, 2 atanh
+ * On an 8-bit AVR constants lie in RAM too: at most 901 bytes of RAM in all, 31 of them for each play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start memory of
  * the parameter file; reset starts again from plays at 0. Define TWO_BRANCHES_IMPLEMENTATION in one C file

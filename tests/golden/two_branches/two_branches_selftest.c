@@ -18,6 +18,9 @@ typedef struct {
     unsigned int status;
 } two_branches_selftest_sample_t;
 
+/* Too large for some stacks. */
+static two_branches_inverse_t two_branches_selftest_instance;
+
 static bool two_branches_selftest_same(two_branches_real_t a, two_branches_real_t b)
 {
     const unsigned char *x = (const unsigned char *)&a;
@@ -223,18 +226,18 @@ int two_branches_selftest(void)
 {
     int index = 0;
     unsigned int i;
-    two_branches_inverse_t inverse;
-    two_branches_inverse_init(&inverse);
+    two_branches_inverse_init(&two_branches_selftest_instance);
     for (i = 0; i < 185u; ++i) {
         const two_branches_selftest_sample_t *sample = &two_branches_selftest_inverse[i];
         if (sample->kind == 'r') {
-            two_branches_inverse_reset(&inverse, sample->argument);
+            two_branches_inverse_reset(&two_branches_selftest_instance, sample->argument);
         } else if (sample->kind == 'c') {
-            two_branches_inverse_commit(&inverse, sample->argument);
-        } else if (!two_branches_selftest_same(two_branches_inverse_step(&inverse, sample->argument), sample->answer)) {
+            two_branches_inverse_commit(&two_branches_selftest_instance, sample->argument);
+        } else if (!two_branches_selftest_same(
+                       two_branches_inverse_step(&two_branches_selftest_instance, sample->argument), sample->answer)) {
             return index + 1;
         }
-        if (two_branches_inverse_status(&inverse) != sample->status) {
+        if (two_branches_inverse_status(&two_branches_selftest_instance) != sample->status) {
             return index + 1;
         }
         ++index;

@@ -5,6 +5,9 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
+ *
+ * Cost (32-bit target): 2960 bytes of constants, 184 bytes of RAM for its own instance
+ * On an 8-bit AVR constants lie in RAM too: 2202 bytes of RAM in all
  */
 #ifndef TWO_BRANCHES_SELFTEST_H
 #define TWO_BRANCHES_SELFTEST_H
@@ -13,7 +16,8 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not. */
+/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the first that has not.
+   Its instance is static: one call at a time. */
 int two_branches_selftest(void);
 
 #ifdef __cplusplus
