@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,11 +20,15 @@ from hystgen.problems import EffectsError, UnsupportedEffectsError
 
 if TYPE_CHECKING:
     from hystgen.effects import Chain, Effect, Run
+    from hystgen.emission import stale
     from hystgen.emission.module import Options
     from hystgen.fixed import FixedTables
     from hystgen.identification.fit import Fit, Source
     from hystgen.reference import Tables
     from hystgen.simulation import Session
+
+
+Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -218,6 +222,11 @@ def as_model(source: Model | str | os.PathLike[str]) -> Model:
     return source if isinstance(source, Model) else load(source)
 
 
+def _models(source: Sources) -> list[Model]:
+    """The models of one source or several."""
+    return [as_model(each) for each in ([source] if isinstance(source, Model | str | os.PathLike) else source)]
+
+
 def emit_options(
     model: Model,
     operator: str | None = None,
@@ -242,35 +251,57 @@ def emit_options(
     return module.Options(operator, arithmetic, model.engine(engine, operator, arithmetic), layout)
 
 
-def emitted_files(source: Model | str | os.PathLike[str], **options: str | None) -> dict[str, str]:
-    """Names and text of the C files of a model; options as for `emit`. Nothing is written."""
+def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
+    """Names and text of the C files of a model, or of several; options as for `emit`. Nothing is written.
+
+    Raises what `emit` raises, and ValueError where two models make files of one name.
+    """
     from hystgen.emission import module
 
-    model = as_model(source)
-    return module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+    models = _models(source)
+    check_names(models)
+    made: dict[str, str] = {}
+    for model in models:
+        made |= module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+    return made
 
 
-def emit(
-    source: Model | str | os.PathLike[str], output: str | os.PathLike[str] = ".", **options: str | None
-) -> list[Path]:
-    """Write the C files of a model (or parameter file) into folder `output` and return their paths.
+def check_names(models: Sequence[Model]) -> None:
+    """Raise ValueError where two models make files of one name."""
+    names = [model.name.lower() for model in models]  # as some file systems and all macros see them
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"two models are called {twice[0]}, their files would overwrite each other; rename one")
+
+
+def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[Path]:
+    """Write the C files of a model (or parameter file), or of several, into folder `output` and return their paths.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
-    Raises ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError; then nothing is written.
+    Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
+    FormatError and UnsupportedEffectsError; then nothing is written.
     """
     from hystgen.emission import files
 
     return files.write(Path(output), emitted_files(source, **options))
 
 
-def differences(
-    source: Model | str | os.PathLike[str], output: str | os.PathLike[str] = ".", **options: str | None
-) -> list[str]:
-    """What in folder `output` is missing or differs from what `emit` would write, one sentence a file."""
-    from hystgen.emission import files
+def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[str]:
+    """What in folder `output` is missing or other than what `emit` would write, one sentence a file.
 
-    return files.differences(Path(output), emitted_files(source, **options))
+    The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
+    """
+    return [each.sentence() for each in stale_files(source, output, **options)]
+
+
+def stale_files(
+    source: Sources, output: str | os.PathLike[str] = ".", **options: str | None
+) -> list[stale.Difference]:
+    """The differences behind the sentences of `differences`."""
+    from hystgen.emission import stale
+
+    return stale.find(Path(output), emitted_files(source, **options))
 
 
 def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:

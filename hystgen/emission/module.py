@@ -12,13 +12,13 @@ from typing import Any
 import jinja2
 
 import hystgen
-from hystgen.emission import cost, numbers, runtime, selftest
+from hystgen.emission import banner, cost, numbers, runtime, selftest
 from hystgen.models import Cascade, NotInvertibleError, TanhEnvelope
 from hystgen.names import comment_text
 from hystgen.params import Parameters, parameters_sha256
 
-LAYOUTS = ("self-contained", "shared-runtime", "single-header")
-OPERATORS = ("inverse", "forward", "both")
+LAYOUTS = banner.OPTIONS["layout"]
+OPERATORS = banner.OPTIONS["operator"]
 LICENCE_WIDTH = 100
 
 
@@ -91,9 +91,9 @@ def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[st
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        banner = _banner(values, file, about, details)
-        made[file] = render(f"selftest{ending}.j2", values, banner=banner, operators=operators)
-    return {file: _tidy(text) for file, text in made.items()}
+        top = _banner(values, file, about, details)
+        made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
+    return {file: banner.seal(_tidy(text)) for file, text in made.items()}
 
 
 def _tables(values: SimpleNamespace) -> str:
@@ -201,10 +201,7 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
 
 
 def _command(name: str, options: Options) -> str:
-    return (
-        f"hystgen emit {name}.yaml --operator {options.operator} --arithmetic {options.arithmetic} "
-        f"--engine {options.engine} --layout {options.layout}"
-    )
+    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}"
 
 
 def _units(parameters: Parameters) -> SimpleNamespace:

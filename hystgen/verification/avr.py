@@ -85,8 +85,8 @@ def rows(
 def _too_large(board: Board, built: Built, size: Size) -> str:
     if built.ram <= board.ram:
         return (
-            f"the self-test does not fit: with the module it takes {built.with_selftest} of {board.ram} bytes of RAM, and "
-            f"{STACK} are for the stack; the module alone takes {built.ram}"
+            f"the self-test does not fit: with the module it takes {built.with_selftest} of {board.ram} bytes of RAM, "
+            f"and {STACK} are for the stack; the module alone takes {built.ram}"
         )
     fit = size.plays - -(-(built.ram - board.ram) // size.memory.play)
     return (
