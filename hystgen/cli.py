@@ -190,7 +190,7 @@ def verify(
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
     """
     from hystgen import verification
-    from hystgen.records import write_atomically
+    from hystgen.records import check_writable, write_atomically
 
     chosen = tuple(targets.split(","))
     for word in chosen:
@@ -200,6 +200,8 @@ def verify(
     for file in (json_file, junit_file):
         if file and not Path(file).resolve().parent.is_dir():
             raise _Failed(f"error: the folder of {file} does not exist", 2)
+        if file:
+            _shown(file, partial(check_writable, file))
     model = _load(params)
 
     def say(what: str) -> None:
@@ -427,22 +429,32 @@ def identify(
 
     def run() -> None:
         from hystgen import records
+        from hystgen.emission import files
+        from hystgen.identification import settings
         from hystgen.report import plots
 
+        for file in (output, plot):
+            if file:
+                records.check_writable(file)
         if plot:
             plots.check_path(plot)
         if report:
             pages.check_folder(report)
+            files.check(Path(report), pages.names())
+        older = settings.of(output)
         read = records.read_records([*data, *holdout], **how)
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],
-            name=name or identification.identifier_from(Path(output).stem),
+            name=name or older.name or identification.identifier_from(Path(output).stem),
             progress=True,
             **options,
         )
         for warning in fit.warnings:
             click.echo(f"warning: {warning}", err=True)
+        for sentence in older.sentences(fit):
+            click.echo(sentence, err=True)
+        fit = older.on(fit)
         fit.write(output)
         click.echo(fit.table())
         click.echo(output)

@@ -16,8 +16,11 @@ def check(folder: Path, names: Iterable[str]) -> None:
         around = around.parent
     if not around.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(around))
-    if not os.access(around, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(around))
+    try:
+        with tempfile.TemporaryFile(prefix=".hystgen-", dir=around):
+            pass
+    except OSError as failure:
+        raise OSError(failure.errno, failure.strerror, str(around)) from None
     for name in names:  # the one thing that could stop a replacement half-way
         if (folder / name).is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))

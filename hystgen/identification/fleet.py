@@ -17,7 +17,7 @@ import json
 import math
 import os
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,8 @@ import numpy as np
 import hystgen
 from hystgen import identification
 from hystgen.emission import files
-from hystgen.identification import outliers, workers
+from hystgen.identification import outliers, settings, workers
+from hystgen.identification.settings import Settings
 from hystgen.identification.workers import Result, Task
 from hystgen.progress import Progress
 from hystgen.records import FORMATS, Record, write_atomically
@@ -50,7 +51,8 @@ class Unit:
 
     `name`: C identifier of the model; `file`: its record; `done`, else `message` says in one line what failed;
     `figures`: see `FIGURES`; `outlier`: the figures by which the unit is unlike the rest, and how far; empty if it is
-    not; `sha256`: of records, options and tool version; `kept`: done by an earlier call.
+    not; `sha256`: of records, options, settings and tool version; `kept`: done by an earlier call; `settings`: keys
+    taken over from the parameter file that was there.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Unit:
     sha256: str
     outlier: str = ""
     kept: bool = False
+    settings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,10 @@ class Fleet:
         ]
         if not self.judged:
             lines.append(f"outliers are marked from {outliers.FEWEST} units on")
+        taken = [unit for unit in self.units if unit.settings and unit.done and not unit.kept]
+        if taken:
+            keys = ", ".join(dict.fromkeys(key for unit in taken for key in unit.settings))
+            lines.append(f"{keys} kept from the parameter files that were there, of {len(taken)} units")
         marked = [("failed", unit.name, unit.message) for unit in self.failed]
         marked += [("outlier", unit.name, unit.outlier) for unit in self.outliers]
         width = max((len(name) for _, name, _ in marked), default=0)
@@ -117,6 +124,7 @@ class _Job:
     unit: str
     file: str
     holdout: tuple[str, ...]
+    settings: Settings = field(default_factory=Settings)
     key: str = ""
 
 
@@ -144,7 +152,8 @@ def identify_batch(
 
     A unit that fails is a row with its message and stops no other; its older files stay. What is done is not done
     again by a later call, as long as record, options and tool version are the same and the files are as they were
-    written. A call that is interrupted leaves complete files only, and what it had done.
+    written. A call that is interrupted leaves complete files only, and what it had done. Of a parameter file that is
+    there and is written anew its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error far above the others (its logarithm,
     in %), or a gain (output range over drive range), width or p_0 far off; with fewer than 8 units that are done none
@@ -164,6 +173,8 @@ def identify_batch(
     with workers.cluster(scheduler) if scheduler is not None else contextlib.nullcontext() as client:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / KEPT_IN).mkdir(exist_ok=True)
+        files.check(folder, ["summary.csv"])
+        found = [replace(job, settings=settings.of(folder / f"{job.unit}.yaml")) for job in found]
         found = [_keyed(job, options, wanted) for job in found]
         rows = {job.unit: kept for job in found if (kept := _kept(folder, job)) is not None}
         todo = {job.unit: job for job in found if job.unit not in rows}
@@ -244,6 +255,8 @@ def _keyed(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | N
         "options": options,
         "emission": emission,
     }
+    if job.settings.values:
+        content["settings"] = job.settings.values
     text = json.dumps(content, sort_keys=True, default=lambda value: np.asarray(value).tolist())
     return replace(job, key=hashlib.sha256(text.encode()).hexdigest())
 
@@ -289,7 +302,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
             write_atomically(folder / KEPT_IN / f"{job.unit}.json", json.dumps(known, indent=1) + "\n")
     except OSError as failure:
         message = f"cannot be written: {failure}"
-    return Unit(job.unit, job.file, not message, message, result.figures, job.key)
+    return Unit(job.unit, job.file, not message, message, result.figures, job.key, settings=tuple(job.settings.values))
 
 
 # -- the work ---------------------------------------------------------------------------------------------------------
@@ -297,7 +310,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
 
 def _task(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | None] | None) -> Task:
     held = tuple((path, _bytes(path)) for path in job.holdout)
-    return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission)
+    return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission, job.settings)
 
 
 def _bytes(path: str) -> bytes | None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import hystgen
+from hystgen.identification.settings import Settings
 
 DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
 
@@ -35,7 +36,7 @@ class SchedulerError(OSError):
 class Task:
     """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and what is wanted.
 
-    `options`: of `identify`; `emission`: of `emit`, or None to leave it out.
+    `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
     """
 
     unit: str
@@ -43,6 +44,7 @@ class Task:
     holdout: tuple[tuple[str, bytes | None], ...]
     options: Mapping[str, Any]
     emission: Mapping[str, str | None] | None
+    settings: Settings = field(default_factory=Settings)
     version: str = hystgen.__version__
 
 
@@ -85,7 +87,7 @@ def fit_unit(task: Task) -> Result:
 def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
     from hystgen import api, identification
 
-    fit = identification.identify(records, holdout=holdout, name=task.unit, **task.options)
+    fit = task.settings.on(identification.identify(records, holdout=holdout, name=task.unit, **task.options))
     model = api.Model(fit.parameters)
     text, figures = fit.text(), _figures(fit, model)
     if task.emission is None:

@@ -26,7 +26,7 @@ from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
 from hystgen.records.repair import SHORTEST, repaired
 from hystgen.records.units import agreed_units, headers
-from hystgen.records.writing import columns_text, write_atomically, write_columns
+from hystgen.records.writing import check_writable, columns_text, write_atomically, write_columns
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -142,6 +142,7 @@ __all__ = [
     "Record",
     "RecordError",
     "agreed_units",
+    "check_writable",
     "columns_text",
     "headers",
     "parse_columns",
