@@ -538,6 +538,8 @@ def diagnose(
         for note in found.notes:
             click.echo(f"warning: {note}", err=True)
         click.echo(found.sentence())
+        if found.not_emitted():
+            click.echo(found.not_emitted(), err=True)
         for path in found.write(output):
             click.echo(str(path))
 

@@ -139,9 +139,8 @@ def test_what_cannot_be_written_is_found_before_the_fit(tmp_path: Path, run: Run
     """Exit code 2, and the place is named."""
     good = tmp_path / "a.yaml"
     for folder in unwritable(tmp_path):
-        for options in (
-            ("-o", folder / "a.yaml"), ("-o", good, "--plot", folder / "a.svg"), ("-o", good, "--report", folder / "fit"),
-        ):  # fmt: skip
+        plot, report = ("--plot", folder / "a.svg"), ("--report", folder / "fit")
+        for options in (("-o", folder / "a.yaml"), ("-o", good, *plot), ("-o", good, *report)):
             code, out, err = run("identify", RECORDING, *options)
             assert (code, out) == (2, ""), err
             assert str(folder) in err

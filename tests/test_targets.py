@@ -20,7 +20,7 @@ from click.testing import CliRunner
 from modelfiles import FILES, PLAYS
 
 import hystgen
-from hystgen import reference
+from hystgen import extras, reference
 from hystgen.api import Model, emit_options, emitted_files
 from hystgen.cli import main
 from hystgen.emission import module
@@ -363,7 +363,7 @@ def test_a_missing_wheel_is_a_failure_that_says_what_to_install(package: str, mo
     monkeypatch.setitem(sys.modules, package, None)
     report = hystgen.verify(model("plain"), targets=["cortex-m4f", "rv32imac"], target_length=100)
     assert [(row.target, row.ok) for row in report.rows] == [("cortex-m4f", False), ("rv32imac", False)]
-    assert report.table().count("pip install 'hystgen[targets]'") == 2
+    assert report.table().count(extras.install("targets")) == 2
 
 
 def test_missing_compilers_are_failures(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -371,7 +371,7 @@ def test_missing_compilers_are_failures(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(compilers, "find", lambda _: None)
     monkeypatch.setattr(shutil, "which", lambda _: None)
     by_default = hystgen.verify(model("plain"), targets=["cortex-m4f"], target_length=100)
-    assert [row.error for row in by_default.rows] == ["zig is not installed: pip install 'hystgen[targets]'"]
+    assert [row.error for row in by_default.rows] == [f"zig is not installed: {extras.install('targets')}"]
     asked = hystgen.verify(model("plain"), targets=["rv32imac"], compiler=["gcc", "clang"], target_length=100)
     assert [row.error for row in asked.rows] == ["riscv64-unknown-elf-gcc is not installed"]
     only = hystgen.verify(model("plain"), targets=["rv32imac"], compiler=["clang"], target_length=100)

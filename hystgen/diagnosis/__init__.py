@@ -105,6 +105,17 @@ class Diagnosis:
             return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
         return f"{missing}. The records are disturbed too: {first}{more}.{but}"
 
+    def not_emitted(self) -> str:
+        """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
+        from hystgen.api import Model, emit_options
+        from hystgen.problems import UnsupportedEffectsError
+
+        try:
+            emit_options(Model(self.parameters))
+        except UnsupportedEffectsError as error:
+            return str(error)
+        return ""
+
     def _name(self, name: str) -> str:
         """An effect with those that it cannot be told from."""
         others = [other for one, other in self.content["not_separable"] if one == name]

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import hystgen
+from hystgen import extras
 from hystgen.identification.settings import Settings
 
 DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
@@ -187,7 +188,7 @@ def cluster(address: str) -> Iterator[Any]:
         from distributed import Client
         from distributed.comm import get_address_host_port
     except ModuleNotFoundError:
-        raise SchedulerError("a scheduler needs Dask; install it with: pip install 'hystgen[fleet]'") from None
+        raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
     try:
         get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
         client = Client(address, timeout=PATIENCE, set_as_default=False)
