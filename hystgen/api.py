@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import tables
+from hystgen import arguments, tables
 from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, Stage, TanhEnvelope
 from hystgen.params import Parameters, load_parameters
 from hystgen.problems import EffectsError, UnsupportedEffectsError
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from hystgen.emission import stale
     from hystgen.emission.module import Options
     from hystgen.fixed import FixedTables
-    from hystgen.identification.fit import Fit, Source
+    from hystgen.identification.fit import Fit
+    from hystgen.records import Source
     from hystgen.reference import Tables
     from hystgen.simulation import Session
 
@@ -147,14 +148,18 @@ class Model:
         """A record as `chain.simulate` takes it; arguments as for `simulate`, `rest` in seconds before it."""
         from hystgen.effects import Run
 
-        drive = np.array(v, dtype=np.float64)
+        drive = np.array(arguments.signal("v", v), dtype=np.float64)
         low, high = self.cascade.input_range
         period = self.parameters.sample_time or 1.0
         if t is None and self.parameters.sample_time is None and any(effect.timed for effect in self.effects):
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects if effect.timed))
             raise EffectsError(f"the effects ({names}) need time; give t, or sample_time in the parameter file")
-        times = np.array(np.arange(len(drive)) * period if t is None else t, dtype=np.float64)
-        columns = {name: np.array(values, dtype=np.float64) for name, values in (extra or {}).items()}
+        times = np.array(np.arange(len(drive)) * period if t is None else arguments.signal("t", t), dtype=np.float64)
+        if not isinstance(extra or {}, Mapping):
+            raise TypeError(f"extra is a mapping of names to arrays, not {arguments.kind(extra)}")
+        columns = {
+            name: np.array(arguments.signal(name, values), dtype=np.float64) for name, values in (extra or {}).items()
+        }
         for name, values in (("v", drive), ("t", times), *columns.items()):
             if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
                 raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one a sample of v")
@@ -192,6 +197,7 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
     Raises ParameterError with every problem in the file, EffectsError for a file of effects that cannot be used; warns
     of a start memory that had to be projected.
     """
+    path = arguments.path("the parameter file", path)
     model = Model(load_parameters(path, _own_effects(effects)))
     if model.cascade.pi.projected:
         warnings.warn(
@@ -205,9 +211,11 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
 def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
     from hystgen.effects.user import load_user_effects
 
+    if isinstance(sources, str | os.PathLike) or not isinstance(sources, Iterable):
+        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect.py']")
     found: list[type[Effect]] = []
     for source in sources:
-        found += [source] if isinstance(source, type) else load_user_effects(source)
+        found += [source] if isinstance(source, type) else load_user_effects(arguments.path("effects", source))
     return found
 
 
@@ -219,12 +227,16 @@ def check_arithmetic(arithmetic: str) -> None:
 
 def as_model(source: Model | str | os.PathLike[str]) -> Model:
     """The model, or that of a parameter file. Raises ParameterError, and TypeError for what is neither."""
+    if not isinstance(source, Model | str | os.PathLike):
+        raise TypeError(f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}")
     return source if isinstance(source, Model) else load(source)
 
 
 def _models(source: Sources) -> list[Model]:
     """The models of one source or several."""
-    return [as_model(each) for each in ([source] if isinstance(source, Model | str | os.PathLike) else source)]
+    if isinstance(source, list | tuple | Iterator):
+        return [as_model(each) for each in source]
+    return [as_model(source)]  # type: ignore[arg-type]
 
 
 def emit_options(
@@ -241,13 +253,9 @@ def emit_options(
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
     check_arithmetic(arithmetic)
-    for value, known, what in (
-        (operator, module.OPERATORS, "operator"),
-        (engine or "auto", ("auto", *tables.ENGINES), "engine"),
-        (layout, module.LAYOUTS, "layout"),
-    ):
-        if value not in known:
-            raise ValueError(f"{what} {value!r} is none of {', '.join(known)}")
+    arguments.choice("operator", operator, module.OPERATORS)
+    arguments.choice("engine", engine or "auto", ("auto", *tables.ENGINES))
+    arguments.choice("layout", layout, module.LAYOUTS)
     return module.Options(operator, arithmetic, model.engine(engine, operator, arithmetic), layout)
 
 
@@ -258,6 +266,7 @@ def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
     """
     from hystgen.emission import module
 
+    arguments.known_options("emit", emit_options, options)
     models = _models(source)
     check_names(models)
     made: dict[str, str] = {}
@@ -284,7 +293,7 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str |
     """
     from hystgen.emission import files
 
-    return files.write(Path(output), emitted_files(source, **options))
+    return files.write(Path(arguments.path("output", output)), emitted_files(source, **options))
 
 
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[str]:
@@ -301,13 +310,14 @@ def stale_files(
     """The differences behind the sentences of `differences`."""
     from hystgen.emission import stale
 
-    return stale.find(Path(output), emitted_files(source, **options))
+    return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))
 
 
 def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:
     """Compile a model's C, run it and compare it with the bit reference; see `hystgen.verification.verify_model`."""
     from hystgen import verification
 
+    arguments.known_options("verify", verification.verify_model, options)
     return verification.verify_model(as_model(source), **options)
 
 
@@ -315,6 +325,7 @@ def diagnose(source: Model | str | os.PathLike[str], records: Any, **options: An
     """Find what a believed model is missing; see `hystgen.diagnosis.diagnose`."""
     from hystgen import diagnosis
 
+    arguments.known_options("diagnose", diagnosis.diagnose, options)
     return diagnosis.diagnose(source, records, **options)
 
 
@@ -322,6 +333,7 @@ def plan(source: Model | str | os.PathLike[str], **options: Any) -> Any:
     """Drive records to measure for a diagnosis; see `hystgen.diagnosis.plan.plan`."""
     from hystgen.diagnosis import plan as drives
 
+    arguments.known_options("plan", drives.plan, options)
     return drives.plan(source, **options)
 
 
@@ -329,6 +341,7 @@ def identify(records: Any, **options: Any) -> Any:
     """Fit a model to measured records; see `hystgen.identification.identify`."""
     from hystgen import identification
 
+    arguments.known_options("identify", identification.identify, options)
     return identification.identify(records, **options)
 
 
@@ -336,7 +349,7 @@ def identify_batch(sources: Any, output: str | os.PathLike[str], **options: Any)
     """Fit and emit many units in parallel; see `hystgen.identification.fleet.identify_batch`."""
     from hystgen.identification import fleet
 
-    return fleet.identify_batch(sources, output, **options)
+    return fleet.identify_batch(sources, arguments.path("output", output), **options)
 
 
 def report_fit(
@@ -351,10 +364,12 @@ def report_fit(
     has to come as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError
     for other records, RecordError, OSError.
     """
-    from hystgen.identification import several
-    from hystgen.records import read_records
+    from hystgen.identification import Fit
+    from hystgen.records import read_records, several
     from hystgen.report import identification
 
+    if not isinstance(fit, Fit):
+        raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
     return identification.write(fit, read_records([*several(records), *several(holdout)]), folder)
 
 

@@ -24,13 +24,13 @@ from typing import Any
 import numpy as np
 
 import hystgen
-from hystgen import identification
+from hystgen import api, arguments, identification
 from hystgen.emission import files
 from hystgen.identification import outliers, settings, workers
 from hystgen.identification.settings import Settings
 from hystgen.identification.workers import Result, Task
 from hystgen.progress import Progress
-from hystgen.records import FORMATS, Record, write_atomically
+from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", *FORMATS)
 """Files that are taken from a folder."""
@@ -162,8 +162,10 @@ def identify_batch(
     """
     options = _complete(options)
     identification.check_options(**options)
-    if jobs is not None and jobs < 1:
-        raise ValueError(f"jobs is a number of processes from 1 on, not {jobs}")
+    if jobs is not None:
+        arguments.whole("jobs", jobs, "processes", 1)
+    if emission is not None:
+        arguments.known_options("emission of identify_batch", api.emit_options, emission)
     patterns = [holdout] if isinstance(holdout, str) else list(holdout)
     found = _jobs(sources, patterns)
     folder = Path(output)
@@ -194,6 +196,7 @@ def identify_batch(
 def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
     """All options of `identify` that are the same for every unit, its defaults for those not given."""
     own = {"holdout": (), "name": "", "progress": False}
+    arguments.known_options("identify_batch", identification.identify, options)
     bound = inspect.signature(identification.identify).bind((), **own, **options)
     bound.apply_defaults()
     return {name: value for name, value in bound.arguments.items() if name not in ("records", *own)}
@@ -209,8 +212,11 @@ def _jobs(
     for pattern in patterns:
         if "{unit}" not in pattern:
             raise ValueError(f"holdout {pattern!r} would be that of every unit; write {{unit}} for the unit's name")
-    given = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
-    paths = {path.resolve(): path for source in given for path in _expanded(os.fspath(source))}
+    paths: dict[Path, Path] = {}
+    for source in several(sources):
+        if isinstance(source, Record):
+            raise TypeError("a fleet is made of files, not of records in memory; fit those with hystgen.identify")
+        paths |= {path.resolve(): path for path in _expanded(os.fspath(source))}
     jobs = []
     for path in paths.values():
         held = tuple(pattern.replace("{unit}", path.stem) for pattern in patterns)

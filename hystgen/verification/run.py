@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from hystgen import arguments
 from hystgen.api import Model, emit_options
 from hystgen.emission import module
 from hystgen.verification import avr, cores, host, sources
@@ -36,13 +37,17 @@ def verify_model(
     the emitted self-test alone. What is named twice is done once. A compiler or target that is asked for and missing is
     a failed row. Raises what `emit` raises, and ValueError for a target that does not exist.
     """
+    compiler = tuple(dict.fromkeys(arguments.words("compiler", compiler, "gcc")))
+    targets = tuple(dict.fromkeys(arguments.words("targets", targets, HOST)))
+    arguments.whole("length", length, "calls", 1)
+    if target_length is not None:
+        arguments.whole("target_length", target_length, "calls", 1)
     options = emit_options(model, operator, arithmetic, engine, layout)
     numbers = model.tables(options.arithmetic, options.engine)
     real = REALS[options.arithmetic]
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
-    chosen = [known[name] if name in known else find(name) for name in dict.fromkeys(targets)]
-    compiler = tuple(dict.fromkeys(compiler))
+    chosen = [known[name] if name in known else find(name) for name in targets]
 
     @functools.cache
     def records(length: int, op: str) -> list[Expected]:
