@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -119,6 +120,7 @@ def test_a_fleet_keeps_them_too(tmp_path: Path, run: Run) -> None:
 def no_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fails where a record is fitted."""
 
+    @functools.wraps(identification.identify)
     def identify(*_: object, **__: object) -> None:
         raise AssertionError("fitted first")
 
@@ -148,6 +150,6 @@ def test_what_cannot_be_written_is_found_before_the_fit(tmp_path: Path, run: Run
         assert code == 2, err
     code, _, err = run("identify", RECORDING, "-o", tmp_path / "no" / "such" / "a.yaml")
     assert code == 2
-    assert "the folder does not exist; make it first" in err
+    assert "make the folder of this file first" in err
     assert not good.exists()
     assert not (tmp_path / "no").exists()

@@ -68,7 +68,8 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     if target.exists() and not target.is_file():
         return
     if not target.parent.is_dir():
-        raise FileNotFoundError(f"{os.fspath(path)}: the folder does not exist; make it first")
+        reason = os.strerror(errno.ENOENT)
+        raise FileNotFoundError(f"make the folder of this file first: {reason}: {os.fspath(path)!r}")
     try:
         with tempfile.TemporaryFile(prefix=".hystgen-", dir=target.parent):
             pass
