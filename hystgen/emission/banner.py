@@ -6,6 +6,8 @@ import hashlib
 import re
 from dataclasses import dataclass
 
+from hystgen.problems import printable
+
 OPTIONS = {
     "operator": ("inverse", "forward", "both"),
     "arithmetic": ("float32", "float64", "q31", "q15"),
@@ -46,7 +48,7 @@ def read(text: str) -> Banner | None:
     given = re.findall(r" --(\w+) (\S+)", generated[2])
     options = {key: value for key, value in given if value in OPTIONS.get(key, ())}
     edited = sealed is not None and _hash(_SEAL.sub("", text, count=1)) != sealed[1]
-    return Banner(generated[1], options, parameters[1], edited)
+    return Banner(printable(generated[1]), options, parameters[1], edited)
 
 
 def _hash(text: str) -> str:

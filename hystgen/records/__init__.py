@@ -76,7 +76,7 @@ def read_records(
         for source in everything:
             try:
                 if isinstance(source, Record):
-                    check_arrays(source)
+                    _check_arrays(source)
                 else:
                     source = _read(arguments.path("a record", source), columns, sample_time, delimiter, need, bar.tick)
                 found.append(source)
@@ -135,7 +135,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
         raise TypeError(f"delimiter is a character such as ';', not {arguments.kind(delimiter)}")
 
 
-def check_arrays(record: Record) -> None:
+def _check_arrays(record: Record) -> None:
     """Raise ValueError or TypeError for a record made of arrays that are none, or not of one dimension."""
     if not isinstance(record.name, str):
         raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
