@@ -9,7 +9,7 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
-.PHONY: demo test prove lint fuzz blind clean
+.PHONY: demo test prove lint fuzz check-bounds blind clean
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -42,6 +42,10 @@ lint: $(VENV)/ready
 # Ten modules, five minutes each
 fuzz: $(VENV)/ready
 	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
+
+# Ten times the random models of `make test`, against an exact model; those with faults are kept in build/oracle
+check-bounds: $(VENV)/ready
+	$(BIN)/python -m tests.oracle --models 3000
 
 # Makes the cases with their labels, has them diagnosed and counts; a case whose result is there is not run again
 blind: $(VENV)/ready

@@ -1,0 +1,128 @@
+"""Stated error bounds, limits and status bits of the compiled C against an exact model that shares nothing with it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from modelfiles import FILES
+
+from tests.oracle import check, models
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*initial_state cannot have come:UserWarning")
+
+MODELS = int(os.environ.get("HYSTGEN_ORACLE_MODELS", "300"))
+"""Random models of a run; `make check-bounds` takes more."""
+
+KEPT = Path("build/oracle")
+EACH = pytest.mark.parametrize(("arithmetic", "engine"), check.COMBINATIONS)
+
+
+@EACH
+def test_random_models_keep_their_bounds(arithmetic: str, engine: str) -> None:
+    count = -(-MODELS // len(check.COMBINATIONS))
+    first = 10_000 * check.COMBINATIONS.index((arithmetic, engine))
+    tallies, faults = check.run(count, first, ((arithmetic, engine),))
+    tally = tallies[arithmetic, engine]
+    assert not faults, "\n".join(check.keep(faults, KEPT))
+    assert tally.models == count
+    assert tally.refused <= 0.4 * count
+    assert tally.inverses >= 0.8 * count
+    assert tally.samples == check.CALLS * (tally.models + tally.inverses)
+
+
+@EACH
+def test_a_bound_that_is_too_small_is_noticed(arithmetic: str, engine: str, tmp_path: Path) -> None:
+    case = check.emit(check.Case("plain", FILES["plain"], arithmetic, engine, 1), tmp_path)
+    assert case
+    found = list(check.follow([case], tmp_path))
+    worst = min(finding.result.worst for finding in found)
+    assert 0 < worst <= 1
+    assert not any(finding.result.faults for finding in check.follow([case], tmp_path, shrink=1.001))
+    for finding in check.follow([case], tmp_path, shrink=0.999 * worst):
+        assert finding.result.faults > 0
+        assert "times the bound" in finding.result.message.decode()
+
+
+# What goes wrong: the operator that shows it, a pattern in the emitted C, the text in its place
+CHANGES = {
+    "a pending drive is forgotten": ("inverse", r"above_inverse_see\(self, self->pending\);", ";"),
+    "a commit is not limited": ("inverse", r"v = above_clamp_drive\(applied\)", "v = applied"),
+    "a commit does not count": ("inverse", r"(_inverse_commit\(above_inverse_t \*self[^{;]*\{)", r"\1 return;"),
+    "a limited drive has no bit": ("inverse", r"\|= ABOVE_STATUS_OUTPUT_CLAMPED", "|= 0u"),
+    "a limited reference has no bit": ("inverse", r"= ABOVE_STATUS_INPUT_CLAMPED;", "= 0u;"),
+    "a limited input has no bit": ("forward", r"\|= ABOVE_STATUS_INPUT_CLAMPED", "|= 0u"),
+    "a limit lies elsewhere": ("forward", r"v = ABOVE_DRIVE_MIN;", "v = (above_real_t)(ABOVE_DRIVE_MAX / 2);"),
+    "an output lies elsewhere": ("forward", r"(self->answer = [^;]*);", r"\1 + 2;"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+def test_a_fault_in_the_c_is_noticed(change: str, arithmetic: str, tmp_path: Path) -> None:
+    operator, old, new = CHANGES[change]
+    case = check.emit(check.Case("above", FILES["above"], arithmetic, "loop", 1), tmp_path)
+    assert case
+    path = tmp_path / "above.c"
+    text, count = re.subn(old, new, path.read_text())
+    assert count
+    path.write_text(text)
+    found = {finding.operator: finding.result for finding in check.follow([case], tmp_path)}
+    assert found[operator].faults > 0
+
+
+@pytest.mark.parametrize("limit", ["DRIVE_MIN", "DRIVE_MAX", "OUTPUT_MIN", "OUTPUT_MAX"])
+@pytest.mark.parametrize("by", [-1, 1])
+def test_a_limit_that_is_a_code_off_is_noticed(limit: str, by: int, tmp_path: Path) -> None:
+    case = check.emit(check.Case("above", FILES["above"], "q15", "corners", 1), tmp_path)
+    assert case
+    path = tmp_path / "above.h"
+    text, count = re.subn(rf"(#define ABOVE_{limit}) (\S+)", rf"\1 (\2 + {by})", path.read_text())
+    assert count == 1
+    path.write_text(text)
+    assert all(limit in finding.result.message.decode() for finding in check.follow([case], tmp_path))
+
+
+def test_models_are_of_every_kind() -> None:
+    kinds: Counter[str] = Counter()
+    for seed in range(400):
+        arithmetic = check.COMBINATIONS[seed % len(check.COMBINATIONS)][0]
+        data = models.parameters(np.random.default_rng([seed, 0]), arithmetic, "m")
+        pi, (low, high) = data["model"]["pi"], data["input_range"]
+        stages = data["model"].get("memoryless", [])
+        stages = stages if isinstance(stages, list) else [stages]
+        weights = [p for p in pi["weights"] if p]
+        kinds["twelve decades"] += max(weights) / min(weights) > 1e10
+        kinds["a weight of 0"] += 0.0 in pi["weights"][1:]
+        kinds["small p0"] += 0 < pi["weights"][0] < 1e-5 * sum(weights)
+        kinds["close thresholds"] += bool(
+            np.any(np.diff(pi["thresholds"]) < 1e-6 * np.max(pi["thresholds"], initial=0))
+        )
+        kinds["wide thresholds"] += not stages and pi["thresholds"][-1] > high - low
+        kinds["many plays"] += len(pi["weights"]) > 60
+        kinds["no play"] += len(pi["weights"]) == 1
+        kinds["start list"] += isinstance(pi.get("initial_state"), list)
+        start = pi.get("initial_state", low)
+        kinds["start outside"] += not stages and isinstance(start, float) and not low <= start <= high
+        kinds["0 outside"] += not low <= 0 <= high
+        kinds["40 breaks"] += any(len(stage.get("thresholds", ())) >= 40 for stage in stages)
+        kinds["two branches"] += any("descending" in stage for stage in stages)
+        kinds["two stages"] += len(stages) > 1
+        kinds["offset"] += "output_offset" in data["model"]
+        kinds["small unit"] += high - low < 1e-6
+        kinds["large unit"] += high - low > 1e6
+    assert min(kinds.values()) >= 4, kinds
+
+
+def test_numbers_are_read_without_the_package() -> None:
+    model = check.model_of(FILES["mixed"])
+    assert (model.n, model.listed, model.stages, model.low, model.high) == (6, 0, 2, -2.0, 2.0)
+    assert model.threshold[:3] == [0.0, 0.45, 0.9]
+    assert model.stage[0].count == 4
+    assert list(model.stage[1].a) == [6.0, 0.1, 0.1, 0.2, 6.0, 0.1, 0.1, 0.5]
+    names = (check.HERE / "oracle.c").read_text()
+    assert set(re.findall(r'#include "(.*)"', names)) == {"oracle.h"}
