@@ -6,10 +6,10 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -94,34 +94,81 @@ def main() -> None:
 
 
 @main.command()
-@params_argument
+@click.argument("params", nargs=-1, required=True, type=click.Path())
 @click.option("-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to")
 @operator_option
 @arithmetic_option
 @engine_option
 @layout_option
-@click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs")
+@click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
-def emit(params: str, output: str, check: bool, list_outputs: bool, **options: str | None) -> None:
-    """Write the C files of a model.
+def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, **options: str | None) -> None:
+    """Write the C files of models.
 
-    Example: hystgen emit stage_x.yaml -o firmware/ --operator inverse --arithmetic float32
+    Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
     """
     from hystgen import api
+    from hystgen.emission import files
 
-    model = _load(params)
+    params = tuple(dict.fromkeys(params))
+    models = _each(params, _load)
+    _shown(output, lambda: api.check_names(models))
+    named = list(zip(params, models, strict=True))
+    texts = _each(named, lambda one: _shown(one[0], lambda: api.emitted_files(one[1], **options)))
+    made = {name: text for each in texts for name, text in each.items()}
     if check:
-        problems = _shown(params, lambda: api.differences(model, output, **options))
-        if problems:
-            raise _Failed("\n".join(f"error: {problem}; run hystgen emit again" for problem in problems), 1)
-        return
-    if list_outputs:
-        names = _shown(params, lambda: api.emitted_files(model, **options))
-        for name in names:
+        _check(named, output, options)
+    elif list_outputs:
+        for name in made:
             click.echo(str(Path(output) / name))
-        return
-    for path in _shown(params, lambda: api.emit(model, output, **options)):
-        click.echo(str(path))
+    else:
+        for path in _shown(output, lambda: files.write(Path(output), made)):
+            click.echo(str(path))
+
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+
+def _each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
+    """What `action` gives for every item. Raises _Failed with all messages and the higher one of the exit codes."""
+    made, failures = [], []
+    for item in items:
+        try:
+            made.append(action(item))
+        except _Failed as failure:
+            failures.append(failure)
+    if failures:
+        messages = dict.fromkeys(failure.message for failure in failures)
+        raise _Failed("\n".join(messages), max(failure.exit_code for failure in failures))
+    return made
+
+
+def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, str | None]) -> None:
+    """Exit code 1 with the differences of files on disk, and the commands that fit."""
+    from dataclasses import asdict
+
+    from hystgen import api
+    from hystgen.emission import stale
+
+    problems, advice = [], []
+    for path, model in models:
+        found = _shown(path, partial(api.stale_files, model, output, **options))
+        if not found:
+            continue
+        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
+        wanted = asdict(api.emit_options(model, **options))  # type: ignore[arg-type]
+        problems += [f"error: {each.sentence()}" for each in found]
+
+        def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
+            try:
+                return api.stale_files(model, output, **other)
+            except ValueError:  # no such model any more
+                return list(found)
+
+        advice += stale.advice(found, path, output, given, wanted, again)
+    if problems:
+        raise _Failed("\n".join(dict.fromkeys([*problems, *advice])), 1)
 
 
 @main.command()
@@ -143,7 +190,7 @@ def verify(
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
     """
     from hystgen import verification
-    from hystgen.records import write_atomically
+    from hystgen.records import check_writable, write_atomically
 
     chosen = tuple(targets.split(","))
     for word in chosen:
@@ -153,6 +200,8 @@ def verify(
     for file in (json_file, junit_file):
         if file and not Path(file).resolve().parent.is_dir():
             raise _Failed(f"error: the folder of {file} does not exist", 2)
+        if file:
+            _shown(file, partial(check_writable, file))
     model = _load(params)
 
     def say(what: str) -> None:
@@ -380,22 +429,32 @@ def identify(
 
     def run() -> None:
         from hystgen import records
+        from hystgen.emission import files
+        from hystgen.identification import settings
         from hystgen.report import plots
 
+        for file in (output, plot):
+            if file:
+                records.check_writable(file)
         if plot:
             plots.check_path(plot)
         if report:
             pages.check_folder(report)
+            files.check(Path(report), pages.names())
+        older = settings.of(output)
         read = records.read_records([*data, *holdout], **how)
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],
-            name=name or identification.identifier_from(Path(output).stem),
+            name=name or older.name or identification.identifier_from(Path(output).stem),
             progress=True,
             **options,
         )
         for warning in fit.warnings:
             click.echo(f"warning: {warning}", err=True)
+        for sentence in older.sentences(fit):
+            click.echo(sentence, err=True)
+        fit = older.on(fit)
         fit.write(output)
         click.echo(fit.table())
         click.echo(output)
@@ -479,6 +538,8 @@ def diagnose(
         for note in found.notes:
             click.echo(f"warning: {note}", err=True)
         click.echo(found.sentence())
+        if found.not_emitted():
+            click.echo(found.not_emitted(), err=True)
         for path in found.write(output):
             click.echo(str(path))
 

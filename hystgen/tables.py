@@ -48,6 +48,8 @@ def choose_engine(engine: str, cascade: Cascade, operator: str, arithmetic: str)
     The table's next smaller number of plays decides; for both operators the sum. Any other choice is kept, but without
     plays nothing is listed.
     """
+    if engine not in ("auto", *ENGINES):
+        raise ValueError(f"engine {engine!r} is none of auto, {', '.join(ENGINES)}")
     n = cascade.pi.n
     if n == 0:
         return "loop"

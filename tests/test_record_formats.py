@@ -27,7 +27,7 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
-from hystgen import cli, identify
+from hystgen import cli, extras, identify
 from hystgen.progress import Progress
 from hystgen.records import Record, RecordError, agreed_units, csv_file, hdf5, parquet, parse_columns, read_record
 from hystgen.records import headers as with_units
@@ -420,7 +420,7 @@ def test_without_the_library_of_a_format(
     result = CliRunner().invoke(cli.main, ["identify", str(tmp_path / file), "-o", str(tmp_path / "new.yaml")])
     assert result.exit_code == 2
     assert result.stderr == (
-        f"{tmp_path / file}: error: {kind} files need the package {package}; pip install 'hystgen[formats]', or export "
+        f"{tmp_path / file}: error: {kind} files need the package {package}; {extras.install('formats')}, or export "
         "CSV, .npz or MATLAB .mat (v7)\n"
     )
     assert not (tmp_path / "new.yaml").exists()

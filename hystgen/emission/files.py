@@ -1,4 +1,4 @@
-"""Generated files on disk: written all together or not at all, and compared with what is there."""
+"""Generated files on disk: written all together or not at all."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ def check(folder: Path, names: Iterable[str]) -> None:
         around = around.parent
     if not around.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(around))
-    if not os.access(around, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(around))
+    try:
+        with tempfile.TemporaryFile(prefix=".hystgen-", dir=around):
+            pass
+    except OSError as failure:
+        raise OSError(failure.errno, failure.strerror, str(around)) from None
     for name in names:  # the one thing that could stop a replacement half-way
         if (folder / name).is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
@@ -26,7 +29,8 @@ def check(folder: Path, names: Iterable[str]) -> None:
 def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
     """Write `files` (name to ASCII text or bytes) into `folder`; each appears complete, none before all are ready.
 
-    A folder that is not there yet appears with all of them; of one that is, other files stay as they are.
+    A folder that is not there yet appears with all of them; of one that is, other files stay as they are, and so do
+    those that have the same bytes already.
     """
     new = not folder.exists()
     around = folder.parent if new else folder
@@ -41,17 +45,10 @@ def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
             return [folder / name for name in files]
         check(folder, files)
         for name in files:
-            os.replace(made / name, folder / name)
+            if not _same(made / name, folder / name):
+                os.replace(made / name, folder / name)
     return [folder / name for name in files]
 
 
-def differences(folder: Path, files: Mapping[str, str]) -> list[str]:
-    """What is missing from `folder` or differs from `files`, one sentence a file."""
-    problems = []
-    for name, text in files.items():
-        path = folder / name
-        if not path.is_file():
-            problems.append(f"{path} is missing")
-        elif path.read_bytes() != text.encode("ascii"):
-            problems.append(f"{path} differs from what the parameters give")
-    return problems
+def _same(made: Path, there: Path) -> bool:
+    return there.is_file() and there.read_bytes() == made.read_bytes()

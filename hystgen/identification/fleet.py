@@ -17,19 +17,20 @@ import json
 import math
 import os
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import hystgen
-from hystgen import identification
+from hystgen import api, arguments, identification
 from hystgen.emission import files
-from hystgen.identification import outliers, workers
+from hystgen.identification import outliers, settings, workers
+from hystgen.identification.settings import Settings
 from hystgen.identification.workers import Result, Task
 from hystgen.progress import Progress
-from hystgen.records import FORMATS, Record, write_atomically
+from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", *FORMATS)
 """Files that are taken from a folder."""
@@ -50,7 +51,8 @@ class Unit:
 
     `name`: C identifier of the model; `file`: its record; `done`, else `message` says in one line what failed;
     `figures`: see `FIGURES`; `outlier`: the figures by which the unit is unlike the rest, and how far; empty if it is
-    not; `sha256`: of records, options and tool version; `kept`: done by an earlier call.
+    not; `sha256`: of records, options, settings and tool version; `kept`: done by an earlier call; `settings`: keys
+    taken over from the parameter file that was there.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Unit:
     sha256: str
     outlier: str = ""
     kept: bool = False
+    settings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,10 @@ class Fleet:
         ]
         if not self.judged:
             lines.append(f"outliers are marked from {outliers.FEWEST} units on")
+        taken = [unit for unit in self.units if unit.settings and unit.done and not unit.kept]
+        if taken:
+            keys = ", ".join(dict.fromkeys(key for unit in taken for key in unit.settings))
+            lines.append(f"{keys} kept from the parameter files that were there, of {len(taken)} units")
         marked = [("failed", unit.name, unit.message) for unit in self.failed]
         marked += [("outlier", unit.name, unit.outlier) for unit in self.outliers]
         width = max((len(name) for _, name, _ in marked), default=0)
@@ -117,6 +124,7 @@ class _Job:
     unit: str
     file: str
     holdout: tuple[str, ...]
+    settings: Settings = field(default_factory=Settings)
     key: str = ""
 
 
@@ -144,7 +152,8 @@ def identify_batch(
 
     A unit that fails is a row with its message and stops no other; its older files stay. What is done is not done
     again by a later call, as long as record, options and tool version are the same and the files are as they were
-    written. A call that is interrupted leaves complete files only, and what it had done.
+    written. A call that is interrupted leaves complete files only, and what it had done. Of a parameter file that is
+    there and is written anew its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error far above the others (its logarithm,
     in %), or a gain (output range over drive range), width or p_0 far off; with fewer than 8 units that are done none
@@ -153,8 +162,10 @@ def identify_batch(
     """
     options = _complete(options)
     identification.check_options(**options)
-    if jobs is not None and jobs < 1:
-        raise ValueError(f"jobs is a number of processes from 1 on, not {jobs}")
+    if jobs is not None:
+        arguments.whole("jobs", jobs, "processes", 1)
+    if emission is not None:
+        arguments.known_options("emission of identify_batch", api.emit_options, emission)
     patterns = [holdout] if isinstance(holdout, str) else list(holdout)
     found = _jobs(sources, patterns)
     folder = Path(output)
@@ -164,6 +175,8 @@ def identify_batch(
     with workers.cluster(scheduler) if scheduler is not None else contextlib.nullcontext() as client:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / KEPT_IN).mkdir(exist_ok=True)
+        files.check(folder, ["summary.csv"])
+        found = [replace(job, settings=settings.of(folder / f"{job.unit}.yaml")) for job in found]
         found = [_keyed(job, options, wanted) for job in found]
         rows = {job.unit: kept for job in found if (kept := _kept(folder, job)) is not None}
         todo = {job.unit: job for job in found if job.unit not in rows}
@@ -183,6 +196,7 @@ def identify_batch(
 def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
     """All options of `identify` that are the same for every unit, its defaults for those not given."""
     own = {"holdout": (), "name": "", "progress": False}
+    arguments.known_options("identify_batch", identification.identify, options)
     bound = inspect.signature(identification.identify).bind((), **own, **options)
     bound.apply_defaults()
     return {name: value for name, value in bound.arguments.items() if name not in ("records", *own)}
@@ -198,8 +212,11 @@ def _jobs(
     for pattern in patterns:
         if "{unit}" not in pattern:
             raise ValueError(f"holdout {pattern!r} would be that of every unit; write {{unit}} for the unit's name")
-    given = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
-    paths = {path.resolve(): path for source in given for path in _expanded(os.fspath(source))}
+    paths: dict[Path, Path] = {}
+    for source in several(sources):
+        if isinstance(source, Record):
+            raise TypeError("a fleet is made of files, not of records in memory; fit those with hystgen.identify")
+        paths |= {path.resolve(): path for path in _expanded(os.fspath(source))}
     jobs = []
     for path in paths.values():
         held = tuple(pattern.replace("{unit}", path.stem) for pattern in patterns)
@@ -244,6 +261,8 @@ def _keyed(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | N
         "options": options,
         "emission": emission,
     }
+    if job.settings.values:
+        content["settings"] = job.settings.values
     text = json.dumps(content, sort_keys=True, default=lambda value: np.asarray(value).tolist())
     return replace(job, key=hashlib.sha256(text.encode()).hexdigest())
 
@@ -289,7 +308,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
             write_atomically(folder / KEPT_IN / f"{job.unit}.json", json.dumps(known, indent=1) + "\n")
     except OSError as failure:
         message = f"cannot be written: {failure}"
-    return Unit(job.unit, job.file, not message, message, result.figures, job.key)
+    return Unit(job.unit, job.file, not message, message, result.figures, job.key, settings=tuple(job.settings.values))
 
 
 # -- the work ---------------------------------------------------------------------------------------------------------
@@ -297,7 +316,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
 
 def _task(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | None] | None) -> Task:
     held = tuple((path, _bytes(path)) for path in job.holdout)
-    return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission)
+    return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission, job.settings)
 
 
 def _bytes(path: str) -> bytes | None:

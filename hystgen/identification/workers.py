@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import hystgen
+from hystgen import extras
+from hystgen.identification.settings import Settings
 
 DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
 
@@ -35,7 +37,7 @@ class SchedulerError(OSError):
 class Task:
     """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and what is wanted.
 
-    `options`: of `identify`; `emission`: of `emit`, or None to leave it out.
+    `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
     """
 
     unit: str
@@ -43,6 +45,7 @@ class Task:
     holdout: tuple[tuple[str, bytes | None], ...]
     options: Mapping[str, Any]
     emission: Mapping[str, str | None] | None
+    settings: Settings = field(default_factory=Settings)
     version: str = hystgen.__version__
 
 
@@ -85,7 +88,7 @@ def fit_unit(task: Task) -> Result:
 def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
     from hystgen import api, identification
 
-    fit = identification.identify(records, holdout=holdout, name=task.unit, **task.options)
+    fit = task.settings.on(identification.identify(records, holdout=holdout, name=task.unit, **task.options))
     model = api.Model(fit.parameters)
     text, figures = fit.text(), _figures(fit, model)
     if task.emission is None:
@@ -185,7 +188,7 @@ def cluster(address: str) -> Iterator[Any]:
         from distributed import Client
         from distributed.comm import get_address_host_port
     except ModuleNotFoundError:
-        raise SchedulerError("a scheduler needs Dask; install it with: pip install 'hystgen[fleet]'") from None
+        raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
     try:
         get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
         client = Client(address, timeout=PATIENCE, set_as_default=False)

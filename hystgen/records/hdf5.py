@@ -8,9 +8,10 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import extras
 from hystgen.records.array_files import MATLAB_NUMBERS
 from hystgen.records.columns import Column, column
-from hystgen.records.reading import INSTALL, Reading, Table, one_dimension
+from hystgen.records.reading import Reading, Table, one_dimension
 
 SLICE = 1 << 18
 """Samples read at a time."""
@@ -37,7 +38,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
     except ImportError:
         what = "MATLAB v7.3" if matlab else "HDF5"
         raise reading.refuse(
-            f"{what} files need the package h5py; {INSTALL}, or export CSV, .npz or MATLAB .mat (v7)"
+            f"{what} files need the package h5py; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat (v7)"
         ) from None
     with reading.parsing(kind), h5py.File(reading.file, "r") as file:
         columns: list[Column] = []

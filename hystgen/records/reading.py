@@ -16,8 +16,6 @@ from hystgen.records.columns import LISTED, Column, Finder, further_names
 from hystgen.records.record import Array
 from hystgen.records.units import to_seconds
 
-INSTALL = "pip install 'hystgen[formats]'"
-
 
 class Lines:
     """Line of the file that each row of a table came from, kept by stretches of rows."""

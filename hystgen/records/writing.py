@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import errno
 import io
 import os
 import tempfile
@@ -57,6 +58,23 @@ def write_atomically(path: str | os.PathLike[str], text: str) -> None:
         with contextlib.suppress(OSError):
             os.unlink(temporary)
         raise
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raise the OSError that `write_atomically` would end in, by a trial in the folder."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
+    if target.exists() and not target.is_file():
+        return
+    if not target.parent.is_dir():
+        reason = os.strerror(errno.ENOENT)
+        raise FileNotFoundError(f"make the folder of this file first: {reason}: {os.fspath(path)!r}")
+    try:
+        with tempfile.TemporaryFile(prefix=".hystgen-", dir=target.parent):
+            pass
+    except OSError as failure:
+        raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None
 
 
 def _texts(values: NDArray[Any]) -> list[str]:

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import extras
+
 Array = NDArray[np.float64]
 
 MEASURED, MODEL, RESIDUAL, OTHER = "#1f5a99", "#c2410c", "#3f7d3a", "#5b4a91"
@@ -60,7 +62,7 @@ def require() -> None:
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        raise PlotError("plots need matplotlib; install it with: pip install 'hystgen[plot]'") from None
+        raise PlotError(f"plots need matplotlib; install it with: {extras.install('plot')}") from None
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import reference
+from hystgen import extras, reference
 from hystgen.emission import runtime
 from hystgen.reference import Bytes
 from hystgen.verification import compilers
@@ -84,7 +84,7 @@ def _hook() -> Any:
     """The counting hook as machine code of this machine. Raises EmulatorError."""
     found = compilers.available()
     if not found:
-        raise EmulatorError("no C compiler for this machine; install gcc or clang, or: pip install 'hystgen[zig]'")
+        raise EmulatorError(f"no C compiler for this machine; install gcc or clang, or: {extras.install('zig')}")
     source = runtime.data_folder("templates") / "instruction_counter.c"
     with tempfile.TemporaryDirectory(prefix="hystgen-counter-", ignore_cleanup_errors=True) as folder:
         library = Path(folder) / "instruction_counter.so"

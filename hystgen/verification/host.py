@@ -11,6 +11,7 @@ import cffi
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import extras
 from hystgen.reference import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.comparison import Expected, compare
@@ -71,7 +72,7 @@ def rows(
     """One row an operator, compiler and build; compilers: those named, else all that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
-        message = "no C compiler found; install gcc or clang, or: pip install 'hystgen[zig]'"
+        message = f"no C compiler found; install gcc or clang, or: {extras.install('zig')}"
         yield Row(HOST, "-", "-", "-", error=message)
         return
     for number, (name, found) in enumerate(chosen):

@@ -8,6 +8,7 @@ from typing import Any
 
 import cffi
 
+from hystgen import extras
 from hystgen.api import Model
 from hystgen.emission import module, runtime
 from hystgen.verification import compilers, sources
@@ -27,7 +28,7 @@ class Instance:
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
         if chosen is None:
             missing = f"{compiler} is not installed" if compiler else "no C compiler found"
-            raise compilers.CompileError(f"{missing}; install gcc or clang, or: pip install 'hystgen[zig]'")
+            raise compilers.CompileError(f"{missing}; install gcc or clang, or: {extras.install('zig')}")
         name, op = model.name, options.operator
         real = runtime.FAMILIES[options.arithmetic].real
         self._ffi = cffi.FFI()
