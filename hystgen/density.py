@@ -51,8 +51,8 @@ _SMALLEST_EXPONENT = -4000
 _LARGE_POWER = 1 << 16
 """Exponents of `**` from which the size of the result is estimated first: a whole one costs a multiplication a bit."""
 _MAX_OPERATIONS = 2_000_000
-"""Operations that a formula may take in all: 1 to 5 us each (tests/test_density.py measures the slowest formulas). A sum
-of 30 narrow bell curves, about the most that fits into a formula, takes 600 000."""
+"""Operations that a formula may take in all, 1 to 5 us each (tests/test_density.py has the slowest formulas). A sum of
+29 bell curves, about the most that fits into a formula, takes 600 000."""
 
 
 class DensityError(ValueError):

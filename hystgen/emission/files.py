@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import errno
 import os
-import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+
+from hystgen import writing
 
 
 def check(folder: Path, names: Iterable[str]) -> None:
@@ -28,20 +29,27 @@ def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
 
     A folder that is not there yet appears with all of them; of one that is, other files stay as they are.
     """
-    new = not folder.exists()
-    around = folder.parent if new else folder
+    target = writing.destination(folder)  # a link stays a link
+    new = not target.exists()
+    around = target.parent if new else target
     around.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".hystgen-", dir=around) as staging:
-        made = Path(staging) / "made"
-        made.mkdir()
-        for name, content in files.items():
-            (made / name).write_bytes(content if isinstance(content, bytes) else content.encode("ascii"))
-        if new:
-            made.rename(folder)
-            return [folder / name for name in files]
-        check(folder, files)
-        for name in files:
-            os.replace(made / name, folder / name)
+    writing.sweep(target.parent)  # of a call that was killed before the folder appeared
+    try:
+        with writing.staging(around) as staged:
+            made = staged / "made"
+            made.mkdir()
+            for name, content in files.items():
+                (made / name).write_bytes(content if isinstance(content, bytes) else content.encode("ascii"))
+            if new:
+                made.rename(target)
+            else:
+                check(target, files)
+                for name in files:
+                    os.replace(made / name, target / name)
+    except OSError as failure:
+        if writing.PREFIX in str(failure.filename):  # name what was asked for
+            raise OSError(failure.errno, failure.strerror, str(folder)) from None
+        raise
     return [folder / name for name in files]
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import signal
-import tempfile
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import hystgen
+from hystgen import writing
 
 DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
 
@@ -64,10 +64,10 @@ def fit_unit(task: Task) -> Result:
     """Fit and emit one unit. Never raises an Exception: whatever goes wrong is the result's message."""
     if task.version != hystgen.__version__:
         return Result(task.unit, f"the worker has hystgen {hystgen.__version__}, not {task.version}; install the same")
-    with tempfile.TemporaryDirectory(prefix="hystgen-") as folder:
+    with writing.temporary() as folder:
         paths = {}
         for k, (path, data) in enumerate((*task.records, *task.holdout)):
-            copy = Path(folder) / str(k) / Path(path).name
+            copy = folder / str(k) / Path(path).name
             copy.parent.mkdir()
             paths[str(copy)] = path
             if data is not None:

@@ -26,7 +26,8 @@ from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
 from hystgen.records.repair import SHORTEST, repaired
 from hystgen.records.units import agreed_units, headers
-from hystgen.records.writing import columns_text, write_atomically, write_columns
+from hystgen.records.writing import columns_text, write_columns
+from hystgen.writing import write_atomically
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
