@@ -90,7 +90,7 @@ def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
     from hystgen import compiled
 
-    compiled.announce = lambda: click.echo("compiling for this machine, once: about 20 s", err=True)
+    compiled.announce = partial(click.echo, err=True)
 
 
 @main.command()

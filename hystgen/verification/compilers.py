@@ -95,7 +95,7 @@ def missing(name: str) -> str:
 
 @functools.cache
 def _environment(name: str) -> dict[str, str] | None:
-    """Environment of a compiler; None: that of this process. zig keeps its libraries below the home folder, or fails."""
+    """Environment of a compiler; None: that of this process. zig needs a folder for what it builds."""
     if name != "zig" or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return None
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
