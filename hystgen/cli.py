@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from hystgen import __version__
+from hystgen import __version__, console
 from hystgen.verification.targets import NAMES as TARGETS
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class _Failed(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message alone: it already says that it is an error."""
-        click.echo(self.message, file=file, err=True)
+        console.note(self.message, file)
 
 
 def _shown(path: str, action: Callable[[], Any]) -> Any:
@@ -46,7 +46,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
             warnings.simplefilter("always", UserWarning)
             result = action()
         for warning in caught:
-            click.echo(f"warning: {warning.message}", err=True)
+            console.note(f"warning: {warning.message}")
         return result
     except (ParameterError, PlanError, RecordError) as error:
         raise _Failed(str(error), 2) from None
@@ -59,7 +59,14 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
         raise
     except (ValueError, OSError) as error:
-        raise _Failed(f"error: {error}", 2) from None
+        raise _Failed(f"error: {_reason(error)}", 2) from None
+
+
+def _reason(error: ValueError | OSError) -> str:
+    """What an error says; of the system's own the file and what is wrong with it."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
 
 
 def _load(path: str, effects: Sequence[str] = ()) -> Model:
@@ -84,13 +91,13 @@ layout_option = click.option(
 )  # fmt: skip
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=console.Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="hystgen")
 def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
     from hystgen import compiled
 
-    compiled.announce = partial(click.echo, err=True)
+    compiled.announce = console.note
 
 
 @main.command()
@@ -118,10 +125,10 @@ def emit(params: str, output: str, check: bool, list_outputs: bool, **options: s
     if list_outputs:
         names = _shown(params, lambda: api.emitted_files(model, **options))
         for name in names:
-            click.echo(str(Path(output) / name))
+            console.say(str(Path(output) / name))
         return
     for path in _shown(params, lambda: api.emit(model, output, **options)):
-        click.echo(str(path))
+        console.say(str(path))
 
 
 @main.command()
@@ -151,18 +158,18 @@ def verify(
             raise _Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
     _keep((json_file, junit_file), [params])
     for file in (json_file, junit_file):
-        if file and not Path(file).resolve().parent.is_dir():
+        if file and not Path(os.path.realpath(file)).parent.is_dir():
             raise _Failed(f"error: the folder of {file} does not exist", 2)
     model = _load(params)
 
     def say(what: str) -> None:
-        click.echo(f"verifying: {what}", err=True)
+        console.note(f"verifying: {what}")
 
     report = _shown(
         params,
         lambda: verification.verify_model(model, compiler=compiler, targets=chosen, progress=say, **options),
     )
-    click.echo(report.table())
+    console.say(report.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
             _shown(file, partial(write_atomically, file, text()))
@@ -180,20 +187,20 @@ def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | No
         planned = plan(params, effects=effects, max_rate=max_rate, sample_time=sample_time)
         _keep([Path(output) / name for name in planned.names], [params, *effects])
         for sentence in planned.defaults:
-            click.echo(sentence, err=True)
-        click.echo(planned.sentence(), err=True)
+            console.note(sentence)
+        console.note(planned.sentence())
         for path in planned.write(output):
-            click.echo(str(path))
-        click.echo(f"then run: {planned.command(output)}", err=True)
+            console.say(str(path))
+        console.note(f"then run: {planned.command(output)}")
 
     _shown(params, run)
 
 
 def _keep(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
     """Refuse to write over what is read."""
-    read = {Path(path).resolve() for path in inputs}
+    read = {os.path.realpath(path) for path in inputs}
     for path in outputs:
-        if path and Path(path).resolve() in read:
+        if path and os.path.realpath(path) in read:
             raise _Failed(f"error: {path} is an input and would be overwritten; choose another name", 2)
 
 
@@ -283,7 +290,7 @@ def simulate(
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             raise _Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
         for note in record.notes:
-            click.echo(f"warning: {record.name}: {note}", err=True)
+            console.note(f"warning: {record.name}: {note}")
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
@@ -295,7 +302,7 @@ def simulate(
     for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
         columns = record.columns()
         for sentence in remarks:
-            click.echo(f"warning: {sentence}", err=True)
+            console.note(f"warning: {sentence}")
         units = dict(record.units)
         if answer in columns:
             columns[f"{answer}_measured"] = columns.pop(answer)
@@ -303,10 +310,10 @@ def simulate(
         columns[answer] = answers
         header = records.headers(columns, units)
         if target is None:
-            click.echo(records.columns_text(header, list(columns.values())), nl=False)
+            console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8
             continue
         _shown(str(target), partial(_write_record, target, header, columns))
-        click.echo(str(target))
+        console.say(str(target))
 
 
 @main.command()
@@ -395,15 +402,15 @@ def identify(
             **options,
         )
         for warning in fit.warnings:
-            click.echo(f"warning: {warning}", err=True)
+            console.note(f"warning: {warning}")
         fit.write(output)
-        click.echo(fit.table())
-        click.echo(output)
+        console.say(fit.table())
+        console.say(output)
         if plot:
             plots.show_fit(fit, read, plot)
-            click.echo(plot)
+            console.say(plot)
         if report:
-            click.echo(str(pages.write(fit, read, report, Path(output).name)))
+            console.say(str(pages.write(fit, read, report, Path(output).name)))
 
     _shown(data[0], run)
 
@@ -416,8 +423,8 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
         done = _shown(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
         raise _Failed("interrupted; what is done is kept, and the same command goes on from there", 130) from None
-    click.echo(done.table(), nl=False, err=True)
-    click.echo(str(Path(output) / "summary.csv"))
+    console.note(done.table().rstrip("\n"))
+    console.say(str(Path(output) / "summary.csv"))
     if done.failed:
         raise _Failed(f"error: {len(done.failed)} of {len(done.units)} units failed", 1)
 
@@ -477,10 +484,10 @@ def diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
         for note in found.notes:
-            click.echo(f"warning: {note}", err=True)
-        click.echo(found.sentence())
+            console.note(f"warning: {note}")
+        console.say(found.sentence())
         for path in found.write(output):
-            click.echo(str(path))
+            console.say(str(path))
 
     _shown(params, run)
 
@@ -500,12 +507,12 @@ def show(params: str, plot: str | None, effects: tuple[str, ...]) -> None:
     if plot:
         _keep([plot], [params])
         _shown(params, partial(plots.check_path, plot))
-    click.echo(_shown(params, lambda: properties.properties(model)))
+    console.say(_shown(params, lambda: properties.properties(model)))
     for warning in properties.warnings(model):
-        click.echo(f"warning: {warning}", err=True)
+        console.note(f"warning: {warning}")
     if plot:
         _shown(params, lambda: plots.show_model(model, plot))
-        click.echo(plot)
+        console.say(plot)
 
 
 @main.command()
@@ -518,7 +525,7 @@ def schema() -> None:
 
     from hystgen import params
 
-    click.echo(json.dumps(params.schema(), indent=2))
+    console.say(json.dumps(params.schema(), indent=2))
 
 
 if __name__ == "__main__":

@@ -74,15 +74,15 @@ def _cache_class() -> Any:
     class Cache(FunctionCache):
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             try:
-                return super().load_overload(sig, target_context)
+                return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             except Exception:  # whatever unpickling half a file ends in
                 with contextlib.suppress(OSError):
-                    self.flush()
+                    self.flush()  # type: ignore[no-untyped-call]
                 return None
 
         def save_overload(self, sig: Any, data: Any) -> None:
             with contextlib.suppress(OSError):
-                super().save_overload(sig, data)
+                super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
     return Cache
 
