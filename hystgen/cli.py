@@ -149,8 +149,7 @@ def verify(
 
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
     """
-    from hystgen import verification
-    from hystgen.records import write_atomically
+    from hystgen import verification, writing
 
     chosen = tuple(targets.split(","))
     for word in chosen:
@@ -158,8 +157,8 @@ def verify(
             raise _Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
     _keep((json_file, junit_file), [params])
     for file in (json_file, junit_file):
-        if file and not Path(os.path.realpath(file)).parent.is_dir():
-            raise _Failed(f"error: the folder of {file} does not exist", 2)
+        if file:
+            _shown(file, partial(writing.place_for, file))
     model = _load(params)
 
     def say(what: str) -> None:
@@ -172,7 +171,7 @@ def verify(
     console.say(report.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
-            _shown(file, partial(write_atomically, file, text()))
+            _shown(file, partial(writing.write_atomically, file, text()))
     if not report.ok:
         raise _Failed("verification failed", 1)
 
@@ -349,7 +348,7 @@ def identify(
 
     Example: hystgen identify --batch 'units/*.csv' -o params/
     """
-    from hystgen import identification
+    from hystgen import identification, writing
     from hystgen.report import identification as pages
 
     drive, _, displacement = (units or "").partition(",")
@@ -382,6 +381,7 @@ def identify(
         raise click.UsageError("Missing argument 'DATA...'.")
     if Path(output).is_dir():
         raise click.BadParameter(f"File '{output}' is a directory.", param_hint="'-o'")
+    _shown(output, partial(writing.place_for, output))  # before a fit that may take minutes
     made = [str(Path(report) / name) for name in pages.names()] if report else []
     _keep((output, plot, *made), (*data, *holdout))
 

@@ -122,19 +122,25 @@ def destination(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def place_for(path: str | os.PathLike[str]) -> Path:
+    """`destination` of a file, whose folder is there. Raises OSError."""
+    target = destination(path)
+    if not target.parent.is_dir():
+        what = f"the folder {target.parent} does not exist; make it, or choose another output"
+        raise FileNotFoundError(errno.ENOENT, what, os.fspath(path))
+    return target
+
+
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None:
     """Write a file, text as UTF-8, so that it is either the old one or complete.
 
     A link stays a link, and what is no regular file (a pipe, a terminal) is written to in place. Raises OSError.
     """
-    target = destination(path)
+    target = place_for(path)
     data = content.encode() if isinstance(content, str) else content
     if target.exists() and not target.is_file():
         target.write_bytes(data)
         return
-    if not target.parent.is_dir():
-        what = f"the folder {target.parent} does not exist; make it, or choose another output"
-        raise FileNotFoundError(errno.ENOENT, what, os.fspath(path))
     try:
         with staging(target.parent) as folder:
             (folder / target.name).write_bytes(data)
