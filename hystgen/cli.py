@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from hystgen import __version__
+from hystgen import __version__, console
 from hystgen.verification.targets import NAMES as TARGETS
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class _Failed(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message alone: it already says that it is an error."""
-        click.echo(self.message, file=file, err=True)
+        console.note(self.message, file)
 
 
 def _shown(path: str, action: Callable[[], Any]) -> Any:
@@ -46,7 +46,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
             warnings.simplefilter("always", UserWarning)
             result = action()
         for warning in caught:
-            click.echo(f"warning: {warning.message}", err=True)
+            console.note(f"warning: {warning.message}")
         return result
     except (ParameterError, PlanError, RecordError) as error:
         raise _Failed(str(error), 2) from None
@@ -59,7 +59,14 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
         raise
     except (ValueError, OSError) as error:
-        raise _Failed(f"error: {error}", 2) from None
+        raise _Failed(f"error: {_reason(error)}", 2) from None
+
+
+def _reason(error: ValueError | OSError) -> str:
+    """What an error says; of the system's own the file and what is wrong with it."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
 
 
 def _load(path: str, effects: Sequence[str] = ()) -> Model:
@@ -84,13 +91,13 @@ layout_option = click.option(
 )  # fmt: skip
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=console.Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="hystgen")
 def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
     from hystgen import compiled
 
-    compiled.announce = lambda: click.echo("compiling for this machine, once: about 20 s", err=True)
+    compiled.announce = console.note
 
 
 @main.command()
@@ -120,10 +127,10 @@ def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, 
         _check(named, output, options)
     elif list_outputs:
         for name in made:
-            click.echo(str(Path(output) / name))
+            console.say(str(Path(output) / name))
     else:
         for path in _shown(output, lambda: files.write(Path(output), made)):
-            click.echo(str(path))
+            console.say(str(path))
 
 
 T = TypeVar("T")
@@ -189,8 +196,7 @@ def verify(
 
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
     """
-    from hystgen import verification
-    from hystgen.records import check_writable, write_atomically
+    from hystgen import verification, writing
 
     chosen = tuple(targets.split(","))
     for word in chosen:
@@ -198,23 +204,21 @@ def verify(
             raise _Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
     _keep((json_file, junit_file), [params])
     for file in (json_file, junit_file):
-        if file and not Path(file).resolve().parent.is_dir():
-            raise _Failed(f"error: the folder of {file} does not exist", 2)
         if file:
-            _shown(file, partial(check_writable, file))
+            _shown(file, partial(writing.check_writable, file))
     model = _load(params)
 
     def say(what: str) -> None:
-        click.echo(f"verifying: {what}", err=True)
+        console.note(f"verifying: {what}")
 
     report = _shown(
         params,
         lambda: verification.verify_model(model, compiler=compiler, targets=chosen, progress=say, **options),
     )
-    click.echo(report.table())
+    console.say(report.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
-            _shown(file, partial(write_atomically, file, text()))
+            _shown(file, partial(writing.write_atomically, file, text()))
     if not report.ok:
         raise _Failed("verification failed", 1)
 
@@ -229,20 +233,20 @@ def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | No
         planned = plan(params, effects=effects, max_rate=max_rate, sample_time=sample_time)
         _keep([Path(output) / name for name in planned.names], [params, *effects])
         for sentence in planned.defaults:
-            click.echo(sentence, err=True)
-        click.echo(planned.sentence(), err=True)
+            console.note(sentence)
+        console.note(planned.sentence())
         for path in planned.write(output):
-            click.echo(str(path))
-        click.echo(f"then run: {planned.command(output)}", err=True)
+            console.say(str(path))
+        console.note(f"then run: {planned.command(output)}")
 
     _shown(params, run)
 
 
 def _keep(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
     """Refuse to write over what is read."""
-    read = {Path(path).resolve() for path in inputs}
+    read = {os.path.realpath(path) for path in inputs}
     for path in outputs:
-        if path and Path(path).resolve() in read:
+        if path and os.path.realpath(path) in read:
             raise _Failed(f"error: {path} is an input and would be overwritten; choose another name", 2)
 
 
@@ -332,7 +336,7 @@ def simulate(
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             raise _Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
         for note in record.notes:
-            click.echo(f"warning: {record.name}: {note}", err=True)
+            console.note(f"warning: {record.name}: {note}")
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
@@ -344,7 +348,7 @@ def simulate(
     for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
         columns = record.columns()
         for sentence in remarks:
-            click.echo(f"warning: {sentence}", err=True)
+            console.note(f"warning: {sentence}")
         units = dict(record.units)
         if answer in columns:
             columns[f"{answer}_measured"] = columns.pop(answer)
@@ -352,10 +356,10 @@ def simulate(
         columns[answer] = answers
         header = records.headers(columns, units)
         if target is None:
-            click.echo(records.columns_text(header, list(columns.values())), nl=False)
+            console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8
             continue
         _shown(str(target), partial(_write_record, target, header, columns))
-        click.echo(str(target))
+        console.say(str(target))
 
 
 @main.command()
@@ -391,7 +395,7 @@ def identify(
 
     Example: hystgen identify --batch 'units/*.csv' -o params/
     """
-    from hystgen import identification
+    from hystgen import identification, writing
     from hystgen.report import identification as pages
 
     drive, _, displacement = (units or "").partition(",")
@@ -435,7 +439,7 @@ def identify(
 
         for file in (output, plot):
             if file:
-                records.check_writable(file)
+                writing.check_writable(file)
         if plot:
             plots.check_path(plot)
         if report:
@@ -451,18 +455,18 @@ def identify(
             **options,
         )
         for warning in fit.warnings:
-            click.echo(f"warning: {warning}", err=True)
+            console.note(f"warning: {warning}")
         for sentence in older.sentences(fit):
-            click.echo(sentence, err=True)
+            console.note(sentence)
         fit = older.on(fit)
         fit.write(output)
-        click.echo(fit.table())
-        click.echo(output)
+        console.say(fit.table())
+        console.say(output)
         if plot:
             plots.show_fit(fit, read, plot)
-            click.echo(plot)
+            console.say(plot)
         if report:
-            click.echo(str(pages.write(fit, read, report, Path(output).name)))
+            console.say(str(pages.write(fit, read, report, Path(output).name)))
 
     _shown(data[0], run)
 
@@ -475,8 +479,8 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
         done = _shown(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
         raise _Failed("interrupted; what is done is kept, and the same command goes on from there", 130) from None
-    click.echo(done.table(), nl=False, err=True)
-    click.echo(str(Path(output) / "summary.csv"))
+    console.note(done.table().rstrip("\n"))
+    console.say(str(Path(output) / "summary.csv"))
     if done.failed:
         raise _Failed(f"error: {len(done.failed)} of {len(done.units)} units failed", 1)
 
@@ -536,12 +540,12 @@ def diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
         for note in found.notes:
-            click.echo(f"warning: {note}", err=True)
-        click.echo(found.sentence())
+            console.note(f"warning: {note}")
+        console.say(found.sentence())
         if found.not_emitted():
-            click.echo(found.not_emitted(), err=True)
+            console.note(found.not_emitted())
         for path in found.write(output):
-            click.echo(str(path))
+            console.say(str(path))
 
     _shown(params, run)
 
@@ -561,12 +565,12 @@ def show(params: str, plot: str | None, effects: tuple[str, ...]) -> None:
     if plot:
         _keep([plot], [params])
         _shown(params, partial(plots.check_path, plot))
-    click.echo(_shown(params, lambda: properties.properties(model)))
+    console.say(_shown(params, lambda: properties.properties(model)))
     for warning in properties.warnings(model):
-        click.echo(f"warning: {warning}", err=True)
+        console.note(f"warning: {warning}")
     if plot:
         _shown(params, lambda: plots.show_model(model, plot))
-        click.echo(plot)
+        console.say(plot)
 
 
 @main.command()
@@ -579,7 +583,7 @@ def schema() -> None:
 
     from hystgen import params
 
-    click.echo(json.dumps(params.schema(), indent=2))
+    console.say(json.dumps(params.schema(), indent=2))
 
 
 if __name__ == "__main__":

@@ -486,18 +486,25 @@ def _upward(x: Fraction) -> float:
 
 
 def _breaks(cascade: Cascade) -> dict[bool, list[float]]:
-    """Drives at which the memoryless part has a kink, on each branch."""
+    """Drives at which the memoryless part has a kink, on each branch. Raises FormatError for too many."""
     found: dict[bool, list[float]] = {}
     for ascending in (True, False):
-        places: list[float] = []
-        for j, (stage, (low, high)) in enumerate(
-            zip(cascade.stages, cascade.stage_ranges(ascending), strict=True)
-        ):
-            if isinstance(stage, DeadZone):
-                for b in stage.breaks:
-                    if low < b < high:
-                        places.append(_drive_at(cascade, j, b, ascending))
-        found[ascending] = sorted(places)
+        if not ascending and not cascade.branches_differ:
+            found[ascending] = found[True]
+            continue
+        inside = [
+            (j, b)
+            for j, (stage, (low, high)) in enumerate(
+                zip(cascade.stages, cascade.stage_ranges(ascending), strict=True)
+            )
+            if isinstance(stage, DeadZone)
+            for b in stage.breaks
+            if low < b < high
+        ]
+        if len(inside) > MOST_PIECES:
+            what = f"bends at {len(inside)} places inside input_range, and fixed point takes {MOST_PIECES}"
+            raise FormatError((("model", "memoryless"), f"{what}; thin out the thresholds or use float32"))
+        found[ascending] = sorted(_drive_at(cascade, j, b, ascending) for j, b in inside)
     return found
 
 
@@ -522,6 +529,8 @@ def _drive_at(cascade: Cascade, j: int, value: float, ascending: bool) -> float:
     low, high = cascade.input_range
     for _ in range(200):
         middle = (low + high) / 2
+        if middle in (low, high):  # no double lies between them
+            break
         x = middle
         for stage in cascade.stages[:j]:
             x = float(stage.forward(x, ascending))

@@ -16,6 +16,7 @@ import io
 import json
 import math
 import os
+import warnings
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,7 +25,7 @@ from typing import Any
 import numpy as np
 
 import hystgen
-from hystgen import api, arguments, identification
+from hystgen import api, arguments, identification, writing
 from hystgen.emission import files
 from hystgen.identification import outliers, settings, workers
 from hystgen.identification.settings import Settings
@@ -168,9 +169,10 @@ def identify_batch(
         arguments.known_options("emission of identify_batch", api.emit_options, emission)
     patterns = [holdout] if isinstance(holdout, str) else list(holdout)
     found = _jobs(sources, patterns)
-    folder = Path(output)
-    if any(Path(file).resolve().parent == folder.resolve() for job in found for file in (job.file, *job.holdout)):
-        raise ValueError(f"{folder} has records in it, among which summary.csv would be one more; use another folder")
+    folder = writing.destination(output)
+    if any(Path(file).resolve().parent == folder for job in found for file in (job.file, *job.holdout)):
+        what = f"{os.fspath(output)} has records in it, among which summary.csv would be one more"
+        raise ValueError(f"{what}; use another folder")
     wanted = dict(emission or {}) if emit else None
     with workers.cluster(scheduler) if scheduler is not None else contextlib.nullcontext() as client:
         folder.mkdir(parents=True, exist_ok=True)
@@ -178,7 +180,7 @@ def identify_batch(
         files.check(folder, ["summary.csv"])
         found = [replace(job, settings=settings.of(folder / f"{job.unit}.yaml")) for job in found]
         found = [_keyed(job, options, wanted) for job in found]
-        rows = {job.unit: kept for job in found if (kept := _kept(folder, job)) is not None}
+        rows = _kept_rows(folder, found)
         todo = {job.unit: job for job in found if job.unit not in rows}
         tasks = (_task(job, options, wanted) for job in todo.values())
         with Progress(len(found), progress, "fleet") as bar:
@@ -276,17 +278,48 @@ def _digest(path: Path) -> str | None:
         return None
 
 
+def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
+    """The units that an earlier call left done; a warning where what it noted of some cannot be read."""
+    rows = {}
+    unreadable = []
+    for job in jobs:
+        try:
+            kept = _kept(folder, job)
+        except (OSError, ValueError, RecursionError):
+            unreadable.append(job.unit)
+            continue
+        if kept is not None:
+            rows[job.unit] = kept
+    if unreadable:
+        files_of = f"{folder / KEPT_IN / unreadable[0]}.json cannot be read"
+        more = f", and {len(unreadable) - 1} more" if len(unreadable) > 1 else ""
+        warnings.warn(f"{files_of}{more}; the fit of these units is done again", stacklevel=3)
+    return rows
+
+
 def _kept(folder: Path, job: _Job) -> Unit | None:
-    """The unit as an earlier call left it; None if anything has changed since."""
+    """The unit as an earlier call left it; None if it left nothing, or anything has changed since.
+
+    Raises OSError, ValueError or RecursionError for notes that no call has written so.
+    """
     try:
         known = json.loads((folder / KEPT_IN / f"{job.unit}.json").read_text("ascii"))
-        if known["sha256"] != job.key:
-            return None
-        if any(_digest(folder / name) != digest for name, digest in known["outputs"].items()):
-            return None
-        return Unit(job.unit, job.file, True, "", known["figures"], job.key, kept=True)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except FileNotFoundError:
         return None
+    if not (isinstance(known, dict) and isinstance(known.get("sha256"), str)):
+        raise ValueError("no notes of a unit")
+    if known["sha256"] != job.key:
+        return None
+    outputs, figures = known.get("outputs"), known.get("figures")
+    if not (isinstance(outputs, dict) and isinstance(figures, dict) and figures.keys() == set(FIGURES)):
+        raise ValueError("no outputs or figures")
+    for name, value in figures.items():
+        sort = str if name == "kind" else int | float | None
+        if not isinstance(value, sort) or isinstance(value, bool):
+            raise ValueError(f"{name} is none")
+    if any(_digest(folder / name) != digest for name, digest in outputs.items()):
+        return None
+    return Unit(job.unit, job.file, True, "", figures, job.key, kept=True)
 
 
 def _keep(folder: Path, job: _Job, result: Result) -> Unit:

@@ -27,7 +27,8 @@ from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
 from hystgen.records.repair import SHORTEST, repaired
 from hystgen.records.units import agreed_units, headers
-from hystgen.records.writing import check_writable, columns_text, write_atomically, write_columns
+from hystgen.records.writing import columns_text, write_columns
+from hystgen.writing import write_atomically
 
 Source = Record | str | os.PathLike[str]
 """A record, or the path of a data file."""
@@ -189,7 +190,6 @@ __all__ = [
     "RecordError",
     "Source",
     "agreed_units",
-    "check_writable",
     "columns_text",
     "headers",
     "parse_columns",

@@ -1,4 +1,8 @@
-"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; by h5py."""
+"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; by h5py.
+
+A record is one file: datasets behind external links, with external storage, or put together from others (virtual) would
+have whatever the file names opened, and are not read.
+"""
 
 from __future__ import annotations
 
@@ -43,23 +47,30 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
     with reading.parsing(kind), h5py.File(reading.file, "r") as file:
         columns: list[Column] = []
         ignored: list[str] = []
+        outside: list[str] = []
+        join = "." if matlab else "/"  # MATLAB writes a field of a struct with a point
+
+        def link(path: str, found: Any) -> None:
+            if isinstance(found, h5py.ExternalLink):
+                outside.append(path.replace("/", join))
 
         def visit(path: str, found: Any) -> None:
             if not isinstance(found, h5py.Dataset) or (matlab and path.split("/")[0] in _MATLAB_OWN):
                 return
             *folders, name = path.split("/")
-            # MATLAB writes a field of a struct with a point
-            join = "." if matlab else "/"
             folder = "".join(part + join for part in folders)
             length = _length(found, matlab)
-            if length:
+            if found.external or found.is_virtual:
+                outside.append(folder + name)
+            elif length:
                 unit = "" if matlab else _unit(found)
                 columns.append(column(name, folder, unit, length, partial(_vector, reading, found)))
             else:
                 ignored.append(folder + name)
 
         file.visititems(visit)
-        return reading.table(columns, ignored)
+        file.visititems_links(link)
+        return reading.table(columns, ignored, outside)
 
 
 def _length(dataset: Any, matlab: bool) -> int:

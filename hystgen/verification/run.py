@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import functools
-import tempfile
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
-from hystgen import arguments
+from hystgen import arguments, writing
 from hystgen.api import Model, emit_options
 from hystgen.emission import module
 from hystgen.verification import avr, cores, host, sources
@@ -54,8 +52,7 @@ def verify_model(
         progress(f"reference, {op}")
         return expected_records(numbers, real, op == "inverse", length)
 
-    with tempfile.TemporaryDirectory(prefix="hystgen-verify-") as name:
-        folder = Path(name)
+    with writing.temporary() as folder:
         written = sources.write(folder, model, options)
         for target in chosen:
             if target is None:
