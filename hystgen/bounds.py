@@ -10,14 +10,18 @@ from the tables and products, S for the first sum, S for the anchor's, S for the
 memory that is a list adds less: 2 S from two slopes, 2 S for their difference and the product, S for the sum.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
-residual eta: the forward error plus the rounding of the solution. The exact inverse turns a reference error eta into
+residual eta: the forward error plus the rounding of the solution. That needs solving to stop where another play would
+follow: on the straight piece before, of slope P_k, rounding of eta is one of eta / P_k in w, which behind that place
+would count with a steeper slope. Both engines stop there, and neither answers a move with one the other way, which
+would do the same to the plays that follow behind a turn. The exact inverse turns a reference error eta into
 at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front into that over its smallest
 slope. A clamp or commit gives both the same drive and adds nothing.
 
 With two branches two drives can give the same output, one on each, and rounding decides between them where the
 reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
 gap between the branches makes at the input of the plays, now and in what the plays remember. The bound counts that.
-The forward bound holds once the drive has moved off the one that the start memory stands for.
+The first move starts from the drive that the start memory stands for, G_R^-1(s_0), which need not be a number of the
+type. The forward operator tells on which side of it every drive lies, to the rounding of G_R^-1 in double precision.
 """
 
 from __future__ import annotations

@@ -122,7 +122,7 @@ def answers(
     from hystgen.reference import new_state
 
     code, state = reference(t, compiled), new_state(t)
-    code.init(t, state)
+    code.init(t, state, int(inverse))
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
     code.run(t, state, int(inverse), np.asarray(call, dtype=np.uint8), x, found, status)

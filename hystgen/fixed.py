@@ -20,7 +20,9 @@ from hystgen.reference import (
     DRIVE_MIN,
     NEXT_OUTPUT,
     OFFSET,
+    OUTPUT_CLAMPED,
     RISING,
+    STATUS,
     K,
     Reals,
     State,
@@ -37,7 +39,7 @@ from hystgen.reference import (
 )
 
 # more places in `limits`, after those of `hystgen.reference`
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX = 16, 17, 18, 19, 20, 21
+PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED = 16, 17, 18, 19, 20, 21, 22
 
 HALF = 1 << 30
 
@@ -57,6 +59,8 @@ class FixedTables(NamedTuple):
     shift: Reals
     start: Reals
     limits: Reals
+    applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
+    ascending: Reals  # direction before the first move, likewise
     knot: Reals  # where the pieces of the curves begin, curve after curve
     coefficient: Reals  # (pieces, degree + 1)
     scale: Reals  # left shift that stretches a piece to 2^31
@@ -206,9 +210,11 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
 
 
 def output(t: FixedTables, s: State) -> Any:
-    """Output code for the memory as it is."""
+    """Output code for the memory as it is, limited to the type."""
     total = corners_output(t, s) if t.engine == CORNERS else loop_output(t, s)
     code = nearest(total + t.limits[OFFSET], t.limits[FRACTION])
+    if code > t.limits[SATURATED] or code < -t.limits[SATURATED]:
+        s.counts[STATUS] |= OUTPUT_CLAMPED
     if code > t.limits[CODE_MAX]:
         return t.limits[CODE_MAX]
     if code < -t.limits[CODE_MAX]:

@@ -4,7 +4,7 @@ Everything is computed with fractions from the parameters as they are, so that t
 anywhere; only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
 
 Ranges. The drive is limited to `input_range`, so that the input w of the plays, every play and every corner stay
-between the least and largest of the range's images and the start memory. `Ranges` bounds every sum from there; a
+between the least and largest of the range's images, the start memory and 0, where a reset begins. `Ranges` bounds every sum from there; a
 format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables).
 
 Errors. With the drive exact, as it is sent: rounded thresholds and start states move a play by no more than their own
@@ -31,7 +31,7 @@ from hystgen.bounds import error_bounds
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import Path
-from hystgen.tables import FormatError
+from hystgen.tables import FormatError, first_moves
 from hystgen.words import counted
 
 CODE_BITS = {"q31": 31, "q15": 15}
@@ -142,7 +142,7 @@ class _Builder:
     def _codes(self) -> None:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
-        low, high = (Fraction(end) / self.output_lsb for end in self.cascade.output_range)
+        low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
         self.output = (math.ceil(low), math.floor(high))
         for (first, last), key, far in (
             (self.drive, "drive_lsb", ("input_range",)),
@@ -168,8 +168,9 @@ class _Builder:
     def _plays(self) -> None:
         """Least step of w, thresholds, start states and curves in it."""
         c, pi = self.cascade, self.cascade.pi
-        low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start))
-        high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start))
+        # where plays can be: in the range of their input, at the start memory, or at 0 behind a reset
+        low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start), Fraction(0))
+        high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
         span = high - low
         reach = max(abs(low), abs(high)) + 2 * min(span, Fraction(pi.thresholds[-1]))
         if c.stages:
@@ -181,7 +182,12 @@ class _Builder:
                 self.fine = max(0, math.floor(math.log2((1 << PLAY_BITS) / (reach / self.drive_lsb))))
             self.step = self.drive_lsb / 2**self.fine
 
-        cap = math.floor(span / self.step) + 8  # no play moves that far: one this wide never does
+        states = [nearest(Fraction(s) / self.step) for s in pi.start]
+        if c.stages:
+            cap = math.floor(span / self.step) + 8  # what rounding of the curves can add
+        else:
+            cap = max(self.drive[1] << self.fine, *states, 0) - min(self.drive[0] << self.fine, *states, 0)
+        # no input comes farther than `cap` from a play: one this wide never moves
         self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
         if cap > TABLE_MAX:
             needed = next((i for i, t in enumerate(self.threshold) if t > TABLE_MAX), None)
@@ -199,7 +205,6 @@ class _Builder:
                     + f" in {self.arithmetic} with {float(self.drive_lsb):.6g} a drive code; "
                     f"{finer}, or leave this play out",
                 ))
-        states = [nearest(Fraction(s) / self.step) for s in pi.start]
         for i in range(2, len(states)):
             room = self.threshold[i] - self.threshold[i - 1]
             states[i] = min(max(states[i], states[i - 1] - room), states[i - 1] + room)
@@ -213,6 +218,7 @@ class _Builder:
             raise FormatError((("model", "pi", "initial_state"), message))
         self.start = states
         self._curves()
+        self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # of all that plays can be
 
     def _curves(self) -> None:
         c = self.cascade
@@ -265,7 +271,7 @@ class _Builder:
         gain = [Fraction(p) * self.step / self.output_lsb for p in pi.weights]
         sums = [Fraction(0), *itertools.accumulate(gain)]
         offset = Fraction(self.cascade.output_offset) / self.output_lsb
-        largest = max(*(abs(w) for w in self.play), *(abs(s) for s in self.start)) + 1
+        largest = max(map(abs, self.hull)) + 1
         travel = self.play[1] - self.play[0]
         finer = self._finer("output_lsb")
         for i, g in enumerate(gain):
@@ -310,21 +316,20 @@ class _Builder:
 
     # ------------------------------------------------------------ results
 
-    def _drive_code(self, w: float) -> int:
-        """Code of the drive that stands for an input of the plays, as near as there is one."""
-        v = float(self.cascade.front_inverse(float(w))) if self.cascade.stages else w
-        code: int = nearest(Fraction(v) / self.drive_lsb)
-        return int(min(max(code, -self.code_max), self.code_max))
-
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = [0] * 22
+        limits = [0] * 23
         limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX] = self.drive
         limits[reference.OUTPUT_MIN], limits[reference.OUTPUT_MAX] = self.output
         limits[reference.OFFSET] = self.offset
-        if c.start_is_defined:
-            limits[reference.START_APPLIED] = self._drive_code(c.pi.start[0])
-            limits[reference.RESET_APPLIED] = self._drive_code(0.0)
+        far = 2 * max(map(abs, c.input_range))  # as good as any drive beyond it, and finite
+
+        def code(v: float) -> Fraction:
+            return Fraction(min(max(v, -far), far)) / self.drive_lsb
+
+        applied, ascending = first_moves(
+            c, self.drive, lambda v: (math.floor(code(v)), code(v).denominator == 1), lambda v: nearest(code(v))
+        )
         if c.branches_differ and self.invertible:
             limits[reference.HOLD] = math.floor(2 * (self._inverse_rounding() or 0))
         limits[reference.REAL_MAX] = 2**SUM_BITS
@@ -332,6 +337,7 @@ class _Builder:
         limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] = self.play
         limits[fixed.MARGIN], limits[fixed.FRACTION] = self.margin, self.bits
         limits[fixed.FINE], limits[fixed.CODE_MAX] = self.fine, self.code_max
+        limits[fixed.SATURATED] = self._saturated()
         curves = self.front
         pieces = [piece for curve in curves for piece in curve.pieces]
 
@@ -348,6 +354,8 @@ class _Builder:
             shift=whole(self.shift),
             start=whole(self.start if len(set(self.start)) > 1 else self.start[:1]),
             limits=whole(limits),
+            applied=whole(applied),
+            ascending=whole(ascending),
             knot=whole([piece.knot for piece in pieces]),
             coefficient=np.array([piece.coefficients for piece in pieces] or np.zeros((0, 1)), dtype=np.int64),
             scale=whole([piece.scale for piece in pieces]),
@@ -361,6 +369,14 @@ class _Builder:
             branches=int(c.branches_differ),
             fronts=int(bool(c.stages)),
         )
+
+    def _saturated(self) -> int:
+        """Size of an output code beyond which limiting it to the type is reported.
+
+        Outputs after `init` fit the type but for rounding; those after `reset` may not.
+        """
+        behind_reset = (abs(Fraction(y)) for y in self.cascade.reset_range)
+        return self.code_max if max(behind_reset) > (self.code_max + Fraction(1, 2)) * self.output_lsb else 2**SUM_BITS
 
     def _play_errors(self) -> list[Fraction]:
         """How far each play can be from that of the exact model, in physical units of w."""
@@ -379,9 +395,8 @@ class _Builder:
         """How far a sum can be from the exact model's output, in output codes, before it is rounded."""
         pi = self.cascade.pi
         plays = sum(Fraction(p) * e for p, e in zip(pi.weights, self._play_errors(), strict=True)) / self.output_lsb
-        largest = max(*(abs(w) for w in self.play), *(abs(s) for s in self.start))
-        travel = self.play[1] - self.play[0]
-        weights = self.slope_errors[-1] * largest
+        travel = self.hull[1] - self.hull[0]
+        weights = self.slope_errors[-1] * max(map(abs, self.hull))
         for k, (a, b) in enumerate(itertools.pairwise(self.threshold), 1):
             weights += self.slope_errors[k] * min(b - a, travel)
         return plays + weights + self.offset_error
@@ -408,7 +423,7 @@ class _Builder:
             return None
         c, pi = self.cascade, self.cascade.pi
         steepest, flattest = Fraction(c.front_slopes[1]), Fraction(c.front_slopes[0])
-        travel = self.play[1] - self.play[0]
+        travel = self.hull[1] - self.hull[0]
         # rounding of the solution: its input of the plays, then the drive code
         solved = self.step * (Fraction(1, 2) + Fraction(travel, 2**31) + Fraction(1, 2**8))
         code = Fraction(1, 2)

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple, Protocol
 
@@ -469,6 +470,12 @@ class Cascade:
         return low, high
 
     @cached_property
+    def reset_range(self) -> tuple[float, float]:
+        """Extremes of the output over every drive history inside `input_range` when all plays begin at 0."""
+        low, high = (self._after(w, start=(0.0,) * (self.pi.n + 1)) for w in self.play_range)
+        return low, high
+
+    @cached_property
     def swung(self) -> tuple[float, float]:
         """The output at either end of `input_range` after the other end: inside `output_range`, or right at its ends.
 
@@ -483,12 +490,18 @@ class Cascade:
         )
 
     def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
-        """The output when the plays have been led from their start memory to inputs, one after the other."""
-        states = list(self.pi.start if start is None else start)
-        for w in drives:
-            states = [min(max(s, w - r), w + r) for s, r in zip(states, self.pi.thresholds, strict=True)]
+        """The output when the plays have been led from their start memory to inputs, one after the other.
+
+        In fractions: an offset may cancel most of the sum, and limits are rounded inward from here.
+        """
+        thresholds = [Fraction(r) for r in self.pi.thresholds]
+        states = [Fraction(s) for s in (self.pi.start if start is None else start)]
+        for w in map(Fraction, drives):
+            states = [min(max(s, w - r), w + r) for s, r in zip(states, thresholds, strict=True)]
             states[0] = w
-        return math.fsum([*(p * s for p, s in zip(self.pi.weights, states, strict=True)), self.output_offset])
+        weights = [Fraction(p) for p in self.pi.weights]
+        total = sum((p * s for p, s in zip(weights, states, strict=True)), Fraction(self.output_offset))
+        return float(total)
 
     @property
     def start_is_defined(self) -> bool:

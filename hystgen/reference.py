@@ -28,7 +28,7 @@ Bytes = NDArray[np.uint8]
 
 # arithmetic-independent names for places in the arrays below
 DRIVE_MIN, DRIVE_MAX, OUTPUT_MIN, OUTPUT_MAX, OFFSET = 0, 1, 2, 3, 4
-START_APPLIED, RESET_APPLIED, HOLD, REAL_MAX, ZERO, HALF = 5, 6, 7, 8, 9, 10
+HOLD, REAL_MAX, ZERO, HALF = 7, 8, 9, 10
 MULTIPLE = 13  # there and two places to either side: -2, -1, 0, 1, 2
 LIMITED_LOW, LIMITED_HIGH = 16, 17  # floating point only, as are these
 
@@ -56,6 +56,8 @@ class Tables(NamedTuple):
     inverse_slope: Reals  # n + 2
     start: Reals  # n + 1 plays, or 1 where all start at the same value
     limits: Reals  # DRIVE_MIN .. LIMITED_HIGH
+    applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
+    ascending: Counts  # direction before the first move, likewise
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # where the stage's numbers begin in stage_data
     stage_size: Counts  # break points of a dead zone
@@ -546,20 +548,22 @@ def loop_solve(t: Tables, s: State, output: Any) -> Any:
     """Input of the plays that gives `output`, letting go of the largest thresholds one by one."""
     rising = output >= loop_output(t, s)
     tail = t.limits[ZERO]
-    k = len(s.play)
-    while k > 1:
-        last = k - 1
+    next_follows = t.limits[ZERO]
+    for last in range(len(s.play) - 1, -1, -1):
+        k = last + 1
         if rising:
+            first = s.play[last] + t.threshold[last]
             w = (output - (tail - t.lift[k])) * t.inverse_slope[k]
-            if w >= s.play[last] + t.threshold[last]:
-                return w
         else:
+            first = s.play[last] - t.threshold[last]
             w = (output - (tail + t.lift[k])) * t.inverse_slope[k]
-            if w <= s.play[last] - t.threshold[last]:
-                return w
+        if reached(w, first, rising):
+            if k < len(s.play) and past(w, next_follows, rising):
+                return next_follows
+            return w
         tail = tail + t.weight[last] * s.play[last]
-        k = last
-    return (output - tail) * t.inverse_slope[1]
+        next_follows = first
+    return s.play[0]
 
 
 # ---------------------------------------------------------------- envelope_*.c, dead_zone_*.c
@@ -666,22 +670,23 @@ def solve(t: Tables, s: State, u: Any) -> Any:
     return loop_solve(t, s, u - t.limits[OFFSET])
 
 
-def begin(t: Tables, s: State, applied: Any) -> None:
-    """What init and reset have in common once the plays are set."""
-    s.counts[ASCENDING] = 1
+def begin(t: Tables, s: State, which: int) -> None:
+    """What init and reset have in common once the plays are set; `which` as in `Tables.applied`."""
+    applied = t.applied[which]
+    s.counts[ASCENDING] = t.ascending[which]
     s.counts[HAS_PENDING] = 0
     s.counts[REPEAT] = 0
     s.counts[STEPPED] = 0
     s.counts[BITS] = 0
-    s.counts[STATUS] = 0
     s.real[PENDING] = applied
     s.real[APPLIED] = applied
     s.real[LEVEL] = output(t, s)
+    s.counts[STATUS] = 0
     s.real[REFERENCE] = s.real[LEVEL]
     s.real[ANSWER] = s.real[LEVEL]
 
 
-def init(t: Tables, s: State) -> None:
+def init(t: Tables, s: State, inverse: int) -> None:
     """Start memory of the parameter file."""
     if len(t.start) == 1:
         rest(t, s, t.start[0])
@@ -689,7 +694,7 @@ def init(t: Tables, s: State) -> None:
         corners_start(t, s, t.start)
     else:
         loop_start(s, t.start)
-    begin(t, s, t.limits[START_APPLIED])
+    begin(t, s, 2 * inverse)
 
 
 def see_drive(t: Tables, s: State, v: Any) -> None:
@@ -792,7 +797,7 @@ def inverse_step(t: Tables, s: State, u: Any) -> Any:
         s.counts[HAS_PENDING] = 0
     if not finite(t, u):
         s.counts[STATUS] |= HELD
-        v = s.real[ANSWER] if s.counts[STEPPED] else clamp_drive(t, s.real[APPLIED])
+        v = s.real[ANSWER] if s.counts[STEPPED] else s.real[APPLIED]
         foretell(t, s, v)
         return answer(s, v)
     if s.counts[REPEAT] and u == s.real[REFERENCE]:
@@ -844,22 +849,22 @@ def inverse_commit(t: Tables, s: State, applied: Any) -> None:
     foretell(t, s, v)
 
 
-def reset(t: Tables, s: State) -> None:
+def reset(t: Tables, s: State, inverse: int) -> None:
     """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
     rest(t, s, t.limits[ZERO])
-    begin(t, s, t.limits[RESET_APPLIED])
+    begin(t, s, 2 * inverse + 1)
 
 
 def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
     """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
     for i in range(len(op)):
         if op[i] == OP_INIT:
-            init(t, s)
+            init(t, s, inverse)
         elif op[i] == OP_COMMIT:
             inverse_commit(t, s, x[i])
         else:
             if op[i] == OP_RESET:
-                reset(t, s)
+                reset(t, s, inverse)
             if inverse:
                 inverse_step(t, s, x[i])
             else:

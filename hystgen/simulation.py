@@ -46,7 +46,7 @@ class Session:
 
     def init(self) -> None:
         """Back to the start memory."""
-        self._code.init(self.tables, self.state)
+        self._code.init(self.tables, self.state, self._inverse)
 
     @property
     def drive_range(self) -> tuple[float, float]:

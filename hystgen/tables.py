@@ -9,7 +9,7 @@ import csv
 import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -82,6 +82,32 @@ def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
     if float(b) > high:
         b = np.nextafter(b, dtype(-np.inf))
     return a, b
+
+
+def first_moves(
+    cascade: Cascade,
+    limits: tuple[Any, Any],
+    below: Callable[[float], tuple[Any, bool]],
+    nearest: Callable[[float], Any],
+) -> tuple[list[Any], list[int]]:
+    """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.
+
+    `below` gives the largest number of the type that is not above a drive, and whether it is that drive. The forward
+    operator has to know which way the actuator moves from the drive that the start memory stands for, also where that is
+    no number of the type or lies beyond the limits: seen from the number below it, every move has its true direction if
+    no move counts as descending. The inverse starts at the nearest number, where it may stay.
+    """
+    low, high = limits
+    applied, ascending = [0, 0, 0, 0], [1, 1, 1, 1]
+    if cascade.start_is_defined:
+        for j, w in enumerate((float(cascade.pi.start[0]), 0.0)):
+            v = float(cascade.front_inverse(w))
+            number, same = below(v)
+            ascending[j] = int(number < low or (same and number <= high))
+            applied[j] = min(max(number, low), high)
+            ascending[2 + j] = int(nearest(v) <= high)
+            applied[2 + j] = min(max(nearest(v), low), high)
+    return applied, ascending
 
 
 def upward(x: float, dtype: Any) -> Any:
@@ -191,10 +217,15 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
     else:
         limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
     limits[reference.OFFSET] = cascade.output_offset
-    if cascade.start_is_defined:
-        # the drive that the start memory stands for: held before any sample, and where the first move starts
-        for place, w in ((reference.START_APPLIED, pi.start[0]), (reference.RESET_APPLIED, 0.0)):
-            limits[place] = float(cascade.front_inverse(w))
+
+    def below(v: float) -> tuple[float, bool]:
+        number = dtype(v)
+        if float(number) > v:
+            number = np.nextafter(number, dtype(-np.inf))
+        return float(number), float(number) == v
+
+    drives = (limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX])
+    applied, ascending = first_moves(cascade, drives, below, lambda v: float(dtype(v)))
     if cascade.branches_differ and not cascade.inverse_problems():
         limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits[reference.REAL_MAX] = largest
@@ -221,6 +252,8 @@ def build_float(cascade: Cascade, arithmetic: str, engine: str, clamp: bool, inv
         ),
         start=reals(pi.start if len(set(pi.start)) > 1 else pi.start[:1], "start states", "pi"),
         limits=np.array(limits, dtype=dtype),
+        applied=np.array(applied, dtype=dtype),
+        ascending=np.array(ascending, dtype=np.int64),
         stage_kind=np.array(kinds, dtype=np.int64),
         stage_first=np.array(firsts, dtype=np.int64),
         stage_size=np.array(sizes, dtype=np.int64),

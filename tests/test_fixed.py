@@ -164,12 +164,12 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         **{
             field: getattr(tables, field).astype(object)
             for field in ("threshold", "weight", "slope", "lift", "start_level", "reciprocal", "shift", "start",
-                          "limits", "knot", "coefficient", "scale", "domain", "edge", "argument", "below")
+                          "limits", "applied", "knot", "coefficient", "scale", "domain", "edge", "argument", "below")
         }
     )  # fmt: skip
     for inverse in (0, 1):
         state = reference.new_state(whole)
-        plain.init(whole, state)
+        plain.init(whole, state, inverse)
         first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
         for code in records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7].tolist():
             (plain.inverse_step if inverse else plain.forward_step)(whole, state, code)

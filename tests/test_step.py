@@ -178,7 +178,7 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
     state = reference.new_state(numbers)
-    reference.init(numbers, state)
+    reference.init(numbers, state, int(inverse))
     first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range

@@ -44,8 +44,13 @@ def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
         "offset": operand(limits[reference.OFFSET]),
         "start": literal(numbers.start[0]),
         "start_list": len(numbers.start) > 1,
-        "start_applied": literal(limits[reference.START_APPLIED]),
-        "reset_applied": literal(limits[reference.RESET_APPLIED]),
+        "first_moves": {
+            op: {
+                call: (literal(numbers.applied[j]), "true" if numbers.ascending[j] else "false")
+                for call, j in (("init", first), ("reset", first + 1))
+            }
+            for op, first in (("forward", 0), ("inverse", 2))
+        },
         "hold": operand(limits[reference.HOLD]),
     }
 
@@ -108,6 +113,7 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "has_offset": bool(numbers.limits[reference.OFFSET]),
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
+        "saturates": False,
         "precision": [],
     }
 
@@ -197,6 +203,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "fine_factor": 2**fine,
         "fraction": int(limits[fixed.FRACTION]),
         "code_max": int(limits[fixed.CODE_MAX]),
+        "saturates": bool(limits[fixed.SATURATED] == limits[fixed.CODE_MAX]),
         "curves": _curves(numbers, name, options) if numbers.fronts else {},
         "drive_lsb": _physical(form.drive_lsb),
         "output_lsb": _physical(form.output_lsb),

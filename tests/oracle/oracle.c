@@ -50,6 +50,7 @@ typedef struct {
        still, on the other branch: the ends there are the numbers in the header. */
     quad drive_end[2], reference_end[2];
     quad size;        /* nothing added up for an output exceeds it */
+    quad outer;       /* sum of the weights, the steepest slope of the plays */
 } context_t;
 
 static quad least_of(quad a, quad b) { return a < b ? a : b; }
@@ -357,6 +358,7 @@ static void set_up(context_t *c, const oracle_model_t *m, const oracle_probe_t *
         total += m->weight[i];
         c->size += (quad)m->weight[i] * m->threshold[i];
     }
+    c->outer = total;
     c->size += total * most_of(most_of(size_of(ends[0]), size_of(ends[1])), size_of(c->start[0]));
 }
 
@@ -652,7 +654,9 @@ static void check_limits(const context_t *c, oracle_result_t *r)
 {
     const oracle_probe_t *p = c->p;
     const double text = 1 + 4 * DBL_EPSILON; /* the LSB is printed as a double */
-    const quad slack = 64 * (quad)DBL_EPSILON * c->size; /* the package finds extremes in double */
+    /* the package finds extremes in double, where a stage may cancel most of its argument */
+    const quad drive = most_of(size_of(c->low), size_of(c->high));
+    const quad slack = 64 * (quad)DBL_EPSILON * (c->size + c->outer * c->steepest * drive);
     const struct { const char *name; double value, lsb; quad end; int inward; quad off; } rows[] = {
         {"DRIVE_MIN", p->drive_min, p->drive_lsb, c->low, 1, size_of(c->low) * (text - 1)},
         {"DRIVE_MAX", p->drive_max, p->drive_lsb, c->high, -1, size_of(c->high) * (text - 1)},
@@ -701,11 +705,19 @@ static exact_t memory(const context_t *c)
 }
 
 /* Whether v is so near to the drive a start memory stands for that rounding decides whether and where it moves. */
-static bool uncertain_start(const context_t *c, const exact_t *e, quad v)
+static bool uncertain_start(const context_t *c, const exact_t *e, quad v, quad near)
 {
-    const quad near = (c->high - c->low) / 1000 + 4 * physical(c, 1, c->p->drive_lsb) * (c->p->kind == ORACLE_FIXED);
     return c->branches && !e->moved && size_of(drive_inside(c, v) - e->applied) <= near;
 }
+
+/* The inverse starts at a number of its type, where it may stay. */
+static quad about_a_number(const context_t *c)
+{
+    return (c->high - c->low) / 1000 + 4 * physical(c, 1, c->p->drive_lsb) * (c->p->kind == ORACLE_FIXED);
+}
+
+/* The forward operator knows the start drive as it is, to double precision. */
+static quad about_a_double(const context_t *c) { return (c->high - c->low) / 1000000000; }
 
 void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t seed, long calls, double shrink,
     oracle_call_t *log, oracle_result_t *r)
@@ -729,9 +741,10 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             exact = output_at(&f.c, &e, e.s[0]) + f.c.offset;
         }
         x = next_sample(&f, &e, false);
-        if (call != ORACLE_INIT && isfinite(x) && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb))) {
-            x = p->drive_min + p->drive_max - x; /* the stated bound begins off the start */
-            if (uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb))) {
+        if (call != ORACLE_INIT && isfinite(x)
+            && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb), about_a_double(&f.c))) {
+            x = p->drive_min + p->drive_max - x;
+            if (uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb), about_a_double(&f.c))) {
                 x = p->drive_min;
             }
         }
@@ -760,7 +773,21 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             const bool out = isfinite(x) && (x < p->drive_min || x > p->drive_max);
             bits_are(r, k, status, INPUT_CLAMPED, out, out, "INPUT_CLAMPED");
         }
-        bits_are(r, k, status, OUTPUT_CLAMPED | DOMAIN_LIMITED, false, false, "OUTPUT_CLAMPED or DOMAIN");
+        bits_are(r, k, status, DOMAIN_LIMITED, false, false, "DOMAIN");
+        {
+            /* behind a reset the output can be more than any code: then it is the last code, and a bit says so */
+            const double most = p->kind == ORACLE_FIXED ? (f.codes15 ? 32767 : 2147483647) : HUGE_VAL;
+            const quad size = size_of(exact) / p->output_lsb;
+            const bool may = isfinite(x) && size >= most - p->forward_bound;
+            bits_are(r, k, status, OUTPUT_CLAMPED, isfinite(x) && size > most + p->forward_bound, may, "OUTPUT_CLAMPED");
+            if (call == ORACLE_STEP && (status & OUTPUT_CLAMPED) != 0) {
+                if (answer != (exact > 0 ? most : -most)) {
+                    ++r->wrong;
+                    fault(r, k, "a limited output is %.17g, not the last code", answer);
+                }
+                continue;
+            }
+        }
         if (call == ORACLE_STEP) {
             judge(r, k, "forward", answer * (quad)p->output_lsb, exact, p->forward_bound * p->output_lsb * shrink,
                 &r->over_forward, &r->worst_forward);
@@ -830,7 +857,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             known = agreed = true;
         }
         if (sent.has_pending) {
-            known = known && !uncertain_start(c, &sent, sent.pending);
+            known = known && !uncertain_start(c, &sent, sent.pending, about_a_number(c));
             take_pending(c, &sent);
             take_pending(c, &own);
             agreed = agreed && known && sent.ascending == own.ascending;
@@ -862,9 +889,10 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         }
         v = answer * (quad)p->drive_lsb;
         moved_up = v > sent.applied ? true : v < sent.applied ? false : sent.ascending;
-        same = known && !uncertain_start(c, &sent, v) && (!fresh || moved_up == up);
+        same = known && !uncertain_start(c, &sent, v, about_a_number(c)) && (!fresh || moved_up == up);
         sent.answer = sent.pending = v; /* what the actuator sees */
         if (call == ORACLE_RESET) {
+            known = known && !uncertain_start(c, &sent, v, about_a_number(c));
             take_pending(c, &sent);
             take_pending(c, &own);
             sent.has_pending = own.has_pending = true;
@@ -881,7 +909,9 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             bits_are(r, k, status, INPUT_CLAMPED, out, out, "INPUT_CLAMPED");
         }
         if (fresh && (same || !c->branches)) {
-            const quad *ends = c->end[up][m->stages], room = c->steepest * bound;
+            /* a bound that is the whole range says nothing of how far an answer can lie beyond it */
+            const bool open = p->inverse_bound >= (p->drive_max - p->drive_min) * 0.999;
+            const quad *ends = c->end[up][m->stages], room = open ? (quad)HUGE_VAL : c->steepest * bound;
             const bool must = at > ends[1] + room || at < ends[0] - room;
             const bool may = at >= ends[1] - room || at <= ends[0] + room;
             bits_are(r, k, status, OUTPUT_CLAMPED, must, may, "OUTPUT_CLAMPED");
