@@ -21,7 +21,7 @@ import pytest
 from recordings import brute_output, noisy, wander, write_csv
 
 import hystgen
-from hystgen import identification
+from hystgen import extras, identification
 from hystgen.identification import outliers, workers
 from hystgen.identification.workers import Result, Task
 
@@ -415,7 +415,7 @@ def test_without_dask_one_line_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     code, _, err = run("identify", "--batch", few, "-o", tmp_path / "params", "--scheduler", "tcp://127.0.0.1:1")
-    assert (code, err) == (2, "error: a scheduler needs Dask; install it with: pip install 'hystgen[fleet]'")
+    assert (code, err) == (2, f"error: a scheduler needs Dask; install it with: {extras.install('fleet')}")
 
 
 # -- usage -------------------------------------------------------------------------------------------------------------

@@ -25,6 +25,7 @@ from recordings import brute_output, brute_plays, noisy, wander, write_csv
 from scipy.stats import binned_statistic
 
 import hystgen
+from hystgen import extras
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import drawing, fit_figures
@@ -406,7 +407,7 @@ class TestCommand:
         monkeypatch.setitem(sys.modules, "matplotlib", None)
         code, said, told = run("identify", a, "-o", tmp_path / "a.yaml", "--report", tmp_path / "out")
         assert (code, said) == (2, "")
-        assert "pip install 'hystgen[plot]'" in told
+        assert extras.install("plot") in told
         assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "b.csv"}
 
     def test_a_file_in_the_way_and_an_input_in_the_folder(self, run: Run, tmp_path: Path) -> None:

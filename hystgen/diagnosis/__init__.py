@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import arguments
 from hystgen.diagnosis import believed, channels, disturbances, floor, intervals, selection, starts, structure, told
 from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.disturbances import Cleaned
@@ -28,10 +29,10 @@ from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
 from hystgen.effects.base import Place
 from hystgen.identification import remarks, stage_content, threads
-from hystgen.identification.fit import Source, visited
+from hystgen.identification.fit import visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
 from hystgen.identification.thresholds import rounded
-from hystgen.records import Record, read_records
+from hystgen.records import Source, read_records, several
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -105,6 +106,17 @@ class Diagnosis:
             return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
         return f"{missing}. The records are disturbed too: {first}{more}.{but}"
 
+    def not_emitted(self) -> str:
+        """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
+        from hystgen.api import Model, emit_options
+        from hystgen.problems import UnsupportedEffectsError
+
+        try:
+            emit_options(Model(self.parameters))
+        except UnsupportedEffectsError as error:
+            return str(error)
+        return ""
+
     def _name(self, name: str) -> str:
         """An effect with those that it cannot be told from."""
         others = [other for one, other in self.content["not_separable"] if one == name]
@@ -152,27 +164,30 @@ def diagnose(
     weights on the free-run error, and accepted when it removes a worthwhile part of the held-out error that chance does
     not explain. Raises RecordError, IdentificationError, ValueError.
     """
-    from hystgen.api import Model, load
+    from hystgen.api import as_model
+    from hystgen.effects import Effect
     from hystgen.progress import Progress
 
-    model = parameters if isinstance(parameters, Model) else load(parameters)
+    model = as_model(parameters)
     given = model.parameters.model.effects
-    several = [records] if isinstance(records, Record | str | os.PathLike) else list(records)
-    others = [holdout] if isinstance(holdout, Record | str | os.PathLike) else list(holdout)
-    if not several:
+    fitted, others = several(records), several(holdout)
+    if not fitted:
         raise ValueError("there is no record to fit")
-    read = read_records([*several, *others], columns, sample_time, delimiter, progress=progress)
+    arguments.number("rest", rest, "seconds", 0.0)
+    if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
+        raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
+    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
     with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
         first = believed.as_given(model.cascade, given)
         usable, odd = channels.checked(read, *first, before)
         to_fit, to_hold = (
             [record for record in group if record is not None]
-            for group in (usable[: len(several)], usable[len(several) :])
+            for group in (usable[: len(fitted)], usable[len(fitted) :])
         )
 
         def searched(history: tuple[float, ...] | None) -> tuple[Cleaned, Floor, Records, Outcome]:
-            ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
+            ready = believed.prepare(to_fit or read[: len(fitted)], to_hold, history, rest)
             base, start = believed.structure_of(model.cascade, given, ready)
             weights = believed.believed_weights(model.cascade, base)
 
@@ -211,7 +226,7 @@ def diagnose(
         ]
         content = content_of(model.parameters, ready, noise, found, as_given, odd, compared.one_loop)
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
-    notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
+    notes += [*remarks.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += cleaned.notes(model.parameters.units.output)
     extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import textwrap
 import warnings as python_warnings
@@ -13,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import arguments
 from hystgen.identification import faults, joint, reduction, remarks
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
 from hystgen.identification.uncertainty import Intervals
 from hystgen.identification.used import Used
-from hystgen.records import Record, read_record, write_atomically
+from hystgen.records import Record, Source, read_record, write_atomically
 from hystgen.words import counted
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 HELD_OUT = 0.25
 """Share of each record, its end, that is held out for the figures when no record is given for that."""
-
-Source = Record | str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -168,8 +166,5 @@ def _read(source: Source) -> Record:
 
 
 def visited(values: Sequence[float]) -> tuple[float, ...]:
-    """A history as plain numbers. Raises ValueError unless all are finite."""
-    places = tuple(float(x) for x in values)
-    if not all(math.isfinite(x) for x in places):
-        raise ValueError("history is a list of finite drive values")
-    return places
+    """A history as plain numbers. Raises ValueError unless all are finite, TypeError for what is no list of numbers."""
+    return arguments.numbers("history", values, "[100, -100]")

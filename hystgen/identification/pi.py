@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import arguments
 from hystgen.identification import reduction, thresholds, weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
@@ -163,9 +164,9 @@ def checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[floa
         return int(wanted)
     if isinstance(wanted, str | float | bool):
         raise ValueError("thresholds is a whole number of plays or a list of thresholds")
-    places = tuple(float(r) for r in wanted)
+    places = arguments.numbers("thresholds", wanted, "[0, 1.5, 3]")
     if not places or places[0] != 0.0:
         places = (0.0, *places)
-    if not all(math.isfinite(r) for r in places) or any(b <= a for a, b in itertools.pairwise(places)):
+    if any(b <= a for a, b in itertools.pairwise(places)):
         raise ValueError("thresholds are finite, not negative, and rise strictly")
     return places

@@ -16,8 +16,6 @@ from hystgen.records.columns import LISTED, Column, Finder, further_names
 from hystgen.records.record import Array
 from hystgen.records.units import to_seconds
 
-INSTALL = "pip install 'hystgen[formats]'"
-
 
 class Lines:
     """Line of the file that each row of a table came from, kept by stretches of rows."""
@@ -104,10 +102,14 @@ class Reading:
             raise self.refuse(f"is not {kind} ({printable(str(failure))}); export it again") from None
 
     def chosen(
-        self, columns: Sequence[Column], ignored: Sequence[str] = (), line: int | None = None
+        self,
+        columns: Sequence[Column],
+        ignored: Sequence[str] = (),
+        outside: Sequence[str] = (),
+        line: int | None = None,
     ) -> dict[str, Column]:
         """The columns that are asked for, by our names. Raises RecordError for those that are not there."""
-        finder = Finder(columns, self.columns, ignored)
+        finder = Finder(columns, self.columns, ignored, outside)
         found = finder.find(self.need, self.sample_time is not None)
         for text in finder.problems:
             self.problem(text, line)
@@ -119,7 +121,8 @@ class Reading:
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
-        self.left_out("whose name is taken", [c.name for c in others if c not in names.values() and c.name])
+        kept = {c.name for c in names.values()}
+        self.left_out("whose name is taken", [c.name for c in others if c.name not in kept and c.name])
         return names
 
     def left_out(self, which: str, names: Sequence[str]) -> None:
@@ -128,18 +131,20 @@ class Reading:
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
             self.notes.append(f"columns {which} were left out: {', '.join(map(printable, names[:LISTED]))}{more}")
 
-    def table(self, columns: Sequence[Column], ignored: Sequence[str]) -> Table:
+    def table(self, columns: Sequence[Column], ignored: Sequence[str], outside: Sequence[str] = ()) -> Table:
         """The table of a file whose columns are read one by one.
 
-        Read are the columns asked for and, out of the groups that hold these, all others of the same length.
+        Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
+        that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`).
         """
-        chosen = self.chosen(columns, ignored)
+        chosen = self.chosen(columns, ignored, outside)
         lengths = {c.length for c in chosen.values()}
         if len(lengths) > 1:
             told = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
             raise self.refuse(f"the columns differ in length: {told} samples; export them with one length")
         folders = {c.folder for c in chosen.values()}
         self.left_out("without numbers", ignored)
+        self.left_out("kept outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
         near = [c for c in columns if c.folder in folders]
         self.left_out("of another length", [c.name for c in near if c.length not in lengths])

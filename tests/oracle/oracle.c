@@ -741,6 +741,10 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             exact = output_at(&f.c, &e, e.s[0]) + f.c.offset;
         }
         x = next_sample(&f, &e, false);
+        if (f.c.branches && !e.moved && choice(&f, 2) == 0) { /* right beside the drive that the start memory stands for */
+            x = neighbour(&f.c, coded(&f.c, drive_inside(&f.c, e.applied), p->drive_lsb), choice(&f, 3) - 1);
+            x = p->kind == ORACLE_FIXED ? fmin(fmax(x, p->drive_min), p->drive_max) : x;
+        }
         if (call != ORACLE_INIT && isfinite(x)
             && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb), about_a_double(&f.c))) {
             x = p->drive_min + p->drive_max - x;
