@@ -102,8 +102,8 @@ def _outputs(tables: reference.Tables | FixedTables, op: Bytes, drive: NDArray[n
     last = np.cumsum(times) - 1
     calls = np.full(int(times.sum()), reference.OP_STEP, dtype=np.uint8)
     calls[last - times + 1] = op
-    answers: NDArray[np.float64] = compiled.answers(tables, False, calls, np.repeat(drive, times))[0].astype(float)
-    return answers[last]
+    answers: NDArray[np.float64] = compiled.answers(tables, False, calls, np.repeat(drive, times))[0][last]
+    return answers.astype(float)
 
 
 def along(
