@@ -84,10 +84,11 @@ def lsbs(
 ) -> tuple[Fraction, Fraction]:
     """Physical units a drive code and an output code: those given, else the finest that reach the ends of the ranges.
 
-    Raises FormatError for one that is too small.
+    Raises FormatError for one that is too small, and for an output that stays 0.
     """
     code_max = 2 ** CODE_BITS[arithmetic] - 1
-    found, refused = [], []
+    found: list[Fraction] = []
+    refused: list[tuple[Path, str]] = []
     for given, ends, what, key in (
         (drive_lsb, cascade.input_range, "input_range", "drive_lsb"),
         (output_lsb, cascade.output_range, "the output range", "output_lsb"),
@@ -95,6 +96,9 @@ def lsbs(
         largest = max(abs(decimal(end)) for end in ends)
         finest = largest / code_max
         lsb = finest if given is None else decimal(given)
+        if lsb == 0:
+            stays = "no play moves over this range of the drive, and the output stays 0; widen the range"
+            refused.append((("input_range",), stays))
         if lsb < finest:
             refused.append((
                 ("emit", key),

@@ -355,3 +355,10 @@ def test_no_entry_of_a_curve_passes_its_type() -> None:
     numbers, _ = built(Cascade(pi, (TanhEnvelope(up, down),), -68125.91212, (-3000.0, 3000.0)), "q31")
     assert len(numbers.coefficient) > 100
     assert np.abs(numbers.coefficient).max() <= 2**31 - 1
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_an_output_that_stays_0_is_refused(arithmetic: str) -> None:
+    still = Cascade(PI([0.0, 3.0], [0.0, 1.0]), (), 0.0, (-1.0, 1.0))
+    with pytest.raises(FormatError, match="no play moves over this range of the drive, and the output stays 0; widen"):
+        built(still, arithmetic)
