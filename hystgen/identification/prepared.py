@@ -1,18 +1,30 @@
-"""Records as a fit compares them: cut at gaps, spikes of the drive bridged, outliers of the output left out."""
+"""Records as a fit compares them: cut at gaps, faults of the drive bridged, wrong samples of the output left out.
+
+What shows without a model is looked for when a course is made, before anything is fitted; isolated samples far from
+what a first, robust fit makes of their neighbours behind it.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hystgen.identification import faults, pi
+from hystgen.identification import faults, pi, stretches
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
-from hystgen.records import Record
+from hystgen.records import SHORTEST, Record
 from hystgen.words import counted
+
+Array = NDArray[np.float64]
+
+LEFT = 0.1
+"""Least share of a record that has to be left of it where its output stood at a converter's end."""
+
+ROUNDS = 3
+"""Most times that the robust fit is repeated; it is once where that changes nothing about the outliers."""
 
 
 def courses(
@@ -44,16 +56,66 @@ def courses(
             f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
-    return [bridged(item) for item in made], told
+    for k, item in enumerate(made):
+        made[k], more = _without_stretches(item)
+        told += more
+    return made, told
 
 
-def bridged(item: Course) -> Course:
-    """The course with straight lines in place of isolated spikes of its drive."""
-    spikes = faults.drive_spikes(item.v, item.y)
-    if not spikes.any():
-        return item
-    # a spike is no extreme of the drive: the start memory is known at another sample than it looked
-    return pi.resettled(replace(item, v=faults.bridged(item.v, spikes)), math.inf)
+def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
+    """The course without the samples at which the converter stood at its end; which end, its level and how many.
+
+    Raises IdentificationError where next to nothing is left.
+    """
+    levels = stretches.rails(item.y, item.v)
+    if not levels:
+        return item, []
+    at = np.isin(item.y, [level for _, level in levels])
+    left, before = np.count_nonzero(np.isfinite(item.y) & ~at), np.count_nonzero(np.isfinite(item.y))
+    if left < max(LEFT * before, SHORTEST):
+        raise IdentificationError(
+            f"{item.name}: y stands at the converter's end in {before - left} of {len(at)} samples; set the sensor's "
+            "range so that the whole motion lies inside it, and record again"
+        )
+    return _less(item, at), [(name, level, int(np.count_nonzero(item.y == level))) for name, level in levels]
+
+
+def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
+    """The course without drop-outs and held samples, and where these are."""
+    found = []
+    for what, find in (("drop-out", stretches.drop_outs), ("run", stretches.held)):
+        runs = find(item.y, item.v)
+        if runs:
+            wrong = np.zeros(len(item.y), dtype=bool)
+            for a, b in runs:
+                wrong[a:b] = True
+            item = _less(item, wrong)
+            found.append((what, runs))
+    return item, found
+
+
+def _less(item: Course, wrong: NDArray[np.bool_]) -> Course:
+    """The course without these samples of y."""
+    faulty = wrong if item.stretches is None else wrong | item.stretches
+    return replace(item, y=np.where(wrong, np.nan, item.y), stretches=faulty)
+
+
+def _without_stretches(item: Course) -> tuple[Course, list[str]]:
+    """The course without the samples of y in stretches that are plainly wrong, and what they were."""
+    left, ends = without_rails(item)
+    told = [
+        f"{item.name}: {counted(number, 'sample')} of y at the converter's end, the {name} of {level:.6g}, not compared"
+        for name, level, number in ends
+    ]
+    left, runs = _without_runs(left)
+    for what, places in runs:
+        number = counted(sum(b - a for a, b in places), "sample")
+        held = " of equal samples while the drive moves" if what == "run" else ""
+        told.append(
+            f"{item.name}: {counted(len(places), what)}{held}, {number} of y not compared; the first is sample "
+            f"{places[0][0]}"
+        )
+    return left, told
 
 
 def mask_outliers(
@@ -61,12 +123,35 @@ def mask_outliers(
 ) -> None:
     """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
 
-    Those at the start too: how much of it is compared is known only in the end.
+    Those at the start too: how much of it is compared is known only in the end. The play sum is one of least trimmed
+    squares (Rousseeuw and Van Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the
+    samples that it misses most, as many as may be left out, so that none of them draws it near.
     """
-    solution, _ = pi.solve(to_fit, wanted, floor)
-    for group in (to_fit, held):
-        for k, item in enumerate(group):
-            error = pi.compare(replace(item, first=0), solution.thresholds, solution.weights).error
-            wrong = faults.outliers(error, item.v)
-            if wrong.any():
-                group[k] = replace(item, y=np.where(wrong, np.nan, item.y))
+    plain = [_without_runs(item)[0] for item in to_fit]
+    solution, _ = pi.solve(plain, wanted, floor)
+    places = tuple(float(r) for r in solution.thresholds)
+    wrong = [faults.outliers(_errors(item, solution), item.v) for item in to_fit]
+    for _ in range(ROUNDS):
+        solution, _ = pi.solve([_trimmed(item, _errors(item, solution)) for item in plain], places, floor)
+        before, wrong = wrong, [faults.outliers(_errors(item, solution), item.v) for item in to_fit]
+        if all(np.array_equal(one, other) for one, other in zip(before, wrong, strict=True)):
+            break
+    wrong += [faults.outliers(_errors(item, solution), item.v) for item in held]
+    to_fit[:], held[:] = (
+        [replace(item, y=np.where(flags, np.nan, item.y)) if flags.any() else item for item, flags in pairs]
+        for pairs in (zip(to_fit, wrong[: len(to_fit)], strict=True), zip(held, wrong[len(to_fit) :], strict=True))
+    )
+
+
+def _errors(item: Course, solution: pi.Solution) -> Array:
+    """Errors (N,) of a course from its very start."""
+    return pi.compare(replace(item, first=0, last=len(item.v)), solution.thresholds, solution.weights).error
+
+
+def _trimmed(item: Course, error: Array) -> Course:
+    """The course without as many of the samples compared as may be isolated faults, those with the largest errors."""
+    compared = item.compared
+    far = compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
+    y = item.y.copy()
+    y[far] = np.nan
+    return replace(item, y=y)
