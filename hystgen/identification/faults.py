@@ -66,6 +66,20 @@ def outliers(error: Array, v: Array) -> Flags:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN counts as none.
 
     Those at a step of the drive `v` (N,) are not: a model that lacks a lag or a resonance misses them.
+    """
+    found = np.zeros(len(error), dtype=bool)
+    stepped = _stepped(v)
+    for first, last in far_from_others(error):
+        if not stepped[first:last].any():
+            found[first:last] = True
+    found &= np.isfinite(error)
+    if np.count_nonzero(found) > most(int(np.count_nonzero(np.isfinite(error)))):
+        found[:] = False
+    return found
+
+
+def far_from_others(error: Array) -> list[tuple[int, int]]:
+    """Runs [first, last) of few samples of an error signal (N,) that lie far from their neighbours; NaN is skipped.
 
     The scatter is taken from the median absolute deviation from a running median (Hampel identifier; Pearson, Control
     Engineering Practice 2005), so that neither the outliers nor what a model misses widens it.
@@ -73,19 +87,16 @@ def outliers(error: Array, v: Array) -> Flags:
     from scipy.ndimage import median_filter
 
     known = np.flatnonzero(np.isfinite(error))
-    found = np.zeros(len(error), dtype=bool)
     if len(known) < WINDOW:
-        return found
+        return []
     e = error[known]
     from_middle = np.abs(e - median_filter(e, WINDOW, mode="mirror"))
     far = from_middle > FAR * max(_scatter(from_middle, FEW), 1e-9 * float(np.max(np.abs(e))))
-    stepped = _stepped(v)
-    for first, last in runs_of(far):
-        if last - first <= LONGEST and not stepped[known[first:last]].any() and _stands_out(e, first, last):
-            found[known[first:last]] = True
-    if np.count_nonzero(found) > most(len(known)):
-        found[:] = False
-    return found
+    return [
+        (int(known[first]), int(known[last - 1]) + 1)
+        for first, last in runs_of(far)
+        if last - first <= LONGEST and _stands_out(e, first, last)
+    ]
 
 
 def _scatter(sizes: Array, faulty: int) -> float:
@@ -155,6 +166,16 @@ def wrong_drive(v: Array, y: Array) -> Flags:
     if np.count_nonzero(pulses) <= most(len(v)):
         found |= pulses
     return found
+
+
+def returns(v: Array, first: int, last: int) -> bool:
+    """Whether the drive leaves its course at samples [first, last), by a part of its range, and comes back."""
+    if first == 0 or last == len(v):
+        return True
+    _, away = _jump(v, first, last)
+    there, back = v[first] - v[first - 1], v[last] - v[last - 1]
+    enough = (1.0 - AT_ONCE) * float(np.max(away))
+    return bool(np.max(away) > STEP_OF_RANGE * _span(v) and there * back < 0.0 and min(abs(there), abs(back)) > enough)
 
 
 def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:

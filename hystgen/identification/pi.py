@@ -71,8 +71,9 @@ def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Cour
         missing = int(np.count_nonzero(no_value(x)))
         if missing > faults.most(len(x)):
             raise IdentificationError(
-                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, {x[no_value(x)][0]:.6g} first; "
-                f"numbers from {LARGEST:g} on are none in any unit. Record again, or convert {name}"
+                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
+                f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
+                f"convert {name}"
             )
     y = np.where(faults.wrong_output(v, y), np.nan, y)
     v = faults.bridged(v, faults.wrong_drive(v, y))

@@ -6,6 +6,7 @@ what a first, robust fit makes of their neighbours behind it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -23,8 +24,11 @@ Array = NDArray[np.float64]
 LEFT = 0.1
 """Least share of a record that has to be left of it where its output stood at a converter's end."""
 
-ROUNDS = 3
-"""Most times that the robust fit is repeated; it is once where that changes nothing about the outliers."""
+ROUNDS = 4
+"""Most robust fits; there is one where it changes nothing about what is found."""
+
+HALF = 0.25
+"""The drive is what is wrong where the output is then missed by less than half as much, squared."""
 
 
 def courses(
@@ -123,24 +127,57 @@ def mask_outliers(
 ) -> None:
     """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
 
-    Those at the start too: how much of it is compared is known only in the end. The play sum is one of least trimmed
-    squares (Rousseeuw and Van Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the
-    samples that it misses most, as many as may be left out, so that none of them draws it near.
+    Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
+    that is bridged. The play sum is one of least trimmed squares (Rousseeuw and Van Driessen, Data Mining and Knowledge
+    Discovery 12, 2006): it is fitted again without the samples that it misses most, as many as may be left out, so that
+    none of them draws it near.
     """
-    plain = [_without_runs(item)[0] for item in to_fit]
-    solution, _ = pi.solve(plain, wanted, floor)
+    solution, _ = pi.solve([_without_runs(item)[0] for item in to_fit], wanted, floor)
     places = tuple(float(r) for r in solution.thresholds)
-    wrong = [faults.outliers(_errors(item, solution), item.v) for item in to_fit]
-    for _ in range(ROUNDS):
-        solution, _ = pi.solve([_trimmed(item, _errors(item, solution)) for item in plain], places, floor)
-        before, wrong = wrong, [faults.outliers(_errors(item, solution), item.v) for item in to_fit]
-        if all(np.array_equal(one, other) for one, other in zip(before, wrong, strict=True)):
+    before: list[Array] = []
+    for number in range(ROUNDS):
+        to_fit[:] = [_with_drive_right(item, solution, number > 0) for item in to_fit]
+        wrong = [faults.outliers(_errors(item, solution), item.v) for item in to_fit]
+        now = [np.stack([item.v, flags]) for item, flags in zip(to_fit, wrong, strict=True)]
+        if before and all(np.array_equal(one, other) for one, other in zip(before, now, strict=True)):
             break
-    wrong += [faults.outliers(_errors(item, solution), item.v) for item in held]
-    to_fit[:], held[:] = (
-        [replace(item, y=np.where(flags, np.nan, item.y)) if flags.any() else item for item, flags in pairs]
-        for pairs in (zip(to_fit, wrong[: len(to_fit)], strict=True), zip(held, wrong[len(to_fit) :], strict=True))
-    )
+        before = now
+        trimmed = [_trimmed(_without_runs(item)[0], _errors(item, solution)) for item in to_fit]
+        solution, _ = pi.solve(trimmed, places, floor)
+    for group in (to_fit, held):
+        for k, item in enumerate(group):
+            right = _with_drive_right(item, solution, True)
+            flags = faults.outliers(_errors(right, solution), right.v)
+            group[k] = replace(right, y=np.where(flags, np.nan, right.y)) if flags.any() else right
+
+
+def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
+    """The course with its drive bridged at isolated samples where a model then misses the output by far less.
+
+    And the rest of it by no more: a wrong drive is remembered, where a wrong output is not. A `robust` solution is
+    asked about the largest and the least drive too, if it misses the output there by as much as anywhere: what they
+    spoil may hide them, and the range of the model ends at them.
+    """
+    error = _errors(item, solution)
+    suspects = faults.far_from_others(error)
+    if robust:
+        missed = _most_missed(item, error).tolist()
+        suspects += [(k, k + 1) for k in (int(np.argmax(item.v)), int(np.argmin(item.v))) if k in missed]
+    for first, last in suspects:
+        if not faults.returns(item.v, first, last):
+            continue
+        run = np.zeros(len(item.v), dtype=bool)
+        run[first:last] = True
+        other = pi.resettled(replace(item, v=faults.bridged(item.v, run)), math.inf)
+        less = _errors(other, solution)
+        if _size(less[run]) < HALF * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
+            item, error = other, less
+    return item
+
+
+def _size(error: Array) -> float:
+    """Sum of squares of the errors that are known."""
+    return float(np.nansum(error**2))
 
 
 def _errors(item: Course, solution: pi.Solution) -> Array:
@@ -148,10 +185,14 @@ def _errors(item: Course, solution: pi.Solution) -> Array:
     return pi.compare(replace(item, first=0, last=len(item.v)), solution.thresholds, solution.weights).error
 
 
-def _trimmed(item: Course, error: Array) -> Course:
-    """The course without as many of the samples compared as may be isolated faults, those with the largest errors."""
+def _most_missed(item: Course, error: Array) -> NDArray[np.intp]:
+    """As many of the samples compared as may be isolated faults, those with the largest errors."""
     compared = item.compared
-    far = compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
+    return compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
+
+
+def _trimmed(item: Course, error: Array) -> Course:
+    """The course without those."""
     y = item.y.copy()
-    y[far] = np.nan
+    y[_most_missed(item, error)] = np.nan
     return replace(item, y=y)
