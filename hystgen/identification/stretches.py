@@ -40,6 +40,9 @@ SUDDEN = 4.0
 GRAINS = 8.0
 """A coarse output is held where the drive moves it by so many of its steps."""
 
+ROUNDING = 1e-9
+"""Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""
+
 
 def sensitivity(y: Array, v: Array) -> float:
     """Robust sensitivity: the output's spread over the drive's, from quartiles."""
@@ -95,6 +98,7 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
     grain = float(np.min(sizes))
     noise = float(np.median(np.abs(np.diff(y[np.isfinite(y)], 3)))) / 3.0
     at = np.isfinite(y)
+    real = noise > ROUNDING * float(np.ptp(y[at]))
     slope = sensitivity(y[at], v[at])
     long = np.zeros(len(same), dtype=bool)
     for a, b in runs:
@@ -104,10 +108,11 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
     found = []
     for a, b in runs:
         moved = slope * float(np.ptp(v[a : b + 1]))
+        catches_up = b < len(step) and bool(abs(step[b]) > 0.5 * moved)
         if noise > grain:
-            wrong = chance ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise
+            wrong = chance ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
         else:  # a coarse converter repeats codes without any fault, and then moves on by one of them
-            wrong = moved > GRAINS * grain and b < len(step) and bool(abs(step[b]) > 0.5 * moved)
+            wrong = moved > GRAINS * grain and catches_up
         if wrong:
             found.append((a, b + 1))
     return found
