@@ -108,7 +108,7 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
     found = []
     for a, b in runs:
         moved = slope * float(np.ptp(v[a : b + 1]))
-        catches_up = b < len(step) and bool(abs(step[b]) > 0.5 * moved)
+        catches_up = b < len(step) and bool(abs(step[b]) > 0.5 * moved + slope * abs(v[b + 1] - v[b]))
         if noise > grain:
             wrong = chance ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
         else:  # a coarse converter repeats codes without any fault, and then moves on by one of them

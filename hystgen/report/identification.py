@@ -193,8 +193,8 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
             "Not compared are samples at the start, before the drive has wiped an unknown memory, and outliers of y: "
             "isolated samples far from their neighbours. Nor are faulty stretches: drop-outs, samples that are held "
             "while the drive moves, a converter at its end. Isolated samples of v that y takes no notice of are "
-            "bridged by a straight line. A record is cut at gaps, behind which the memory is unknown again; every part has a "
-            "free offset."
+            "bridged by a straight line. A record is cut at gaps, behind which the memory is unknown again; every part "
+            "has a free offset."
         ),
     ]
     return [*blocks, Text("On reading:"), Listing(notes)] if notes else blocks
