@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,6 +231,15 @@ def wrong_output(v: Array, y: Array) -> Flags:
     moves = np.convolve(no_value(v) | _beyond(v, 1.0), np.ones(2 * LONGEST + 1), "same")[known] > 0.5
     found[known[far & ~moves]] = True
     return found
+
+
+def smooth(record: Record) -> Record:
+    """The record with straight lines across the wrong samples that show without a model, to judge it as a whole."""
+    assert record.y is not None
+    v, y = record.v, np.asarray(record.y, dtype=np.float64)
+    wrong = wrong_output(v, y)
+    lost = wrong_drive(v, np.where(wrong, np.nan, y))
+    return replace(record, v=bridged(v, lost), y=bridged(y, wrong))
 
 
 def _beyond(x: Array, times: float) -> Flags:
