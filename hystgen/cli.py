@@ -476,7 +476,7 @@ def diagnose(
         found = diagnosis.diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
-        for note in found.notes:
+        for note in (*found.notes, *found.warnings):
             click.echo(f"warning: {note}", err=True)
         click.echo(found.sentence())
         for path in found.write(output):

@@ -27,10 +27,11 @@ from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
 from hystgen.effects.base import Place
-from hystgen.identification import remarks, stage_content, threads
+from hystgen.identification import P0_FLOOR, remarks, stage_content, threads
 from hystgen.identification.fit import Source, visited
 from hystgen.identification.pi import DIGITS, DUST, IdentificationError
 from hystgen.identification.thresholds import rounded
+from hystgen.identification.weights import Weights
 from hystgen.records import Record, read_records
 
 if TYPE_CHECKING:
@@ -70,6 +71,11 @@ class Diagnosis:
     signals: tuple[Signals, ...] = field(compare=False)
 
     FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about the inverse of the model that is written, one or two sentences each."""
+        return tuple(self.content.get("inverse", {}).get("warnings", ()))
 
     @property
     def verdict(self) -> str:
@@ -123,7 +129,8 @@ class Diagnosis:
         from hystgen.params import dump_parameters
         from hystgen.report import diagnosis as report
 
-        text = dump_parameters(self.parameters, header=f"Diagnosed by hystgen. {self.sentence()}")
+        said = [f"Diagnosed by hystgen. {self.sentence()}", *(f"Warning: {text}" for text in self.warnings)]
+        text = dump_parameters(self.parameters, header="\n".join(said))
         made = zip(self.FILES, (self.to_json(), report.html(self, text), text), strict=True)
         return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
 
@@ -205,6 +212,7 @@ def diagnose(
             except IdentificationError as error:
                 said = told.sentence(wrong, model.parameters.units.output)
                 raise IdentificationError(f"{said}, and without it {error}") from None
+        found, made = selection.invertible(found, compared, P0_FLOOR)
         ready, odd = cleaned.clean, [*odd, *cleaned.told]
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
@@ -214,7 +222,19 @@ def diagnose(
     notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
     notes += cleaned.notes(model.parameters.units.output)
     extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
+    content["inverse"] = _about_inverse(extended, made)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
+
+
+def _about_inverse(extended: Parameters, made: Weights) -> dict[str, Any]:
+    """Whether the static part of the model that is written has an inverse, and what the user should know about it."""
+    from hystgen.api import cascade_of
+
+    problems = cascade_of(extended).inverse_problems()
+    said = remarks.about_inverse(np.array(extended.model.pi.weights), made)
+    if problems and extended.model.pi.weights[0] > 0.0:
+        said = [*said, f"the model has no inverse: {'; '.join(problems)}"]
+    return {"exists": not problems, "warnings": said}
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:

@@ -646,6 +646,23 @@ def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> 
     return begun(structure, items, start, p).further().found(p)
 
 
+def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, weights.Weights]:
+    """A hypothesis with p_0 raised to a share `floor` of the sum of weights where the records allow it, as `identify`
+    does it (`weights.fit`), and what was done; all other numbers are as they were."""
+    p, here = fitted.weights, fitted.actuator
+    kept = weights.Weights(p, fitted.rms)
+    if len(p) < 2 or p[0] >= floor * float(np.sum(p)):
+        return fitted, kept
+    blocks = [_Block(here, item, p) for item in items if item.known.any()]
+    whole = reduction.triangle(*(block.system() for block in blocks))
+    samples = sum(block.samples for block in blocks)
+    system = Reduced(fitted.structure.thresholds, whole, (), (samples,))
+    made = weights.fit(system, np.arange(len(p)), floor)
+    if made.free_p0 is None:
+        return fitted, kept
+    return replace(fitted, weights=made.p, rms=made.rms), replace(made, free_p0=float(p[0]))
+
+
 def rms(errors: Sequence[Array]) -> float:
     """rms over all compared samples of all records."""
     joined = np.concatenate(list(errors))
