@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -29,7 +29,7 @@ from hystgen.diagnosis.trials import Records
 from hystgen.effects.base import Place
 from hystgen.identification import P0_FLOOR, remarks, stage_content, threads
 from hystgen.identification.fit import Source, visited
-from hystgen.identification.pi import DIGITS, DUST, IdentificationError
+from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError
 from hystgen.identification.thresholds import rounded
 from hystgen.identification.weights import Weights
 from hystgen.records import Record, read_records
@@ -178,13 +178,25 @@ def diagnose(
             for group in (usable[: len(several)], usable[len(several) :])
         )
 
-        def searched(history: tuple[float, ...] | None) -> tuple[Cleaned, Floor, Records, Outcome]:
+        def begun(history: tuple[float, ...] | None) -> tuple[believed.Prepared, Callable[[believed.Prepared], Fitted]]:
             ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
             base, start = believed.structure_of(model.cascade, given, ready)
             weights = believed.believed_weights(model.cascade, base)
+            return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
 
-            def refit(ready: believed.Prepared) -> Fitted:
-                return selection.refit(base, ready.to_fit, start, weights)
+        def foreign(history: tuple[float, ...] | None) -> dict[str, Any] | None:
+            """What is said of a history to which the model can be bent, and should not."""
+            if history is None:
+                return None
+            ready, refit = begun(history)
+            try:
+                others, refit_others = begun(None)
+            except IdentificationError:  # nothing is left that does not depend on it
+                return None
+            return starts.bends(ready.to_fit, refit(ready), refit_others(others))
+
+        def searched(history: tuple[float, ...] | None) -> tuple[Cleaned, Floor, Records, Outcome]:
+            ready, refit = begun(history)
 
             def prepared(clean: believed.Prepared, refitted: Fitted) -> tuple[Floor, Records]:
                 noise = floor.noise_floor([*clean.to_fit, *clean.held])
@@ -203,8 +215,10 @@ def diagnose(
                 found = selection.select(records, refitted)
             return cleaned, noise, records, found
 
-        cleaned, noise, compared, found = searched(before)
-        wrong = starts.contradicted(cleaned.clean.to_fit, found.fitted)
+        wrong = foreign(before)
+        if wrong is None:
+            cleaned, noise, compared, found = searched(before)
+            wrong = starts.contradicted(cleaned.clean.to_fit, found.fitted)
         if wrong is not None:
             odd.append(wrong)
             try:
@@ -256,11 +270,16 @@ def _extended(
     ready: believed.Prepared,
     user: Sequence[type[Effect]],
 ) -> Parameters:
-    """The parameter file with the model refitted and the effects added; `cascade`: the believed model."""
+    """The parameter file with the model refitted and the effects added; `cascade`: the believed model.
+
+    Raises IdentificationError where nothing is left of it.
+    """
     from hystgen.params import make_parameters
 
     p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
     p[p < DUST * float(np.sum(p))] = 0.0
+    if not np.any(p > 0.0):
+        raise IdentificationError(FALLS)
     r = fitted.structure.thresholds
     kept = (p > 0.0) | (r == 0.0)
     actuator = fitted.actuator

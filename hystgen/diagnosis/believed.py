@@ -133,6 +133,9 @@ def prepare(
         to_fit, held = held_out.parted(to_fit)
         share = f"{100 * held_out.SET_ASIDE:g} %"
         notes.append(f"no record was given that can judge: the last {share} of each is set aside")
+    if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
+        names = ", ".join(item.name for item in to_fit)
+        raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
     reach = thresholds.largest(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))

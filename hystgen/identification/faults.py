@@ -25,6 +25,10 @@ LONGEST = 4
 FAR = 8.0
 """An outlier lies so many standard deviations of its surroundings' scatter from their median."""
 
+LITTLE = 5e-4
+"""Least scatter, as a share of the peak-to-peak output: a model of a simulation leaves next to nothing but at its
+kinks, and an error of `FAR` times that in a single sample spoils no fit."""
+
 WINDOW = 15
 """Samples of the running median, more than twice `LONGEST`."""
 
@@ -62,14 +66,16 @@ def most(samples: int) -> int:
     return max(FEW, math.ceil(MOST * samples))
 
 
-def outliers(error: Array, v: Array) -> Flags:
+def outliers(error: Array, v: Array, swing: float) -> Flags:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN counts as none.
+
+    `swing`: peak-to-peak output, against which an error may be too small to spoil anything.
 
     Those at a step of the drive `v` (N,) are not: a model that lacks a lag or a resonance misses them.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)
-    for first, last in far_from_others(error):
+    for first, last in far_from_others(error, swing):
         if not stepped[first:last].any():
             found[first:last] = True
     found &= np.isfinite(error)
@@ -78,8 +84,10 @@ def outliers(error: Array, v: Array) -> Flags:
     return found
 
 
-def far_from_others(error: Array) -> list[tuple[int, int]]:
+def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
     """Runs [first, last) of few samples of an error signal (N,) that lie far from their neighbours; NaN is skipped.
+
+    `swing`: as in `outliers`.
 
     The scatter is taken from the median absolute deviation from a running median (Hampel identifier; Pearson, Control
     Engineering Practice 2005), so that neither the outliers nor what a model misses widens it.
@@ -91,7 +99,7 @@ def far_from_others(error: Array) -> list[tuple[int, int]]:
         return []
     e = error[known]
     from_middle = np.abs(e - median_filter(e, WINDOW, mode="mirror"))
-    far = from_middle > FAR * max(_scatter(from_middle, FEW), 1e-9 * float(np.max(np.abs(e))))
+    far = from_middle > FAR * max(_scatter(from_middle, FEW), LITTLE * swing)
     return [
         (int(known[first]), int(known[last - 1]) + 1)
         for first, last in runs_of(far)
@@ -169,10 +177,13 @@ def wrong_drive(v: Array, y: Array) -> Flags:
 
 
 def returns(v: Array, first: int, last: int) -> bool:
-    """Whether the drive leaves its course at samples [first, last), by a part of its range, and comes back."""
-    if first == 0 or last == len(v):
-        return True
+    """Whether the drive leaves its course at samples [first, last), by a part of its range, and comes back.
+
+    Where there is nothing to come back to, at an end, it has to stand out as well.
+    """
     _, away = _jump(v, first, last)
+    if first == 0 or last == len(v):
+        return bool(np.max(away) > STEP_OF_RANGE * _span(v)) and _stands_out(v, first, last)
     there, back = v[first] - v[first - 1], v[last] - v[last - 1]
     enough = (1.0 - AT_ONCE) * float(np.max(away))
     return bool(np.max(away) > STEP_OF_RANGE * _span(v) and there * back < 0.0 and min(abs(there), abs(back)) > enough)

@@ -32,6 +32,13 @@ SMALLEST = 1e-20
 that there are in double precision and in parameter files."""
 
 
+FALLS = (
+    "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
+    "else check which column is which"
+)
+"""What is said of records from which nothing is left of a model."""
+
+
 class IdentificationError(ValueError):
     """Records that no model can be fitted to; `str()` says why and what to do."""
 
@@ -134,10 +141,7 @@ def solve(
     p[p < DUST * float(np.sum(p))] = 0.0
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
-        raise IdentificationError(
-            "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the "
-            "sign of y, else check which column is which"
-        )
+        raise IdentificationError(FALLS)
     solution = Solution(r, p, reach, fitted)
     return (solution if wanted is not None else solution.without_idle_plays()), compared
 

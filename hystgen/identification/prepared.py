@@ -137,7 +137,7 @@ def mask_outliers(
     before: list[Array] = []
     for number in range(ROUNDS):
         to_fit[:] = [_with_drive_right(item, solution, number > 0) for item in to_fit]
-        wrong = [faults.outliers(_errors(item, solution), item.v) for item in to_fit]
+        wrong = [faults.outliers(_errors(item, solution), item.v, item.output_range) for item in to_fit]
         now = [np.stack([item.v, flags]) for item, flags in zip(to_fit, wrong, strict=True)]
         if before and all(np.array_equal(one, other) for one, other in zip(before, now, strict=True)):
             break
@@ -147,7 +147,7 @@ def mask_outliers(
     for group in (to_fit, held):
         for k, item in enumerate(group):
             right = _with_drive_right(item, solution, True)
-            flags = faults.outliers(_errors(right, solution), right.v)
+            flags = faults.outliers(_errors(right, solution), right.v, right.output_range)
             group[k] = replace(right, y=np.where(flags, np.nan, right.y)) if flags.any() else right
 
 
@@ -159,7 +159,7 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
     spoil may hide them, and the range of the model ends at them.
     """
     error = _errors(item, solution)
-    suspects = faults.far_from_others(error)
+    suspects = faults.far_from_others(error, item.output_range)
     if robust:
         missed = _most_missed(item, error).tolist()
         suspects += [(k, k + 1) for k in (int(np.argmax(item.v)), int(np.argmin(item.v))) if k in missed]

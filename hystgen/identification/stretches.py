@@ -40,6 +40,10 @@ SUDDEN = 4.0
 GRAINS = 8.0
 """A coarse output is held where the drive moves it by so many of its steps."""
 
+CODES = 3.0
+"""One that moves fast on the whole, which looks like noise, is held where it would pass so many: behind a turn it is
+less steep than on the whole."""
+
 ROUNDING = 1e-9
 """Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""
 
@@ -110,7 +114,8 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
         moved = slope * float(np.ptp(v[a : b + 1]))
         catches_up = b < len(step) and bool(abs(step[b]) > 0.5 * moved + slope * abs(v[b + 1] - v[b]))
         if noise > grain:
-            wrong = chance ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
+            enough = moved > max(0.25 * noise, CODES * grain)
+            wrong = chance ** (b - a) * len(y) < CHANCE and enough and (real or catches_up)
         else:  # a coarse converter repeats codes without any fault, and then moves on by one of them
             wrong = moved > GRAINS * grain and catches_up
         if wrong:
@@ -128,10 +133,14 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     if not known.any():
         return []
     found = []
-    step, slope = np.abs(np.diff(y)), sensitivity(y[known], v[known])
+    step = np.abs(np.diff(y))
     grain = float(np.min(step[step > 0.0], initial=np.inf))
-    least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
     for name, end, sign in (("largest", float(np.max(y[known])), 1.0), ("least", float(np.min(y[known])), -1.0)):
+        others = known & (y != end)
+        if not others.any():
+            continue
+        slope = sensitivity(y[others], v[others])
+        least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
         runs = runs_of(y == end)
         if not any(b - a >= RAIL and float(np.max(sign * (v[a:b] - v[a]))) > least for a, b in runs):
             continue
