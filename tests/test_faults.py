@@ -94,7 +94,8 @@ class TestOneWrongSample:
             how = {"history": [0.0], "thresholds": THRESHOLDS}
             fit = hystgen.identify(record(wrong["v"], wrong["y"]), **how)
             # without its first row a record would begin elsewhere, where only y is wrong in it
-            clean = hystgen.identify(record(v, y) if (place, channel) == ("first", "y") else less(record(v, y), [k]), **how)
+            right = record(v, y)
+            clean = hystgen.identify(right if (place, channel) == ("first", "y") else less(right, [k]), **how)
             assert apart(fit, clean) < 0.005, (k, by)
             assert fit.parameters.input_range == pytest.approx(clean.parameters.input_range, abs=0.6), (k, by)
             figures = [row(each, "all").rms_percent for each in (fit, clean)]
