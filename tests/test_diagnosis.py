@@ -121,8 +121,8 @@ class TestBlindPlants:
         data = sorted(case.glob("r*.csv"))[:2]
         code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
         assert (code, out) == (2, "")
-        said = {"file/out": f"Not a directory: '{tmp_path / 'file'}'",
-                "taken": f"Is a directory: '{tmp_path / 'taken' / 'report.html'}'"}  # fmt: skip
+        said = {"file/out": f"{tmp_path / 'file'}: Not a directory",
+                "taken": f"{tmp_path / 'taken' / 'report.html'}: Is a directory"}  # fmt: skip
         assert said[place] in err
 
     def test_the_command(self, tmp_path: Path, run: Call) -> None:

@@ -265,6 +265,8 @@ class TestNoValue:
         ends = np.linspace(-40000.0, 40000.0, 9)
         for x in (np.arange(-1200.0, 1201.0), np.arange(0.0, 70000.0), ends, np.full(5, 999.0)):
             assert not no_value(x).any()
+        for codes in ([0.0, 32767.0, -32768.0], [0.0] * 9 + [32767.0] * 9):
+            assert not no_value(np.array(codes)).any()
         assert no_value(np.array([1.0, np.nan, np.inf])).tolist() == [False, True, True]
 
     @pytest.mark.parametrize("value", ["9.91E+37", "-9.9E37", "-999999", "1e300"])

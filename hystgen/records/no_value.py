@@ -28,12 +28,14 @@ def no_value(x: Array) -> NDArray[np.bool_]:
     """Whether each number (N,) of a column stands for no value; what is not finite does.
 
     A number below `LARGEST` does where it is a usual fill value (all nines, the end of an integer type) that lies
-    farther from all others of the column than these spread: a column may pass through -999 as well.
+    farther from all others of the column than these spread: a column may pass through -999 as well. The end of an
+    integer type does in a column with fractions only; in one of codes it is a code.
     """
     wrong = ~np.isfinite(x) | (np.abs(np.where(np.isfinite(x), x, 0.0)) >= LARGEST)
     rest, fills = x[~wrong], []
+    codes = bool(np.all(rest == np.rint(rest)))
     while len(rest):
-        ends = [end for end in (float(np.min(rest)), float(np.max(rest))) if _fill(end)]
+        ends = [end for end in (float(np.min(rest)), float(np.max(rest))) if _fill(end, codes)]
         if not ends:
             break
         fills += ends
@@ -45,7 +47,8 @@ def no_value(x: Array) -> NDArray[np.bool_]:
     return wrong
 
 
-def _fill(number: float) -> bool:
-    """Whether a number looks like a fill value."""
+def _fill(number: float, codes: bool) -> bool:
+    """Whether a number, of a column of whole numbers or not, looks like a fill value."""
     digits = f"{abs(number):.10g}".replace(".", "")
-    return abs(number) in ENDS_OF_INTEGERS or (len(digits) >= NINES and set(digits) == {"9"})
+    nines = len(digits) >= NINES and set(digits) == {"9"}
+    return nines or (abs(number) in ENDS_OF_INTEGERS and not codes)
