@@ -539,7 +539,7 @@ def diagnose(
         found = diagnosis.diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
-        for note in found.notes:
+        for note in (*found.notes, *found.warnings):
             console.note(f"warning: {note}")
         console.say(found.sentence())
         if found.not_emitted():

@@ -459,10 +459,10 @@ MANY = 20_000
 """Columns of a wide file: one channel a sensor of an array, or spectra side by side."""
 
 WIDE = {
-    "text": lambda k, row: "on",
-    "numbers": lambda k, row: f"{k}.5",
+    "text": lambda _k, _row: "on",
+    "numbers": lambda k, _row: f"{k}.5",
     "gaps": lambda k, row: "" if k == row else "1.5",
-    "quoted": lambda k, row: f'"{k}.5"',
+    "quoted": lambda k, _row: f'"{k}.5"',
 }
 
 

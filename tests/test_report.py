@@ -463,7 +463,7 @@ class TestDrawing:
     def shown(self, residual: Array, v: Array) -> Shown:
         n, none = len(residual), np.empty(0, dtype=np.intp)
         record = Record("made", np.arange(n) * 0.01, v, residual, sample_time=0.01)
-        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none), np.zeros(n))
+        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none, none), np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
     def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:

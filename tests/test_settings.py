@@ -150,6 +150,6 @@ def test_what_cannot_be_written_is_found_before_the_fit(tmp_path: Path, run: Run
         assert code == 2, err
     code, _, err = run("identify", RECORDING, "-o", tmp_path / "no" / "such" / "a.yaml")
     assert code == 2
-    assert "make the folder of this file first" in err
+    assert "make it, or choose another output" in err
     assert not good.exists()
     assert not (tmp_path / "no").exists()

@@ -287,7 +287,10 @@ def _trial(
     best = tried[chosen]
     own = pi.row("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
-    return [*rows, own, replace(best.held_out, model="trial")], kinds[chosen], best.errors, ""
+    rows += [own, replace(best.held_out, model="trial")]
+    # of an amplitude that fades the end alone is a smaller range, and no measure for the errors of both
+    whole = max(replace(item, last=len(item.v)).output_range for item in best.compared)
+    return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
 
 
 def _parameters(

@@ -104,7 +104,7 @@ class Fit:
         from hystgen.api import cascade_of
 
         v = np.ascontiguousarray(record.v, dtype=np.float64)
-        course = Course(record.name, v, v, history, 0, len(v), 0.0)
+        course = Course(record.name, v, v, history, 0, len(v))
         return joint.through_front(course, cascade_of(self.parameters).stages)
 
     def text(self) -> str:
@@ -144,12 +144,12 @@ class Fit:
         n = len(self.parameters.model.pi.thresholds) - 1
         told = [
             f"{counted(n, 'play')}. Errors of a free run with a free offset a record; % of the largest "
-            "peak-to-peak output of the row's records, each taken whole."
+            "peak-to-peak output that was compared of one of the row's records."
         ]
         if any(row.model == "trial" for row in self.rows):
             told.append(
                 f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the "
-                "rest (row held out). written: fitted to everything."
+                "rest (row held out), both in % of the whole. written: fitted to everything."
             )
         elif any(row.part == "held out" for row in self.rows):
             told.append("written: fitted to the records of row fit only.")

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import signal
 import tempfile
+import threading
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
@@ -27,7 +30,10 @@ PATIENCE = 15.0
 """Seconds for a scheduler to answer, and for it to have a worker."""
 
 IDLE = 30.0
-"""Seconds after which a process without work ends; so do those whose parent was killed."""
+"""Seconds after which a process without work ends."""
+
+WATCH = 1.0
+"""Seconds between two looks of a process for the one that started it."""
 
 
 class SchedulerError(OSError):
@@ -140,10 +146,18 @@ def _begin(folder: str) -> None:
     """Set a process up for work: whoever started it ends it and clears up behind it.
 
     Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
-    a folder of that one, which removes it.
+    a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the one that started it is gone."""
+    while os.getppid() == parent:
+        time.sleep(WATCH)
+    os._exit(1)
 
 
 def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:

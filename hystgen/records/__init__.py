@@ -22,6 +22,7 @@ from hystgen.records.array_files import read_mat, read_npz
 from hystgen.records.columns import parse_columns
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
+from hystgen.records.no_value import LARGEST, no_value
 from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
@@ -185,6 +186,7 @@ def _size(source: Record | str | os.PathLike[str]) -> int:
 
 __all__ = [
     "FORMATS",
+    "LARGEST",
     "SHORTEST",
     "Record",
     "RecordError",
@@ -192,6 +194,7 @@ __all__ = [
     "agreed_units",
     "columns_text",
     "headers",
+    "no_value",
     "parse_columns",
     "read_record",
     "read_records",

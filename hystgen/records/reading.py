@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.problems import RecordError, printable
 from hystgen.records.columns import LISTED, Column, Finder, further_names
+from hystgen.records.no_value import no_value
 from hystgen.records.record import Array
 from hystgen.records.units import to_seconds
 
@@ -54,7 +55,10 @@ class Table:
 
 
 class Reading:
-    """One file being read: what was asked for, and what is found to be wrong or worth a note."""
+    """One file being read: what was asked for, and what is found to be wrong or worth a note.
+
+    `fills`: of each column with numbers that stand for no value which ones these are, in words.
+    """
 
     def __init__(
         self,
@@ -73,6 +77,7 @@ class Reading:
         self.tick = tick
         self.problems: list[str] = []
         self.notes: list[str] = []
+        self.fills: dict[str, str] = {}
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
         """Something for which the file is refused, with its place where it has lines."""
@@ -157,8 +162,13 @@ class Reading:
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
         """A table with NaN for every value that is none, time in seconds and units by name."""
-        for x in numbers.values():
-            x[~np.isfinite(x)] = np.nan
+        for name, x in numbers.items():
+            wrong = no_value(x)
+            written = np.unique(x[wrong & np.isfinite(x)])
+            if len(written):
+                several, s = ("numbers such as ", "") if len(written) > 1 else ("", "s")
+                self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as none"
+            x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in units:
             numbers["t"], note = to_seconds(numbers["t"], units["t"])

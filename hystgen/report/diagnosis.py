@@ -51,7 +51,8 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Parameters", [Details("Parameter file with the effects added", parameters_text)]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
     ]
-    return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence())], sections)
+    warnings = [Text(f"Mind the inverse: {said}.") for said in found.warnings]
+    return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence()), *warnings], sections)
 
 
 def _drawn(found: Diagnosis, name: str, width: float) -> bytes:

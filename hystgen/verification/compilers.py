@@ -45,11 +45,12 @@ class Compiler:
     command: tuple[str, ...]
 
     def run(self, arguments: Sequence[str | Path]) -> None:
-        """Run the compiler. Raises CompileError with what it printed."""
+        """Run the compiler; its temporary files go where its output goes. Raises CompileError with what it printed."""
+        folder = Path(arguments[list(arguments).index("-o") + 1]).parent
         try:
             done = subprocess.run(
                 [*self.command, *map(str, arguments)], capture_output=True, encoding="utf-8", errors="replace",
-                check=False, stdin=subprocess.DEVNULL, env=_environment(self.name),
+                check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
             )  # fmt: skip
         except OSError as failure:
             raise CompileError(f"{self.name} cannot be started: {failure.strerror}") from None
@@ -94,18 +95,18 @@ def missing(name: str) -> str:
 
 
 @functools.cache
-def _environment(name: str) -> dict[str, str] | None:
-    """Environment of a compiler; None: that of this process. zig needs a folder for what it builds."""
+def _own(name: str) -> dict[str, str]:
+    """Environment that a compiler needs; zig a folder for what it builds, if the home folder cannot have it."""
     if name != "zig" or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
-        return None
+        return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     while not os.path.isdir(home) and home != os.path.dirname(home):
         home = os.path.dirname(home)
     if os.access(home, os.W_OK | os.X_OK):
-        return None
+        return {}
     instead = contextlib.ExitStack()
     atexit.register(instead.close)
-    return {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(instead.enter_context(writing.temporary()))}
+    return {"ZIG_GLOBAL_CACHE_DIR": str(instead.enter_context(writing.temporary()))}
 
 
 def available() -> list[Compiler]:
