@@ -200,6 +200,7 @@ def test_models_are_of_every_kind() -> None:
         kinds["two branches"] += any("descending" in stage for stage in stages)
         kinds["two stages"] += len(stages) > 1
         kinds["offset"] += "output_offset" in data["model"]
+        kinds["a given LSB"] += "emit" in data
         kinds["small unit"] += high - low < 1e-6
         kinds["large unit"] += high - low > 1e6
     assert min(kinds.values()) >= 4, kinds
