@@ -40,9 +40,9 @@ SUDDEN = 4.0
 GRAINS = 8.0
 """A coarse output is held where the drive moves it by so many of its steps."""
 
-CODES = 3.0
-"""One that moves fast on the whole, which looks like noise, is held where it would pass so many: behind a turn it is
-less steep than on the whole."""
+NEAR = 4
+"""How common equal samples are is asked of so many times the run on either side too: a drive that is slow there alone
+repeats a coarse converter's codes there alone."""
 
 ROUNDING = 1e-9
 """Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""
@@ -114,8 +114,9 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
         moved = slope * float(np.ptp(v[a : b + 1]))
         catches_up = b < len(step) and bool(abs(step[b]) > 0.5 * moved + slope * abs(v[b + 1] - v[b]))
         if noise > grain:
-            enough = moved > max(0.25 * noise, CODES * grain)
-            wrong = chance ** (b - a) * len(y) < CHANCE and enough and (real or catches_up)
+            around = np.concatenate([same[max(a - NEAR * (b - a), 0) : a], same[b : b + NEAR * (b - a)]])
+            likely = max(chance, float(np.mean(around))) if len(around) else chance
+            wrong = likely ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
         else:  # a coarse converter repeats codes without any fault, and then moves on by one of them
             wrong = moved > GRAINS * grain and catches_up
         if wrong:
