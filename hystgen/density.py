@@ -49,7 +49,7 @@ _LARGEST_EXPONENT = 1000
 _SMALLEST_EXPONENT = -4000
 """Binary exponents beyond which an intermediate value is refused, or taken as 0."""
 _LARGE_POWER = 1 << 16
-"""Exponents of `**` from which the size of the result is estimated first: a whole one costs a multiplication a bit."""
+"""Exponents of `**` beyond which it goes through the logarithm."""
 _MAX_OPERATIONS = 2_000_000
 """Operations that a formula may take in all, 1 to 5 us each (tests/test_density.py has the slowest formulas). A sum of
 29 bell curves, about the most that fits into a formula, takes 600 000."""
@@ -142,19 +142,19 @@ class Formula:
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    """`base**exponent`; its own infinity or 0 where the size alone decides.
+    """`base**exponent`. Raises ValueError where it is not real.
 
-    A power with a whole exponent is computed bit by bit of it with numbers that grow on the way, which takes
-    milliseconds where the exponent has a thousand bits.
+    A large exponent goes through the logarithm, with the bits that this costs: a whole one would be taken bit by bit,
+    with numbers that grow on the way, and has up to a thousand bits.
     """
     mp = _context()
-    if abs(exponent) > _LARGE_POWER and base != 0 and abs(base) != 1:
-        bits = exponent * mp.log(abs(base)) / mp.ln2
-        if bits > _LARGEST_EXPONENT + 1:
-            return mp.inf
-        if bits < _SMALLEST_EXPONENT - 1:
-            return mp.mpf(0)
-    return base**exponent
+    if abs(exponent) <= _LARGE_POWER or base == 0:
+        return base**exponent
+    if base < 0 and not mp.isint(exponent):
+        raise ValueError("no real power")
+    with mp.extraprec(40):
+        size = mp.exp(exponent * mp.log(abs(base)))
+    return -size if base < 0 and exponent % 2 == 1 else +size
 
 
 def parse_formula(text: str) -> Formula:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import json
 import os
 import shutil
 import signal
@@ -23,6 +24,7 @@ from recordings import brute_output, noisy, wander, write_csv
 import hystgen
 from hystgen import extras, identification
 from hystgen.identification import outliers, workers
+from hystgen.identification.fleet import FIGURES, KEPT_IN
 from hystgen.identification.workers import Result, Task
 
 Run = Callable[..., tuple[int, str, str]]
@@ -277,6 +279,46 @@ def test_only_what_changed_is_done_again(few: Path, tmp_path: Path) -> None:
     assert tree(folder) == first
 
 
+UNREADABLE: dict[str, Callable[[Path], object]] = {
+    "empty": lambda note: note.write_bytes(b""),
+    "cut off": lambda note: os.truncate(note, note.stat().st_size // 2),
+    "binary": lambda note: note.write_bytes(bytes(range(256))),
+    "nested": lambda note: note.write_text("[" * 100_000),
+    "a list": lambda note: note.write_text("[1, 2]"),
+    "no figures": lambda note: spoil(note, figures=None),
+    "figures of another kind": lambda note: spoil(note, figures=[1, 2]),
+    "few figures": lambda note: spoil(note, figures={"gain": 1.0}),
+    "figures that are text": lambda note: spoil(note, figures=dict.fromkeys(FIGURES, "1.0")),
+    "outputs of another kind": lambda note: spoil(note, outputs=["a"]),
+    "no key": lambda note: spoil(note, sha256=7),
+    "a folder": lambda note: (note.unlink(), note.mkdir(), (note / "x").mkdir()),
+}
+
+
+def spoil(note: Path, **changed: Any) -> None:
+    note.write_text(json.dumps({**json.loads(note.read_text()), **changed}))
+
+
+@pytest.mark.parametrize("kind", UNREADABLE)
+def test_notes_that_cannot_be_read_are_one_warning(kind: str, few: Path, tmp_path: Path, run: Run) -> None:
+    output = tmp_path / "params"
+    words = ("identify", "--batch", few, "-o", output, "--jobs", "1")
+    assert run(*words)[0] == 0
+    whole = tree(output)
+    notes = sorted((output / KEPT_IN).iterdir())
+    for note in notes[:2]:
+        UNREADABLE[kind](note)
+    code, _, err = run(*words)
+    if kind == "a folder":  # which no file can take the place of
+        assert (code, err.count(" cannot be written: ")) == (1, 2)
+        return
+    assert code == 0
+    assert err.count("warning") == 1
+    assert f"warning: {notes[0]} cannot be read, and 1 more; the fit of these units is done again" in err
+    assert "(1 by an earlier call)" in err
+    assert tree(output) == whole
+
+
 def test_another_version_of_the_tool_does_all_again(few: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hystgen.identify_batch(few, tmp_path / "params", jobs=1)
     monkeypatch.setattr(hystgen, "__version__", "9")
@@ -320,9 +362,6 @@ def test_interrupted(sent: signal.Signals, jobs: int, units: Path, fleet: Path, 
     kept = len(list(output.glob(".hystgen/*.json")))
     done = hystgen.identify_batch(units, output, jobs=1)
     assert sum(unit.kept for unit in done.units) == kept
-    for litter in output.rglob(".hystgen-*"):  # what a kill in the middle of a write leaves, under another name
-        assert sent == signal.SIGKILL
-        shutil.rmtree(litter) if litter.is_dir() else litter.unlink()
     assert tree(output) == whole
 
 
@@ -408,6 +447,37 @@ def test_a_scheduler_that_is_not_there(
         assert (code, out) == (2, "")
         assert err.startswith(f"error: no Dask scheduler answers at {address}: ")
     assert not (tmp_path / "params").exists()
+
+
+def test_a_scheduler_that_dies_is_one_message(units: Path, tmp_path: Path) -> None:
+    """Without the tracebacks that Dask logs."""
+    output = tmp_path / "params"
+    code = (
+        "import os, sys\n"
+        "from distributed import LocalCluster\n"
+        "if __name__ == '__main__':\n"
+        "    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:\n"
+        "        print(cluster.scheduler_address, flush=True)\n"
+        "        sys.stdin.read()\n"
+    )
+    (tmp_path / "cluster.py").write_text(code)
+    cluster = subprocess.Popen(
+        [sys.executable, str(tmp_path / "cluster.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True, start_new_session=True,
+    )  # fmt: skip
+    assert cluster.stdout is not None
+    address = cluster.stdout.readline().strip()
+    words = ["identify", "--batch", str(units), "-o", str(output), "--scheduler", address]
+    started = subprocess.Popen(
+        [sys.executable, "-m", "hystgen", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    while started.poll() is None and len(list(output.glob(".hystgen/*.json"))) < 2:
+        time.sleep(0.01)
+    os.killpg(cluster.pid, signal.SIGKILL)
+    cluster.communicate()
+    out, err = started.communicate(timeout=120)
+    assert (started.returncode, out) == (2, "")
+    assert err == "error: the Dask scheduler was lost; the same command goes on from here\n"
 
 
 def test_without_dask_one_line_says_what_to_install(

@@ -142,15 +142,15 @@ def _figures(fit: Any, model: Any) -> dict[str, Any]:
     }
 
 
-def _begin(folder: str) -> None:
-    """Set a process up for work: whoever started it ends it and clears up behind it.
+def _begin(folder: str, parent: int) -> None:
+    """Set a process up for work: whoever started it, `parent`, ends it and clears up behind it.
 
     Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
     a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
 def _end_with(parent: int) -> None:
@@ -182,9 +182,8 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
             yield delayed(work)(task)
 
     def pool(**how: Any) -> Any:
-        apart = {
-            "inner_max_num_threads": 1, "idle_worker_timeout": IDLE, "initializer": _begin, "initargs": (folder,),
-        }  # fmt: skip
+        apart: dict[str, Any] = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE}
+        apart |= {"initializer": _begin, "initargs": (folder, os.getpid())}
         with parallel_config("loky", **apart) if jobs > 1 else parallel_config("sequential"):
             return Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered", **how)
 

@@ -71,9 +71,9 @@ def find(name: str) -> Compiler | None:
     """The compiler of that name, or None where it is not installed.
 
     Any other name is a command as a shell takes it, words and quotes: `ccache gcc`, `gcc -m32`. Raises ValueError for a
-    quote that is not closed.
+    quote that is not closed, and for no command at all.
     """
-    if name == "zig":
+    if name.split() in (["zig"], ["zig", "cc"]):
         if importlib.util.find_spec("ziglang"):
             return Compiler("zig", (sys.executable, "-m", "ziglang", "cc"))
         path = shutil.which("zig")
@@ -85,24 +85,26 @@ def find(name: str) -> Compiler | None:
         words = shlex.split(name)
     except ValueError as failure:
         raise ValueError(f"the compiler {name!r} is no command: {failure}; correct it") from None
-    path = shutil.which(words[0]) if words else None
+    if not words:
+        raise ValueError("a compiler is named by a command; write gcc, clang, zig or another")
+    path = shutil.which(words[0])
     return Compiler(name, (path, *words[1:])) if path else None
 
 
 def missing(name: str) -> str:
     """What is not installed where `find` finds nothing."""
-    return f"{(shlex.split(name) or [name])[0]} is not installed"
+    return f"{shlex.split(name)[0]} is not installed"
 
 
 @functools.cache
 def _own(name: str) -> dict[str, str]:
     """Environment that a compiler needs; zig a folder for what it builds, if the home folder cannot have it."""
-    if name != "zig" or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
+    if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    while not os.path.isdir(home) and home != os.path.dirname(home):
-        home = os.path.dirname(home)
-    if os.access(home, os.W_OK | os.X_OK):
+    while not os.path.exists(home):  # it would be made
+        home = os.path.dirname(home) or "."
+    if os.path.isdir(home) and os.access(home, os.W_OK | os.X_OK):
         return {}
     instead = contextlib.ExitStack()
     atexit.register(instead.close)
