@@ -389,5 +389,5 @@ def test_more_breaks_than_fixed_point_takes_are_refused_at_once() -> None:
     ((path, message),) = caught.value.problems
     assert path == ("model", "memoryless")
     assert message == (
-        "bends at 4093 places inside input_range, and fixed point takes 2000; thin out the thresholds or use float32"
+        "bends at 4094 places inside input_range, and fixed point takes 2000; thin out the thresholds or use float32"
     )

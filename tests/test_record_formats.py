@@ -30,7 +30,17 @@ from ruamel.yaml import YAML
 
 from hystgen import cli, extras, identify
 from hystgen.progress import Progress
-from hystgen.records import Record, RecordError, agreed_units, csv_file, hdf5, parquet, parse_columns, read_record
+from hystgen.records import (
+    LARGEST,
+    Record,
+    RecordError,
+    agreed_units,
+    csv_file,
+    hdf5,
+    parquet,
+    parse_columns,
+    read_record,
+)
 from hystgen.records import headers as with_units
 from hystgen.records.units import split_unit
 
@@ -739,10 +749,10 @@ def awkward(samples: int) -> list[list[str]]:
     """Numbers near which a decimal reader that rounds twice goes wrong, and all kinds of digits."""
     rng = np.random.default_rng(5)
     values = rng.integers(0, 2**63, samples * 2, dtype=np.uint64).view(np.float64)
-    values = np.where(np.isfinite(values), values, 1.0)
+    values = np.where(np.abs(values) < LARGEST, values, 1.0)  # others stand for no value
     texts = [repr(x) for x in values.tolist()]
     hard = ["9007199254740993", "1.00000000000000011102230246251565", "2.2250738585072011e-308", "4.9e-324", "+1.5E-3",
-            ".5", "7.", "0.1e1", "123456789012345678901234567890", "8.988465674311580e307"]  # fmt: skip
+            ".5", "7.", "0.1e1", "12345678901234567890.1234567890", "8.988465674311580e-307"]  # fmt: skip
     texts[: len(hard)] = hard
     return [[repr(k * 0.001), *texts[2 * k : 2 * k + 2]] for k in range(samples)]
 

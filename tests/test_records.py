@@ -371,7 +371,8 @@ class TestWriteColumns:
         lost = tmp_path / "none" / "a.csv"
         with pytest.raises(OSError, match=r"\S") as caught:
             write_columns(lost, ("a",), (np.zeros(2),))
-        assert str(caught.value) == f"[Errno 2] No such file or directory: '{lost}'"
+        what = f"the folder {lost.parent} does not exist; make it, or choose another output"
+        assert str(caught.value) == f"[Errno 2] {what}: '{lost}'"
         assert target.read_text() == "old"
         assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "folder"]
 

@@ -31,11 +31,10 @@ def no_value(x: Array) -> NDArray[np.bool_]:
     farther from all others of the column than these spread: a column may pass through -999 as well. The end of an
     integer type does in a column with fractions only; in one of codes it is a code.
     """
-    wrong = ~np.isfinite(x) | (np.abs(np.where(np.isfinite(x), x, 0.0)) >= LARGEST)
-    rest, fills = x[~wrong], []
-    codes = bool(np.all(rest == np.rint(rest)))
+    wrong = ~np.isfinite(x) | (x >= LARGEST) | (x <= -LARGEST)
+    rest, fills = x[~wrong] if wrong.any() else x, []
     while len(rest):
-        ends = [end for end in (float(np.min(rest)), float(np.max(rest))) if _fill(end, codes)]
+        ends = [end for end in (float(np.min(rest)), float(np.max(rest))) if _fill(end, rest)]
         if not ends:
             break
         fills += ends
@@ -47,8 +46,9 @@ def no_value(x: Array) -> NDArray[np.bool_]:
     return wrong
 
 
-def _fill(number: float, codes: bool) -> bool:
-    """Whether a number, of a column of whole numbers or not, looks like a fill value."""
+def _fill(number: float, column: Array) -> bool:
+    """Whether a number of a column looks like a fill value."""
     digits = f"{abs(number):.10g}".replace(".", "")
-    nines = len(digits) >= NINES and set(digits) == {"9"}
-    return nines or (abs(number) in ENDS_OF_INTEGERS and not codes)
+    if len(digits) >= NINES and set(digits) == {"9"}:
+        return True
+    return abs(number) in ENDS_OF_INTEGERS and not np.array_equal(column, np.rint(column))
