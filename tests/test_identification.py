@@ -732,7 +732,8 @@ class TestRefused:
         target = tmp_path / "none" / "a.yaml"
         code, _, err = run("identify", EXAMPLES / "stage_recording.csv", "-o", target, "--thresholds", 2)
         assert code == 2
-        assert err.splitlines()[-1].endswith(f"No such file or directory: '{target}'")
+        what = f"the folder {target.parent} does not exist; make it, or choose another output"
+        assert err.splitlines()[-1] == f"error: {target}: {what}"
         assert list(tmp_path.iterdir()) == []
 
     def test_all_unusable_files_at_once(self, tmp_path: Path) -> None:

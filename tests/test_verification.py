@@ -14,7 +14,7 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen import fixed, reference, tables
+from hystgen import extras, fixed, reference, tables
 from hystgen.api import Model
 from hystgen.emission import module
 from hystgen.fixed import FixedTables
@@ -212,7 +212,7 @@ def test_no_compiler_at_all_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(compilers, "available", list)
     report = hystgen.verify(model("plain"), length=1000)
     assert not report.ok
-    assert "hystgen[zig]" in report.table()
+    assert extras.install("zig") in report.table()
 
 
 @pytest.mark.parametrize("inverse", [False, True])
