@@ -48,7 +48,8 @@ def write(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
                     if not _same(made / name, target / name):
                         os.replace(made / name, target / name)
     except OSError as failure:
-        if failure.errno is not None and (not failure.filename or writing.PREFIX in str(failure.filename)):  # name what was asked for
+        own = not failure.filename or writing.PREFIX in str(failure.filename)
+        if own and failure.errno is not None:  # name what was asked for
             raise OSError(failure.errno, failure.strerror, str(folder)) from None
         raise
     return [folder / name for name in files]
