@@ -558,7 +558,7 @@ def test_reports_hold_the_figures(tmp_path: Path) -> None:
         assert column in done.stdout.splitlines()[0]
     row = json.loads((tmp_path / "report.json").read_text())["rows"][0]
     assert row["ok"] is True
-    assert row["samples"] == 1700
+    assert row["samples"] == 1800
     assert row["mean_instructions"] < row["max_instructions"]
     assert row["ram"] == 200
     assert {"flash", "library", "stack"} <= row.keys()
