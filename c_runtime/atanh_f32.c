@@ -34,6 +34,7 @@ static const hystgen_real_t hystgen_atanh_row[8][5] = {
 HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 {
     hystgen_real_t a = x < 0.0f ? -x : x;
+    unsigned int step;
     if (a <= 0.5f) {
         const hystgen_real_t *p = hystgen_atanh_odd;
         const hystgen_real_t z = x * x;
@@ -46,7 +47,7 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
     const uint_least32_t whole = (uint_least32_t)(u * 16777216.0f);
     uint_least32_t m = whole << 1; /* to be brought to 2^24 .. 2^25 - 1 */
     unsigned int k = 1u;
-    for (unsigned int step = 16u; step > 0u; step >>= 1) {
+    for (step = 16u; step > 0u; step >>= 1) {
         if (m < (uint_least32_t)1u << (25u - step)) {
             m <<= step;
             k += step;

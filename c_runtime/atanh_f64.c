@@ -52,10 +52,12 @@ static const hystgen_real_t hystgen_atanh_row[8][11] = {
 HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 {
     hystgen_real_t a = x < 0.0 ? -x : x;
+    unsigned int n;
+    unsigned int step;
     if (a <= 0.5) {
         const hystgen_real_t z = x * x;
         hystgen_real_t p = hystgen_atanh_odd[12];
-        for (unsigned int n = 12u; n > 0u; --n) {
+        for (n = 12u; n > 0u; --n) {
             p = hystgen_atanh_odd[n - 1u] + z * p;
         }
         return x + x * (z * p);
@@ -67,7 +69,7 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
     const uint_least64_t whole = (uint_least64_t)(u * 9007199254740992.0);
     uint_least64_t m = whole << 1; /* to be brought to 2^53 .. 2^54 - 1 */
     unsigned int k = 1u;
-    for (unsigned int step = 32u; step > 0u; step >>= 1) {
+    for (step = 32u; step > 0u; step >>= 1) {
         if (m < (uint_least64_t)1u << (54u - step)) {
             m <<= step;
             k += step;
@@ -82,7 +84,7 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
     const hystgen_real_t *q = hystgen_atanh_row[j];
     hystgen_real_t lower = p[10];
     hystgen_real_t upper = q[10];
-    for (unsigned int n = 10u; n > 1u; --n) {
+    for (n = 10u; n > 1u; --n) {
         lower = p[n - 1u] + d * lower;
         upper = q[n - 1u] + e * upper;
     }

@@ -106,11 +106,11 @@ static unsigned int hystgen_threshold_not_reached_near(const hystgen_play_t *ste
 }
 
 /* Where a move to w leads: corners it leaves of `depth`, returned; *k plays follow then, of which the first ones are
-   known to. First the blocks that are passed whole, by bisection, then the plays of one. `near`: a move that goes on
+   known to. First the blocks that are passed whole, by bisection, then the plays of one. `onward`: a move that goes on
    mostly takes one or two more plays along. */
 HYSTGEN_COPIES unsigned int hystgen_find_by_input(const hystgen_tables_t *t, const hystgen_corner_t *corner,
                                                   unsigned int depth, unsigned int *k, hystgen_play_t w, bool rising,
-                                                  bool near)
+                                                  bool onward)
 {
     unsigned int low = 0;
     unsigned int left = depth;
@@ -136,8 +136,8 @@ HYSTGEN_COPIES unsigned int hystgen_find_by_input(const hystgen_tables_t *t, con
         if (rising ? c->side >= 0 : c->side <= 0) { /* it lets go of its plays one by one, not all at its extremum */
             const hystgen_sum_t on = rising ? (hystgen_sum_t)w - c->extremum : (hystgen_sum_t)c->extremum - w;
             const hystgen_sum_t way = c->side == 0 ? on : hystgen_half(on); /* in the measure of the thresholds */
-            *k = near ? hystgen_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
-                      : hystgen_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
+            *k = onward ? hystgen_threshold_not_reached_near(t->threshold, *k, c->end - 1u, way)
+                        : hystgen_threshold_not_reached(t->threshold, *k, c->end - 1u, way);
         }
     }
     return left;
@@ -248,15 +248,16 @@ HYSTGEN_COPIES void hystgen_corners_turn(const hystgen_tables_t *t, hystgen_memo
 {
     unsigned int depth = p->depth;
     unsigned int k = 1;
-    bool far;
+    bool takes_along;
     if (p->k > 1) { /* a corner that owns no play but the input itself is none */
         hystgen_push_corner(t, m, corner, !rising); /* the plays that followed stay where they are */
         depth = depth + 1;
-        far = hystgen_past(w, (hystgen_reach_t)hystgen_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
+        takes_along =
+            hystgen_past(w, (hystgen_reach_t)hystgen_from(m->w, rising ? 1 : -1, t->threshold[1], rising), rising);
     } else {
-        far = depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising);
+        takes_along = depth > 0 && hystgen_past(w, hystgen_activation(t, &corner[depth - 1], 1, rising), rising);
     }
-    if (far) {
+    if (takes_along) {
         k = 2; /* right at its activation it would not follow yet */
         depth = hystgen_find_by_input(t, corner, depth, &k, w, rising, false);
     }

@@ -59,13 +59,14 @@ static const hystgen_real_t hystgen_tanh_row[8][16] = {
 HYSTGEN_API hystgen_real_t hystgen_tanh(hystgen_real_t x)
 {
     const hystgen_real_t a = x < 0.0 ? -x : x;
+    unsigned int n;
     if (a < 7.450580596923828e-09) {
         return x;
     }
     if (a < hystgen_tanh_knot[0]) {
         const hystgen_real_t z = x * x;
         hystgen_real_t p = hystgen_tanh_odd[11];
-        for (unsigned int n = 11u; n > 0u; --n) {
+        for (n = 11u; n > 0u; --n) {
             p = hystgen_tanh_odd[n - 1u] + z * p;
         }
         return x + x * (z * p);
@@ -78,7 +79,7 @@ HYSTGEN_API hystgen_real_t hystgen_tanh(hystgen_real_t x)
         const hystgen_real_t *p = hystgen_tanh_row[i];
         const hystgen_real_t d = a - hystgen_tanh_center[i]; /* exact */
         y = p[15];
-        for (unsigned int n = 15u; n > 0u; --n) {
+        for (n = 15u; n > 0u; --n) {
             y = p[n - 1u] + d * y;
         }
     }

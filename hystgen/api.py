@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import tables
+from hystgen import arguments, tables
 from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, Stage, TanhEnvelope
 from hystgen.params import Parameters, load_parameters
 from hystgen.problems import EffectsError, UnsupportedEffectsError
 
 if TYPE_CHECKING:
     from hystgen.effects import Chain, Effect, Run
+    from hystgen.emission import stale
     from hystgen.emission.module import Options
     from hystgen.fixed import FixedTables
-    from hystgen.identification.fit import Fit, Source
+    from hystgen.identification.fit import Fit
+    from hystgen.records import Source
     from hystgen.reference import Tables
     from hystgen.simulation import Session
+
+
+Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -143,14 +148,18 @@ class Model:
         """A record as `chain.simulate` takes it; arguments as for `simulate`, `rest` in seconds before it."""
         from hystgen.effects import Run
 
-        drive = np.array(v, dtype=np.float64)
+        drive = np.array(arguments.signal("v", v), dtype=np.float64)
         low, high = self.cascade.input_range
         period = self.parameters.sample_time or 1.0
         if t is None and self.parameters.sample_time is None and any(effect.timed for effect in self.effects):
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects if effect.timed))
             raise EffectsError(f"the effects ({names}) need time; give t, or sample_time in the parameter file")
-        times = np.array(np.arange(len(drive)) * period if t is None else t, dtype=np.float64)
-        columns = {name: np.array(values, dtype=np.float64) for name, values in (extra or {}).items()}
+        times = np.array(np.arange(len(drive)) * period if t is None else arguments.signal("t", t), dtype=np.float64)
+        if not isinstance(extra or {}, Mapping):
+            raise TypeError(f"extra is a mapping of names to arrays, not {arguments.kind(extra)}")
+        columns = {
+            name: np.array(arguments.signal(name, values), dtype=np.float64) for name, values in (extra or {}).items()
+        }
         for name, values in (("v", drive), ("t", times), *columns.items()):
             if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
                 raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one a sample of v")
@@ -188,6 +197,7 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
     Raises ParameterError with every problem in the file, EffectsError for a file of effects that cannot be used; warns
     of a start memory that had to be projected.
     """
+    path = arguments.path("the parameter file", path)
     model = Model(load_parameters(path, _own_effects(effects)))
     if model.cascade.pi.projected:
         warnings.warn(
@@ -201,9 +211,11 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
 def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
     from hystgen.effects.user import load_user_effects
 
+    if isinstance(sources, str | os.PathLike) or not isinstance(sources, Iterable):
+        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect.py']")
     found: list[type[Effect]] = []
     for source in sources:
-        found += [source] if isinstance(source, type) else load_user_effects(source)
+        found += [source] if isinstance(source, type) else load_user_effects(arguments.path("effects", source))
     return found
 
 
@@ -215,7 +227,16 @@ def check_arithmetic(arithmetic: str) -> None:
 
 def as_model(source: Model | str | os.PathLike[str]) -> Model:
     """The model, or that of a parameter file. Raises ParameterError, and TypeError for what is neither."""
+    if not isinstance(source, Model | str | os.PathLike):
+        raise TypeError(f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}")
     return source if isinstance(source, Model) else load(source)
+
+
+def _models(source: Sources) -> list[Model]:
+    """The models of one source or several."""
+    if isinstance(source, list | tuple | Iterator):
+        return [as_model(each) for each in source]
+    return [as_model(source)]  # type: ignore[arg-type]
 
 
 def emit_options(
@@ -232,51 +253,71 @@ def emit_options(
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
     check_arithmetic(arithmetic)
-    for value, known, what in (
-        (operator, module.OPERATORS, "operator"),
-        (engine or "auto", ("auto", *tables.ENGINES), "engine"),
-        (layout, module.LAYOUTS, "layout"),
-    ):
-        if value not in known:
-            raise ValueError(f"{what} {value!r} is none of {', '.join(known)}")
+    arguments.choice("operator", operator, module.OPERATORS)
+    arguments.choice("engine", engine or "auto", ("auto", *tables.ENGINES))
+    arguments.choice("layout", layout, module.LAYOUTS)
     return module.Options(operator, arithmetic, model.engine(engine, operator, arithmetic), layout)
 
 
-def emitted_files(source: Model | str | os.PathLike[str], **options: str | None) -> dict[str, str]:
-    """Names and text of the C files of a model; options as for `emit`. Nothing is written."""
+def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
+    """Names and text of the C files of a model, or of several; options as for `emit`. Nothing is written.
+
+    Raises what `emit` raises, and ValueError where two models make files of one name.
+    """
     from hystgen.emission import module
 
-    model = as_model(source)
-    return module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+    arguments.known_options("emit", emit_options, options)
+    models = _models(source)
+    check_names(models)
+    made: dict[str, str] = {}
+    for model in models:
+        made |= module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+    return made
 
 
-def emit(
-    source: Model | str | os.PathLike[str], output: str | os.PathLike[str] = ".", **options: str | None
-) -> list[Path]:
-    """Write the C files of a model (or parameter file) into folder `output` and return their paths.
+def check_names(models: Sequence[Model]) -> None:
+    """Raise ValueError where two models make files of one name."""
+    names = [model.name.lower() for model in models]  # as some file systems and all macros see them
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"two models are called {twice[0]}, their files would overwrite each other; rename one")
+
+
+def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[Path]:
+    """Write the C files of a model (or parameter file), or of several, into folder `output` and return their paths.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
-    Raises ParameterError, NotInvertibleError, FormatError and UnsupportedEffectsError; then nothing is written.
+    Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
+    FormatError and UnsupportedEffectsError; then nothing is written.
     """
     from hystgen.emission import files
 
-    return files.write(Path(output), emitted_files(source, **options))
+    return files.write(Path(arguments.path("output", output)), emitted_files(source, **options))
 
 
-def differences(
-    source: Model | str | os.PathLike[str], output: str | os.PathLike[str] = ".", **options: str | None
-) -> list[str]:
-    """What in folder `output` is missing or differs from what `emit` would write, one sentence a file."""
-    from hystgen.emission import files
+def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[str]:
+    """What in folder `output` is missing or other than what `emit` would write, one sentence a file.
 
-    return files.differences(Path(output), emitted_files(source, **options))
+    The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
+    """
+    return [each.sentence() for each in stale_files(source, output, **options)]
+
+
+def stale_files(
+    source: Sources, output: str | os.PathLike[str] = ".", **options: str | None
+) -> list[stale.Difference]:
+    """The differences behind the sentences of `differences`."""
+    from hystgen.emission import stale
+
+    return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))
 
 
 def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:
     """Compile a model's C, run it and compare it with the bit reference; see `hystgen.verification.verify_model`."""
     from hystgen import verification
 
+    arguments.known_options("verify", verification.verify_model, options)
     return verification.verify_model(as_model(source), **options)
 
 
@@ -284,6 +325,7 @@ def diagnose(source: Model | str | os.PathLike[str], records: Any, **options: An
     """Find what a believed model is missing; see `hystgen.diagnosis.diagnose`."""
     from hystgen import diagnosis
 
+    arguments.known_options("diagnose", diagnosis.diagnose, options)
     return diagnosis.diagnose(source, records, **options)
 
 
@@ -291,6 +333,7 @@ def plan(source: Model | str | os.PathLike[str], **options: Any) -> Any:
     """Drive records to measure for a diagnosis; see `hystgen.diagnosis.plan.plan`."""
     from hystgen.diagnosis import plan as drives
 
+    arguments.known_options("plan", drives.plan, options)
     return drives.plan(source, **options)
 
 
@@ -298,6 +341,7 @@ def identify(records: Any, **options: Any) -> Any:
     """Fit a model to measured records; see `hystgen.identification.identify`."""
     from hystgen import identification
 
+    arguments.known_options("identify", identification.identify, options)
     return identification.identify(records, **options)
 
 
@@ -305,7 +349,7 @@ def identify_batch(sources: Any, output: str | os.PathLike[str], **options: Any)
     """Fit and emit many units in parallel; see `hystgen.identification.fleet.identify_batch`."""
     from hystgen.identification import fleet
 
-    return fleet.identify_batch(sources, output, **options)
+    return fleet.identify_batch(sources, arguments.path("output", output), **options)
 
 
 def report_fit(
@@ -320,10 +364,12 @@ def report_fit(
     has to come as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError
     for other records, RecordError, OSError.
     """
-    from hystgen.identification import several
-    from hystgen.records import read_records
+    from hystgen.identification import Fit
+    from hystgen.records import read_records, several
     from hystgen.report import identification
 
+    if not isinstance(fit, Fit):
+        raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
     return identification.write(fit, read_records([*several(records), *several(holdout)]), folder)
 
 

@@ -6,14 +6,14 @@ import math
 import os
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from hystgen import __version__
+from hystgen import __version__, console
 from hystgen.verification.targets import NAMES as TARGETS
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class _Failed(click.ClickException):
 
     def show(self, file: Any = None) -> None:
         """Print the message alone: it already says that it is an error."""
-        click.echo(self.message, file=file, err=True)
+        console.note(self.message, file)
 
 
 def _shown(path: str, action: Callable[[], Any]) -> Any:
@@ -46,7 +46,7 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
             warnings.simplefilter("always", UserWarning)
             result = action()
         for warning in caught:
-            click.echo(f"warning: {warning.message}", err=True)
+            console.note(f"warning: {warning.message}")
         return result
     except (ParameterError, PlanError, RecordError) as error:
         raise _Failed(str(error), 2) from None
@@ -59,7 +59,14 @@ def _shown(path: str, action: Callable[[], Any]) -> Any:
     except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
         raise
     except (ValueError, OSError) as error:
-        raise _Failed(f"error: {error}", 2) from None
+        raise _Failed(f"error: {_reason(error)}", 2) from None
+
+
+def _reason(error: ValueError | OSError) -> str:
+    """What an error says; of the system's own the file and what is wrong with it."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
 
 
 def _load(path: str, effects: Sequence[str] = ()) -> Model:
@@ -84,44 +91,91 @@ layout_option = click.option(
 )  # fmt: skip
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=console.Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="hystgen")
 def main() -> None:
     """From a measured hysteresis loop to a verified compensator in C."""
     from hystgen import compiled
 
-    compiled.announce = lambda: click.echo("compiling for this machine, once: about 20 s", err=True)
+    compiled.announce = console.note
 
 
 @main.command()
-@params_argument
+@click.argument("params", nargs=-1, required=True, type=click.Path())
 @click.option("-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to")
 @operator_option
 @arithmetic_option
 @engine_option
 @layout_option
-@click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs")
+@click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
-def emit(params: str, output: str, check: bool, list_outputs: bool, **options: str | None) -> None:
-    """Write the C files of a model.
+def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, **options: str | None) -> None:
+    """Write the C files of models.
 
-    Example: hystgen emit stage_x.yaml -o firmware/ --operator inverse --arithmetic float32
+    Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
     """
     from hystgen import api
+    from hystgen.emission import files
 
-    model = _load(params)
+    params = tuple(dict.fromkeys(params))
+    models = _each(params, _load)
+    _shown(output, lambda: api.check_names(models))
+    named = list(zip(params, models, strict=True))
+    texts = _each(named, lambda one: _shown(one[0], lambda: api.emitted_files(one[1], **options)))
+    made = {name: text for each in texts for name, text in each.items()}
     if check:
-        problems = _shown(params, lambda: api.differences(model, output, **options))
-        if problems:
-            raise _Failed("\n".join(f"error: {problem}; run hystgen emit again" for problem in problems), 1)
-        return
-    if list_outputs:
-        names = _shown(params, lambda: api.emitted_files(model, **options))
-        for name in names:
-            click.echo(str(Path(output) / name))
-        return
-    for path in _shown(params, lambda: api.emit(model, output, **options)):
-        click.echo(str(path))
+        _check(named, output, options)
+    elif list_outputs:
+        for name in made:
+            console.say(str(Path(output) / name))
+    else:
+        for path in _shown(output, lambda: files.write(Path(output), made)):
+            console.say(str(path))
+
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+
+def _each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
+    """What `action` gives for every item. Raises _Failed with all messages and the higher one of the exit codes."""
+    made, failures = [], []
+    for item in items:
+        try:
+            made.append(action(item))
+        except _Failed as failure:
+            failures.append(failure)
+    if failures:
+        messages = dict.fromkeys(failure.message for failure in failures)
+        raise _Failed("\n".join(messages), max(failure.exit_code for failure in failures))
+    return made
+
+
+def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, str | None]) -> None:
+    """Exit code 1 with the differences of files on disk, and the commands that fit."""
+    from dataclasses import asdict
+
+    from hystgen import api
+    from hystgen.emission import stale
+
+    problems, advice = [], []
+    for path, model in models:
+        found = _shown(path, partial(api.stale_files, model, output, **options))
+        if not found:
+            continue
+        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
+        wanted = asdict(api.emit_options(model, **options))  # type: ignore[arg-type]
+        problems += [f"error: {each.sentence()}" for each in found]
+
+        def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
+            try:
+                return api.stale_files(model, output, **other)
+            except ValueError:  # no such model any more
+                return list(found)
+
+        advice += stale.advice(found, path, output, given, wanted, again)
+    if problems:
+        raise _Failed("\n".join(dict.fromkeys([*problems, *advice])), 1)
 
 
 @main.command()
@@ -142,8 +196,7 @@ def verify(
 
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
     """
-    from hystgen import verification
-    from hystgen.records import write_atomically
+    from hystgen import verification, writing
 
     chosen = tuple(targets.split(","))
     for word in chosen:
@@ -151,21 +204,21 @@ def verify(
             raise _Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
     _keep((json_file, junit_file), [params])
     for file in (json_file, junit_file):
-        if file and not Path(file).resolve().parent.is_dir():
-            raise _Failed(f"error: the folder of {file} does not exist", 2)
+        if file:
+            _shown(file, partial(writing.check_writable, file))
     model = _load(params)
 
     def say(what: str) -> None:
-        click.echo(f"verifying: {what}", err=True)
+        console.note(f"verifying: {what}")
 
     report = _shown(
         params,
         lambda: verification.verify_model(model, compiler=compiler, targets=chosen, progress=say, **options),
     )
-    click.echo(report.table())
+    console.say(report.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
-            _shown(file, partial(write_atomically, file, text()))
+            _shown(file, partial(writing.write_atomically, file, text()))
     if not report.ok:
         raise _Failed("verification failed", 1)
 
@@ -180,20 +233,20 @@ def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | No
         planned = plan(params, effects=effects, max_rate=max_rate, sample_time=sample_time)
         _keep([Path(output) / name for name in planned.names], [params, *effects])
         for sentence in planned.defaults:
-            click.echo(sentence, err=True)
-        click.echo(planned.sentence(), err=True)
+            console.note(sentence)
+        console.note(planned.sentence())
         for path in planned.write(output):
-            click.echo(str(path))
-        click.echo(f"then run: {planned.command(output)}", err=True)
+            console.say(str(path))
+        console.note(f"then run: {planned.command(output)}")
 
     _shown(params, run)
 
 
 def _keep(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
     """Refuse to write over what is read."""
-    read = {Path(path).resolve() for path in inputs}
+    read = {os.path.realpath(path) for path in inputs}
     for path in outputs:
-        if path and Path(path).resolve() in read:
+        if path and os.path.realpath(path) in read:
             raise _Failed(f"error: {path} is an input and would be overwritten; choose another name", 2)
 
 
@@ -283,7 +336,7 @@ def simulate(
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             raise _Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
         for note in record.notes:
-            click.echo(f"warning: {record.name}: {note}", err=True)
+            console.note(f"warning: {record.name}: {note}")
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
@@ -295,7 +348,7 @@ def simulate(
     for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
         columns = record.columns()
         for sentence in remarks:
-            click.echo(f"warning: {sentence}", err=True)
+            console.note(f"warning: {sentence}")
         units = dict(record.units)
         if answer in columns:
             columns[f"{answer}_measured"] = columns.pop(answer)
@@ -303,10 +356,10 @@ def simulate(
         columns[answer] = answers
         header = records.headers(columns, units)
         if target is None:
-            click.echo(records.columns_text(header, list(columns.values())), nl=False)
+            console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8
             continue
         _shown(str(target), partial(_write_record, target, header, columns))
-        click.echo(str(target))
+        console.say(str(target))
 
 
 @main.command()
@@ -342,7 +395,7 @@ def identify(
 
     Example: hystgen identify --batch 'units/*.csv' -o params/
     """
-    from hystgen import identification
+    from hystgen import identification, writing
     from hystgen.report import identification as pages
 
     drive, _, displacement = (units or "").partition(",")
@@ -380,30 +433,40 @@ def identify(
 
     def run() -> None:
         from hystgen import records
+        from hystgen.emission import files
+        from hystgen.identification import settings
         from hystgen.report import plots
 
+        for file in (output, plot):
+            if file:
+                writing.check_writable(file)
         if plot:
             plots.check_path(plot)
         if report:
             pages.check_folder(report)
+            files.check(Path(report), pages.names())
+        older = settings.of(output)
         read = records.read_records([*data, *holdout], **how)
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],
-            name=name or identification.identifier_from(Path(output).stem),
+            name=name or older.name or identification.identifier_from(Path(output).stem),
             progress=True,
             **options,
         )
         for warning in fit.warnings:
-            click.echo(f"warning: {warning}", err=True)
+            console.note(f"warning: {warning}")
+        for sentence in older.sentences(fit):
+            console.note(sentence)
+        fit = older.on(fit)
         fit.write(output)
-        click.echo(fit.table())
-        click.echo(output)
+        console.say(fit.table())
+        console.say(output)
         if plot:
             plots.show_fit(fit, read, plot)
-            click.echo(plot)
+            console.say(plot)
         if report:
-            click.echo(str(pages.write(fit, read, report, Path(output).name)))
+            console.say(str(pages.write(fit, read, report, Path(output).name)))
 
     _shown(data[0], run)
 
@@ -416,8 +479,8 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
         done = _shown(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
         raise _Failed("interrupted; what is done is kept, and the same command goes on from there", 130) from None
-    click.echo(done.table(), nl=False, err=True)
-    click.echo(str(Path(output) / "summary.csv"))
+    console.note(done.table().rstrip("\n"))
+    console.say(str(Path(output) / "summary.csv"))
     if done.failed:
         raise _Failed(f"error: {len(done.failed)} of {len(done.units)} units failed", 1)
 
@@ -476,11 +539,13 @@ def diagnose(
         found = diagnosis.diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
-        for note in found.notes:
-            click.echo(f"warning: {note}", err=True)
-        click.echo(found.sentence())
+        for note in (*found.notes, *found.warnings):
+            console.note(f"warning: {note}")
+        console.say(found.sentence())
+        if found.not_emitted():
+            console.note(found.not_emitted())
         for path in found.write(output):
-            click.echo(str(path))
+            console.say(str(path))
 
     _shown(params, run)
 
@@ -500,12 +565,12 @@ def show(params: str, plot: str | None, effects: tuple[str, ...]) -> None:
     if plot:
         _keep([plot], [params])
         _shown(params, partial(plots.check_path, plot))
-    click.echo(_shown(params, lambda: properties.properties(model)))
+    console.say(_shown(params, lambda: properties.properties(model)))
     for warning in properties.warnings(model):
-        click.echo(f"warning: {warning}", err=True)
+        console.note(f"warning: {warning}")
     if plot:
         _shown(params, lambda: plots.show_model(model, plot))
-        click.echo(plot)
+        console.say(plot)
 
 
 @main.command()
@@ -518,7 +583,7 @@ def schema() -> None:
 
     from hystgen import params
 
-    click.echo(json.dumps(params.schema(), indent=2))
+    console.say(json.dumps(params.schema(), indent=2))
 
 
 if __name__ == "__main__":

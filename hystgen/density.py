@@ -16,6 +16,9 @@ and no smaller one holds: a history that turns at every threshold and every boun
 Everything is computed with 40 digits and rounded to double once at the end, so that every machine gets the same
 numbers. A formula is replaced by polynomials on panels that are halved until the polynomials agree with it; what
 is left is counted in the bound.
+
+The work is bounded, by counts and so alike on every machine: no text of the permitted length computes for longer than
+about 10 s.
 """
 
 from __future__ import annotations
@@ -45,6 +48,11 @@ _PRECISION = 1e-20
 _LARGEST_EXPONENT = 1000
 _SMALLEST_EXPONENT = -4000
 """Binary exponents beyond which an intermediate value is refused, or taken as 0."""
+_LARGE_POWER = 1 << 16
+"""Exponents of `**` beyond which it goes through the logarithm."""
+_MAX_OPERATIONS = 2_000_000
+"""Operations that a formula may take in all, 1 to 5 us each (tests/test_density.py has the slowest formulas). A sum of
+29 bell curves, about the most that fits into a formula, takes 600 000."""
 
 
 class DensityError(ValueError):
@@ -104,7 +112,7 @@ class Formula:
             "-": (2, lambda a, b: a - b),
             "*": (2, lambda a, b: a * b),
             "/": (2, lambda a, b: a / b),
-            "**": (2, lambda a, b: a**b),
+            "**": (2, _power),
             "negate": (1, lambda a: -a),
         }
         operators.update((name, (1, getattr(mp, name))) for name in FUNCTIONS)
@@ -131,6 +139,22 @@ class Formula:
                 raise DensityError("formula", f"is not finite at r = {_short(r)}; correct the formula or r_max")
             stack[-count:] = [value if exponent + bits > _SMALLEST_EXPONENT else real(0)]
         return stack[0]
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """`base**exponent`. Raises ValueError where it is not real.
+
+    A large exponent goes through the logarithm, with the bits that this costs: a whole one would be taken bit by bit,
+    with numbers that grow on the way, and has up to a thousand bits.
+    """
+    mp = _context()
+    if abs(exponent) <= _LARGE_POWER or base == 0:
+        return base**exponent
+    if base < 0 and not mp.isint(exponent):
+        raise ValueError("no real power")
+    with mp.extraprec(40):
+        size = mp.exp(exponent * mp.log(abs(base)))
+    return -size if base < 0 and exponent % 2 == 1 else +size
 
 
 def parse_formula(text: str) -> Formula:
@@ -369,16 +393,21 @@ def _fit() -> tuple[list[Any], list[Any], list[list[Any]]]:
 def from_formula(formula: Formula, r_max: float) -> Density:
     """The formula on `[0, r_max]`, r_max > 0.
 
-    Raises DensityError where it has no finite real value, is negative, or does not become smooth under
-    repeated halving (a pole, or oscillations too fast to follow).
+    Raises DensityError where it has no finite real value, is negative, does not become smooth under repeated halving
+    (a pole, or oscillations too fast to follow), or takes more than 2 million operations.
     """
     mp = _context()
     nodes, between, matrix = _fit()
     end = mp.mpf(r_max)
     lowest, highest = (mp.inf, mp.mpf(0)), mp.mpf(0)
+    panels_within = _MAX_OPERATIONS // (len(formula.steps) * (len(nodes) + len(between)))
 
     def fit(a: Any, b: Any) -> _Panel:
-        nonlocal lowest, highest
+        nonlocal lowest, highest, panels_within
+        panels_within -= 1
+        if panels_within < 0:
+            what = f"takes too long to integrate: {len(formula.steps)} operations at too many values of r"
+            raise DensityError("formula", f"{what}; shorten it, or give the density as a table")
         middle, half = (a + b) / 2, (b - a) / 2
         samples = [formula(middle + half * t) for t in nodes]
         checks = [formula(middle + half * t) for t in between]
@@ -388,6 +417,9 @@ def from_formula(formula: Formula, r_max: float) -> Density:
             lowest, highest = min(lowest, (s, middle + half * t)), max(highest, abs(s))
         return _Panel(a, b, coefficients, miss * (b - a))
 
+    if panels_within < _FIRST_PANELS:
+        what = f"has {len(formula.steps)} operations, too many to integrate"
+        raise DensityError("formula", f"{what}; shorten it, or give the density as a table")
     edges = [end * i / _FIRST_PANELS for i in range(_FIRST_PANELS + 1)]
     first = [fit(a, b) for a, b in pairwise(edges)]
     allowed = _PRECISION * sum(abs(panel.moments(panel.end)[0]) for panel in first)

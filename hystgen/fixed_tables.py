@@ -4,8 +4,8 @@ Everything is computed with fractions from the parameters as they are, so that t
 anywhere; only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
 
 Ranges. The drive is limited to `input_range`, so that the input w of the plays, every play and every corner stay
-between the least and largest of the range's images, the start memory and 0, where a reset begins. `Ranges` bounds every sum from there; a
-format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables).
+between the least and largest of the range's images, the start memory and 0, where a reset begins. That bounds every
+sum; a format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables).
 
 Errors. With the drive exact, as it is sent: rounded thresholds and start states move a play by no more than their own
 error (3); rounded sums of weights are summed by parts, because neighbouring plays differ by no more than their
@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from hystgen import fixed, reference
-from hystgen.bounds import error_bounds
+from hystgen.bounds import error_bounds, largest_sum
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade, DeadZone, TanhEnvelope
 from hystgen.problems import Path
@@ -84,10 +84,11 @@ def lsbs(
 ) -> tuple[Fraction, Fraction]:
     """Physical units a drive code and an output code: those given, else the finest that reach the ends of the ranges.
 
-    Raises FormatError for one that is too small.
+    Raises FormatError for one that is too small, and for an output that stays 0.
     """
     code_max = 2 ** CODE_BITS[arithmetic] - 1
-    found, refused = [], []
+    found: list[Fraction] = []
+    refused: list[tuple[Path, str]] = []
     for given, ends, what, key in (
         (drive_lsb, cascade.input_range, "input_range", "drive_lsb"),
         (output_lsb, cascade.output_range, "the output range", "output_lsb"),
@@ -95,6 +96,9 @@ def lsbs(
         largest = max(abs(decimal(end)) for end in ends)
         finest = largest / code_max
         lsb = finest if given is None else decimal(given)
+        if lsb == 0:
+            stays = "no play moves over this range of the drive, and the output stays 0; widen the range"
+            refused.append((("input_range",), stays))
         if lsb < finest:
             refused.append((
                 ("emit", key),
@@ -143,7 +147,11 @@ class _Builder:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
-        self.output = (math.ceil(low), math.floor(high))
+        # an end that double precision may have moved off a code is that code: 2^-50 is 8 roundoffs, and no more than
+        # a thousandth of a code where the rest of a sum cancels
+        size = Fraction(largest_sum(self.cascade)) + abs(Fraction(self.cascade.output_offset))
+        slack = min(size / 2**50 / self.output_lsb, Fraction(1, 1024))
+        self.output = (math.ceil(low - slack), math.floor(high + slack))
         for (first, last), key, far in (
             (self.drive, "drive_lsb", ("input_range",)),
             (self.output, "output_lsb", ("model", "output_offset")),
@@ -375,8 +383,9 @@ class _Builder:
 
         Outputs after `init` fit the type but for rounding; those after `reset` may not.
         """
-        behind_reset = (abs(Fraction(y)) for y in self.cascade.reset_range)
-        return self.code_max if max(behind_reset) > (self.code_max + Fraction(1, 2)) * self.output_lsb else 2**SUM_BITS
+        largest = max(abs(Fraction(y)) for y in self.cascade.reset_range) / self.output_lsb
+        reported: int = self.code_max if largest > self.code_max + Fraction(1, 2) else 2**SUM_BITS
+        return reported
 
     def _play_errors(self) -> list[Fraction]:
         """How far each play can be from that of the exact model, in physical units of w."""
@@ -435,6 +444,7 @@ class _Builder:
         output_short = max(
             Fraction(c.output_range[1]) - self.output[1] * self.output_lsb,
             self.output[0] * self.output_lsb - Fraction(c.output_range[0]),
+            Fraction(0),
         )
         residual = (
             self._sum_error() * self.output_lsb
@@ -480,18 +490,25 @@ def _upward(x: Fraction) -> float:
 
 
 def _breaks(cascade: Cascade) -> dict[bool, list[float]]:
-    """Drives at which the memoryless part has a kink, on each branch."""
+    """Drives at which the memoryless part has a kink, on each branch. Raises FormatError for too many."""
     found: dict[bool, list[float]] = {}
     for ascending in (True, False):
-        places: list[float] = []
-        for j, (stage, (low, high)) in enumerate(
-            zip(cascade.stages, cascade.stage_ranges(ascending), strict=True)
-        ):
-            if isinstance(stage, DeadZone):
-                for b in stage.breaks:
-                    if low < b < high:
-                        places.append(_drive_at(cascade, j, b, ascending))
-        found[ascending] = sorted(places)
+        if not ascending and not cascade.branches_differ:
+            found[ascending] = found[True]
+            continue
+        inside = [
+            (j, b)
+            for j, (stage, (low, high)) in enumerate(
+                zip(cascade.stages, cascade.stage_ranges(ascending), strict=True)
+            )
+            if isinstance(stage, DeadZone)
+            for b in stage.breaks
+            if low < b < high
+        ]
+        if len(inside) > MOST_PIECES:
+            what = f"bends at {len(inside)} places inside input_range, and fixed point takes {MOST_PIECES}"
+            raise FormatError((("model", "memoryless"), f"{what}; thin out the thresholds or use float32"))
+        found[ascending] = sorted(_drive_at(cascade, j, b, ascending) for j, b in inside)
     return found
 
 
@@ -516,6 +533,8 @@ def _drive_at(cascade: Cascade, j: int, value: float, ascending: bool) -> float:
     low, high = cascade.input_range
     for _ in range(200):
         middle = (low + high) / 2
+        if middle in (low, high):  # no double lies between them
+            break
         x = middle
         for stage in cascade.stages[:j]:
             x = float(stage.forward(x, ascending))

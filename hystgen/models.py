@@ -216,26 +216,40 @@ class DeadZone:
         middle = sum(1 for b in self.breaks if b < 0)
         points = []
         for j in range(len(self.piece_slopes)):
-            x = 0.0 if j == middle else self.breaks[j] if j < middle else self.breaks[j - 1]
-            points.append((x, self._value(x)))
+            k = j if j < middle else j - 1
+            points.append((0.0, self._value(0.0)) if j == middle else (self.breaks[k], self._values[k]))
         return tuple(points)
 
     def _value(self, x: float) -> float:
         if math.isinf(x):  # the end piece decides, its terms may cancel
             slope = self.piece_slopes[-1 if x > 0 else 0]
             return slope * x if slope else self.anchors[-1 if x > 0 else 0][1]
-        terms = []
-        for rho, eta in zip(self.thresholds, self.weights, strict=True):
-            part = max(x - rho, 0.0) if rho > 0 else min(x - rho, 0.0) if rho < 0 else x
-            terms.append(eta * part)
-        return math.fsum(terms)
+        rho, eta, least, most = self._terms
+        return math.fsum((eta * np.clip(x - rho, least, most)).tolist())
+
+    @cached_property
+    def _terms(self) -> tuple[Array, Array, Array, Array]:
+        """rho, eta, and the least and largest value of `x - rho` in each term."""
+        rho, eta = np.array(self.thresholds), np.array(self.weights)
+        return rho, eta, np.where(rho > 0, 0.0, -math.inf), np.where(rho < 0, 0.0, math.inf)
+
+    @cached_property
+    def _values(self) -> tuple[float, ...]:
+        """Values at the breaks."""
+        return tuple(map(self._value, self.breaks))
+
+    @cached_property
+    def _all_pieces(self) -> tuple[Array, Array, Array]:
+        """Breaks, anchors and slopes as arrays."""
+        return np.array(self.breaks), np.array(self.anchors), np.array(self.piece_slopes)
 
     def forward(self, x: ArrayLike, ascending: bool = True) -> Array:
         """Value at x; both directions share it."""
         points = np.asarray(x, dtype=np.float64)
-        piece = np.searchsorted(np.asarray(self.breaks), points, side="right")
-        anchor = np.asarray(self.anchors)[piece]
-        return np.asarray(anchor[..., 1] + (points - anchor[..., 0]) * np.asarray(self.piece_slopes)[piece])
+        breaks, anchors, slopes = self._all_pieces
+        piece = np.searchsorted(breaks, points, side="right")
+        anchor = anchors[piece]
+        return np.asarray(anchor[..., 1] + (points - anchor[..., 0]) * slopes[piece])
 
     def inverse_map(self) -> DeadZone:
         """The dead-zone sum that undoes this one: thresholds tau (53)(55), weights mu (54)(56).
@@ -260,11 +274,22 @@ class DeadZone:
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
         """The x in [low, high], where the map has to rise, that has the value y; beyond it the end pieces go on."""
-        kept = self.over(low, high)
+        ends, anchors, slopes = self._inverses(low, high)
         values = np.asarray(y, dtype=np.float64)
-        piece = np.searchsorted(np.asarray(kept.values), values, side="right")
-        anchor = np.asarray(kept.anchors)[piece]
-        return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / np.asarray(kept.slopes)[piece])
+        piece = np.searchsorted(ends, values, side="right")
+        anchor = anchors[piece]
+        return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / slopes[piece])
+
+    def _inverses(self, low: float, high: float) -> tuple[Array, Array, Array]:
+        """Values at the breaks, anchors and slopes of `over` as arrays, made once for each range."""
+        if (low, high) not in self._inverted:
+            kept = self.over(low, high)
+            self._inverted[low, high] = np.array(kept.values), np.array(kept.anchors), np.array(kept.slopes)
+        return self._inverted[low, high]
+
+    @cached_property
+    def _inverted(self) -> dict[tuple[float, float], tuple[Array, Array, Array]]:
+        return {}
 
     def over(self, low: float, high: float) -> Pieces:
         """The straight pieces that [low, high] touches; the first and the last go on beyond it."""
@@ -272,7 +297,7 @@ class DeadZone:
         breaks = self.breaks[first:last]
         return Pieces(
             breaks,
-            tuple(self._value(b) for b in breaks),
+            self._values[first:last],
             self.anchors[first : last + 1],
             self.piece_slopes[first : last + 1],
         )
@@ -284,7 +309,8 @@ class DeadZone:
 
     def image(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
         """Least and largest value over [low, high]; they lie at the ends or at breaks."""
-        values = [self._value(x) for x in (low, high, *(b for b in self.breaks if low < b < high))]
+        inside = slice(bisect.bisect_right(self.breaks, low), bisect.bisect_left(self.breaks, high))
+        values = (self._value(low), self._value(high), *self._values[inside])
         return min(values), max(values)
 
     def slope_range(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
@@ -434,14 +460,21 @@ class Cascade:
             v = stage.inverse(v if not isinstance(w, float) else float(v), ascending, low, high)
         return np.asarray(v)
 
-    def stage_ranges(self, ascending: bool) -> list[tuple[float, float]]:
+    def stage_ranges(self, ascending: bool) -> tuple[tuple[float, float], ...]:
         """The input range of every stage when the drive stays inside `input_range`."""
-        ranges = []
-        low, high = self.input_range
-        for stage in self.stages:
-            ranges.append((low, high))
-            low, high = stage.image(low, high, ascending)
-        return ranges
+        return self._stage_ranges[ascending]
+
+    @cached_property
+    def _stage_ranges(self) -> dict[bool, tuple[tuple[float, float], ...]]:
+        found = {}
+        for ascending in (True, False):
+            ranges = []
+            low, high = self.input_range
+            for stage in self.stages:
+                ranges.append((low, high))
+                low, high = stage.image(low, high, ascending)
+            found[ascending] = tuple(ranges)
+        return found
 
     @property
     def stage_spans(self) -> list[tuple[float, float]]:

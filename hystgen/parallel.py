@@ -179,6 +179,8 @@ def _serve(
     global _at_work
     _at_work = at_work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for ending in (signal.SIGTERM, signal.SIGHUP):  # what this process does at these is for its original to do
+        signal.signal(ending, signal.SIG_DFL)
     gc.freeze()  # looking through what is the parent's would take long, and copy all of it
     for each in others:  # its ends, which would keep one copy waiting for the other when the parent is gone
         each.close()

@@ -57,6 +57,7 @@ __all__ = [
     "located",
     "make_parameters",
     "name_problem",
+    "parameter_data",
     "parameters_sha256",
     "parse_parameters",
     "schema",
@@ -72,6 +73,16 @@ def load_parameters(path: str | os.PathLike[str], user_effects: Sequence[type[Ef
     """
     file = os.fspath(path)
     return parse_parameters(_text(file), file, user_effects)
+
+
+def parameter_data(path: str | os.PathLike[str]) -> Mapping[str, Any]:
+    """The plain data of a parameter file, as far as YAML goes: its values are not checked. Raises ParameterError."""
+    file = os.fspath(path)
+    document = read(_text(file).removeprefix("\ufeff"))
+    if not document.complete:
+        raise ParameterError(file, document.problems)
+    data: Mapping[str, Any] = document.data
+    return data
 
 
 def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) -> ParameterError:

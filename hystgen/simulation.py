@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import compiled, fixed, reference, tables
+from hystgen import arguments, compiled, fixed, reference, tables
 from hystgen.models import Cascade
 from hystgen.reference import Bytes
 
@@ -35,6 +35,7 @@ class Session:
         clamp: bool = False,
         lsb: tuple[float | None, float | None] = (None, None),
     ) -> None:
+        arguments.choice("operator", operator, ("forward", "inverse"))
         self._inverse = int(operator == "inverse")
         if self._inverse:
             cascade.inverse()
@@ -75,15 +76,18 @@ class Session:
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
 
-        Fixed point takes and gives codes. Raises ValueError for numbers that are none.
+        Fixed point takes and gives codes. Raises ValueError for numbers that are none and for another shape, TypeError
+        for what is no array of numbers.
         """
         samples = self._samples(x)
         return self.operate(np.full(len(samples), reference.OP_STEP, dtype=np.uint8), samples)
 
     def _samples(self, x: ArrayLike) -> NDArray[Any]:
-        samples = np.ascontiguousarray(x, dtype=self.tables.threshold.dtype)
+        given = arguments.signal("u" if self._inverse else "v", x)
+        with np.errstate(invalid="ignore"):  # what is no code is found below
+            samples = np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
         if samples.dtype.kind == "i":
-            given, most = np.asarray(x), int(self.tables.limits[fixed.CODE_MAX])
+            most = int(self.tables.limits[fixed.CODE_MAX])
             if np.any(given != samples) or np.any(samples < -most - 1) or np.any(samples > most):
                 raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
         return samples

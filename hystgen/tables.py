@@ -49,6 +49,8 @@ def choose_engine(engine: str, cascade: Cascade, operator: str, arithmetic: str)
     The table's next smaller number of plays decides; for both operators the sum. Any other choice is kept, but without
     plays nothing is listed.
     """
+    if engine not in ("auto", *ENGINES):
+        raise ValueError(f"engine {engine!r} is none of auto, {', '.join(ENGINES)}")
     n = cascade.pi.n
     if n == 0:
         return "loop"
@@ -88,22 +90,22 @@ def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
 def first_moves(
     cascade: Cascade,
     limits: tuple[Any, Any],
-    below: Callable[[float], tuple[Any, bool]],
+    not_above: Callable[[float], tuple[Any, bool]],
     nearest: Callable[[float], Any],
 ) -> tuple[list[Any], list[int]]:
     """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.
 
-    `below` gives the largest number of the type that is not above a drive, and whether it is that drive. The forward
-    operator has to know which way the actuator moves from the drive that the start memory stands for, also where that is
-    no number of the type or lies beyond the limits: seen from the number below it, every move has its true direction if
-    no move counts as descending. The inverse starts at the nearest number, where it may stay.
+    `not_above` gives the largest number of the type that is not above a drive, and whether it is that drive. The
+    forward operator has to know which way the actuator moves from the drive that the start memory stands for, also
+    where that is no number of the type or lies beyond the limits: seen from the number below it, every move has its
+    true direction if no move counts as descending. The inverse starts at the nearest number, where it may stay.
     """
     low, high = limits
     applied, ascending = [0, 0, 0, 0], [1, 1, 1, 1]
     if cascade.start_is_defined:
         for j, w in enumerate((float(cascade.pi.start[0]), 0.0)):
             v = float(cascade.front_inverse(w))
-            number, same = below(v)
+            number, same = not_above(v)
             ascending[j] = int(number < low or (same and number <= high))
             applied[j] = min(max(number, low), high)
             ascending[2 + j] = int(nearest(v) <= high)
@@ -243,14 +245,14 @@ def build_float(
         limits[reference.DRIVE_MIN : reference.OUTPUT_MAX + 1] = [-largest, largest, -largest, largest]
     limits[reference.OFFSET] = cascade.output_offset
 
-    def below(v: float) -> tuple[float, bool]:
+    def not_above(v: float) -> tuple[float, bool]:
         number = dtype(v)
         if float(number) > v:
             number = np.nextafter(number, dtype(-np.inf))
         return float(number), float(number) == v
 
     low, high = limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX]
-    applied, ascending = first_moves(cascade, (low, high), below, lambda v: float(dtype(v)))
+    applied, ascending = first_moves(cascade, (low, high), not_above, lambda v: float(dtype(v)))
     if cascade.branches_differ and not cascade.inverse_problems():
         limits[reference.HOLD] = 2.0 * error_bounds(cascade, arithmetic, engine).rounding
     limits[reference.REAL_MAX] = largest

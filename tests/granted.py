@@ -38,8 +38,8 @@ PLACES = [
     ),
     # where a corner is left, a play is held by it; there are no more corners than plays
     (r"(    if \(depth > 0\) \{\n)", 1, r"\1        GRANTED(k >= 1 && k <= PLAYS && depth <= PLAYS);\n"),
-    (r"(        far = depth > 0 && NAME_past\()", 1, r"        GRANTED(depth <= PLAYS);\n\1"),
-    (r"(    if \(far\) \{\n)", 1, r"    GRANTED(depth <= PLAYS);\n\1"),
+    (r"(        takes_along = depth > 0 && NAME_past\()", 1, r"        GRANTED(depth <= PLAYS);\n\1"),
+    (r"(    if \(takes_along\) \{\n)", 1, r"    GRANTED(depth <= PLAYS);\n\1"),
     (r"(static void NAME_leave_corner\([^{]*\{\n)", 1, r"\1    GRANTED(m->here.depth < PLAYS);\n"),
     (
         r"        here = m->here\.k > 1 \? (corner\[m->here\.depth\]\.output) : (NAME_corners_output\(t, m\));",

@@ -49,11 +49,11 @@ def first_exact(v: Array, largest: float) -> int:
 
 
 def error_figures(y: Array, predicted: Array, first: int) -> tuple[float, float, float]:
-    """rms and largest error with a free offset, and rms in % of the whole record's peak to peak."""
+    """rms and largest error with a free offset, and rms in % of the peak to peak of what is compared."""
     error = (y - predicted)[first:]
     error = error - error.sum() / len(error)
     rms = float(np.sqrt((error**2).sum() / len(error)))
-    return rms, float(abs(error).max()), 100.0 * rms / float(y.max() - y.min())
+    return rms, float(abs(error).max()), 100.0 * rms / float(y[first:].max() - y[first:].min())
 
 
 def wander(seed: int, low: float = 0.0, high: float = 100.0, turns: int = 60, samples: int = 40) -> Array:

@@ -442,7 +442,7 @@ def test_generalized_models_stand_in_a_loop() -> None:
 def test_the_compensator_of_a_model_keeps_the_drive_in_its_range() -> None:
     stage = model(NOTE)
     response = Loop(([1.0], [1e-3, 1.0]), GAINS, T, stage, stage.inverse()).run(np.full(4000, 50.0))
-    assert np.max(response.drive) == 6.0
+    assert 6.0 - np.spacing(6.0) <= np.max(response.drive) <= 6.0  # the drive for the largest output, which rounds
     assert response.control[-1] > stage.cascade.output_range[1]
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import time
@@ -310,6 +311,108 @@ def test_global_precision_is_left_alone() -> None:
         assert mpmath.mp.dps == 5
     assert mpmath.mp.dps == before
     assert plays.weights[1] == pytest.approx(1 - math.exp(-1), rel=1e-15)
+
+
+SLOW = {
+    "power of a huge whole exponent": "1e-300**1e300",
+    "many of them": "+".join(["1e-300**1e300"] * 71),
+    "negative exponent": "1e300**-1e300",
+    "base near 1": "+".join(["(1-1e-38)**1e40"] * 58),
+    "base below 1": "+".join(["0.999**1e300"] * 70),
+    "long sum": "r" + "+r" * 499,
+    "signs": "-" * 998 + "r",
+    "brackets": "(" * 499 + "r" + ")" * 499,
+    "powers of r": "+".join(["r**r"] * 190),
+    "tower": "1" + "**r" * 333,
+    "nested sines": "sin(" * 198 + "r" + ")" * 198 + "+2",
+    "nested roots": "sqrt(" * 165 + "r" + ")" * 165,
+    "nested tanh": "tanh(" * 165 + "r" + ")" * 165,
+    "nested logarithms": "log(" * 150 + "9" + ")" * 150,
+    "sines of huge numbers": "+".join(["sin(1e300*r)**2"] * 58),
+    "roots with kinks": "+".join(f"sqrt((r-{k / 7.1:.3f})**2)" for k in range(45)),
+    "steps": "+".join(f"1+tanh(1e6*(r-{k}.1))" for k in range(40)),
+    "poles": "+".join(f"1/(r-{k}.1)**2" for k in range(60)),
+    "fast oscillations": "+".join(f"1+sin({k}*r)" for k in range(900, 968)),
+    "digits": "0." + "3" * 990 + "*r",
+}
+"""The slowest formulas of the permitted length that we found, of each kind; before work was bounded, up to 20 min."""
+
+
+@pytest.mark.parametrize("label", SLOW)
+def test_no_formula_computes_for_long(label: str) -> None:
+    assert len(SLOW[label]) <= 1000
+    start = time.process_time()
+    with contextlib.suppress(DensityError):
+        from_formula(parse_formula(SLOW[label]), 10.0)
+    assert time.process_time() - start < 25.0  # 5 s on a machine that has nothing else to do
+
+
+def test_a_formula_that_takes_too_long_says_so() -> None:
+    advice = "; shorten it, or give the density as a table"
+    assert refused(SLOW["long sum"]) == f"has 999 operations, too many to integrate{advice}"
+    assert refused(SLOW["roots with kinks"]) == (
+        f"takes too long to integrate: 314 operations at too many values of r{advice}"
+    )
+
+
+@pytest.mark.parametrize("n", [16, 4096])
+def test_the_most_that_fits_into_a_formula_is_taken(n: int) -> None:
+    """A sum of 29 bell curves, each of which the integral is known."""
+    curves = [(i, i / 3.1, 0.3) for i in range(1, 30)]
+    text = "+".join(f"{a}*exp(-((r-{b:.4f})/{c})**2)" for a, b, c in curves)
+    start = time.process_time()
+    plays = from_formula(parse_formula(text), 10.0).discretise(1.0, n)
+    assert time.process_time() - start < 25.0
+    total = sum(
+        a * c * math.sqrt(math.pi) / 2 * (math.erf((10.0 - round(b, 4)) / c) + math.erf(round(b, 4) / c))
+        for a, b, c in curves
+    )
+    assert math.fsum(plays.weights[1:]) == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("base", "exponent"),
+    [
+        ("(1-1e-30)", "1e32"), ("(1+1e-30)", "-1e32"), ("0.99999", "1000000"), ("1.00001", "65537"),
+        ("(-1)", "1e300"), ("1", "1e300"), ("(-0.9999)", "1e5"), ("0.9999", "100000.5"), ("2", "-4000"), ("2", "999"),
+    ],
+)  # fmt: skip
+def test_large_powers_are_those_of_another_precision(base: str, exponent: str) -> None:
+    with mpmath.workdps(120):
+        names = {"__builtins__": {}}
+        number = re.compile(r"[0-9.]+(?:e-?[0-9]+)?")
+        a, b = (
+            eval(number.sub(lambda m: f"mpf('{m[0]}')", text), {**names, "mpf": mpmath.mpf})
+            for text in (base, exponent)
+        )
+        expected = mpmath.power(a, b)
+        found = parse_formula(f"{base}**({exponent})")(1.0)
+        # 40 digits of the base make a relative error of the exponent times that
+        allowed = (abs(b) * mpmath.mpf(10) ** -39 + mpmath.mpf(10) ** -36) * abs(expected)
+        assert abs(mpmath.mpf(found) - expected) <= allowed
+
+
+@pytest.mark.parametrize("text", ["0.5**1e300", "2**-1e300", "(-0.5)**1e300", "0.999**1e9", "1e-300**1e300"])
+def test_powers_that_vanish_are_0(text: str) -> None:
+    assert parse_formula(text)(1.0) == 0
+
+
+@pytest.mark.parametrize("text", ["2**1e300", "0.5**-1e300", "(-2)**1e300", "1.001**1e9", "(1+1e-30)**1e40"])
+def test_powers_beyond_every_number_are_refused(text: str) -> None:
+    with pytest.raises(DensityError, match="is not finite at r = 1; correct the formula or r_max"):
+        parse_formula(text)(1.0)
+
+
+def test_any_tolerance_takes_seconds() -> None:
+    density = from_formula(parse_formula("sqrt((r-3.333)**2)"), 10.0)
+    finest = density.discretise(0.7, 4096).error
+    start = time.process_time()
+    for share in (1.0, 1.02, 1.5, 1e9):
+        assert density.discretise_to(0.7, share * finest).error <= share * finest
+    for tolerance in (1e-300, 0.5 * finest):
+        with pytest.raises(DensityError, match="is not reached with 4096 thresholds; ask for"):
+            density.discretise_to(0.7, tolerance)
+    assert time.process_time() - start < 60.0
 
 
 def test_speed() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 import json
 import os
 import re
@@ -120,8 +121,8 @@ class TestBlindPlants:
         data = sorted(case.glob("r*.csv"))[:2]
         code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
         assert (code, out) == (2, "")
-        said = {"file/out": f"Not a directory: '{tmp_path / 'file'}'",
-                "taken": f"Is a directory: '{tmp_path / 'taken' / 'report.html'}'"}  # fmt: skip
+        said = {"file/out": f"{tmp_path / 'file'}: Not a directory",
+                "taken": f"{tmp_path / 'taken' / 'report.html'}: Is a directory"}  # fmt: skip
         assert said[place] in err
 
     def test_the_command(self, tmp_path: Path, run: Call) -> None:
@@ -145,6 +146,14 @@ class TestBlindPlants:
         assert shown.count("<img src=\"data:image/svg+xml;base64,") == 6
         assert "http" not in re.sub(r"base64,[^\"]*", "", shown)
         assert all(name in shown for name in names)
+        # What the report promises of C is what emit does
+        emitted = run("emit", tmp_path / "out" / "params.yaml", "-o", tmp_path / "fw", "--list-outputs")
+        refused = "is not supported yet" in emitted[2]
+        assert emitted[0] == int(refused)
+        page = html.unescape(re.sub(r"\s+", " ", shown))
+        assert (f"C of a model with effects ({', '.join(dict.fromkeys(e.name for e in again.effects))}) is not" in page
+                ) == refused  # fmt: skip
+        assert ("C of a model with effects" in err) == refused
         first = [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())]
         assert run(*words)[0] == 0
         assert [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())] == first

@@ -20,6 +20,7 @@ from hystgen.diagnosis.drives import one_loop, one_speed
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
+from hystgen.identification import stretches
 from hystgen.identification.fronts import Kept
 from hystgen.records import Record
 
@@ -90,7 +91,7 @@ class TestSilence:
         same, told = bad_samples.without_faults(items, [])
         assert told == []
         assert same == items
-        assert [bad_samples.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
+        assert [stretches.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
         assert periodic.lines(items, errors(items))[0] == []
         assert stick_slip.stick_slip(items, errors(items), NOISE) == []
 
@@ -156,7 +157,7 @@ class TestWrongSamples:
 
     def test_a_converter_at_its_end(self) -> None:
         items = [changed(item, np.minimum(item.y, 9.0)) for item in session()]
-        found = [bad_samples.rails(item.y, item.run.v) for item in items]
+        found = [stretches.rails(item.y, item.run.v) for item in items]
         assert found[0] == [("largest", 9.0)]
         repaired = [{"kind": "saturated", "record": "r0.csv", "end": "largest", "level": 9.0, "count": 1}]
         assert bad_samples.not_at_the_end(repaired, items) == repaired

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import time
 from fractions import Fraction
 from pathlib import Path
 
@@ -355,3 +356,38 @@ def test_no_entry_of_a_curve_passes_its_type() -> None:
     numbers, _ = built(Cascade(pi, (TanhEnvelope(up, down),), -68125.91212, (-3000.0, 3000.0)), "q31")
     assert len(numbers.coefficient) > 100
     assert np.abs(numbers.coefficient).max() <= 2**31 - 1
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_an_output_that_stays_0_is_refused(arithmetic: str) -> None:
+    still = Cascade(PI([0.0, 3.0], [0.0, 1.0]), (), 0.0, (-1.0, 1.0))
+    with pytest.raises(FormatError, match="no play moves over this range of the drive, and the output stays 0; widen"):
+        built(still, arithmetic)
+
+
+def straight(breaks: int, stages: int) -> Cascade:
+    """Dead-zone sums with many breaks, which bend the curve by little each."""
+    half = breaks // 2
+    thresholds = [k / breaks for k in range(-half, half + 1)]
+    weights = [1.0 if r == 0.0 else math.copysign(0.1, r) / breaks for r in thresholds]
+    return Cascade(PI([0.0, 0.5], [1.0, 1.0]), (DeadZone(thresholds, weights),) * stages, 0.0, (0.0, 1.0))
+
+
+def test_thousands_of_breaks_take_seconds() -> None:
+    """Work in proportion to the breaks: before, 64 in each of two stages took 15 s, and thousands took hours."""
+    start = time.process_time()
+    for arithmetic in ("q31", "q15"):
+        fixed_tables.build(straight(400, 2), arithmetic, "loop", None, None)
+    assert time.process_time() - start < 30.0
+
+
+def test_more_breaks_than_fixed_point_takes_are_refused_at_once() -> None:
+    start = time.process_time()
+    with pytest.raises(FormatError) as caught:
+        fixed_tables.build(straight(4094, 2), "q31", "loop", None, None)
+    assert time.process_time() - start < 15.0
+    ((path, message),) = caught.value.problems
+    assert path == ("model", "memoryless")
+    assert message == (
+        "bends at 4094 places inside input_range, and fixed point takes 2000; thin out the thresholds or use float32"
+    )

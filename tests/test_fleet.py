@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import json
 import os
 import shutil
 import signal
@@ -21,8 +22,9 @@ import pytest
 from recordings import brute_output, noisy, wander, write_csv
 
 import hystgen
-from hystgen import identification
+from hystgen import extras, identification
 from hystgen.identification import outliers, workers
+from hystgen.identification.fleet import FIGURES, KEPT_IN
 from hystgen.identification.workers import Result, Task
 
 Run = Callable[..., tuple[int, str, str]]
@@ -277,6 +279,46 @@ def test_only_what_changed_is_done_again(few: Path, tmp_path: Path) -> None:
     assert tree(folder) == first
 
 
+UNREADABLE: dict[str, Callable[[Path], object]] = {
+    "empty": lambda note: note.write_bytes(b""),
+    "cut off": lambda note: os.truncate(note, note.stat().st_size // 2),
+    "binary": lambda note: note.write_bytes(bytes(range(256))),
+    "nested": lambda note: note.write_text("[" * 100_000),
+    "a list": lambda note: note.write_text("[1, 2]"),
+    "no figures": lambda note: spoil(note, figures=None),
+    "figures of another kind": lambda note: spoil(note, figures=[1, 2]),
+    "few figures": lambda note: spoil(note, figures={"gain": 1.0}),
+    "figures that are text": lambda note: spoil(note, figures=dict.fromkeys(FIGURES, "1.0")),
+    "outputs of another kind": lambda note: spoil(note, outputs=["a"]),
+    "no key": lambda note: spoil(note, sha256=7),
+    "a folder": lambda note: (note.unlink(), note.mkdir(), (note / "x").mkdir()),
+}
+
+
+def spoil(note: Path, **changed: Any) -> None:
+    note.write_text(json.dumps({**json.loads(note.read_text()), **changed}))
+
+
+@pytest.mark.parametrize("kind", UNREADABLE)
+def test_notes_that_cannot_be_read_are_one_warning(kind: str, few: Path, tmp_path: Path, run: Run) -> None:
+    output = tmp_path / "params"
+    words = ("identify", "--batch", few, "-o", output, "--jobs", "1")
+    assert run(*words)[0] == 0
+    whole = tree(output)
+    notes = sorted((output / KEPT_IN).iterdir())
+    for note in notes[:2]:
+        UNREADABLE[kind](note)
+    code, _, err = run(*words)
+    if kind == "a folder":  # which no file can take the place of
+        assert (code, err.count(" cannot be written: ")) == (1, 2)
+        return
+    assert code == 0
+    assert err.count("warning") == 1
+    assert f"warning: {notes[0]} cannot be read, and 1 more; the fit of these units is done again" in err
+    assert "(1 by an earlier call)" in err
+    assert tree(output) == whole
+
+
 def test_another_version_of_the_tool_does_all_again(few: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hystgen.identify_batch(few, tmp_path / "params", jobs=1)
     monkeypatch.setattr(hystgen, "__version__", "9")
@@ -320,9 +362,6 @@ def test_interrupted(sent: signal.Signals, jobs: int, units: Path, fleet: Path, 
     kept = len(list(output.glob(".hystgen/*.json")))
     done = hystgen.identify_batch(units, output, jobs=1)
     assert sum(unit.kept for unit in done.units) == kept
-    for litter in output.rglob(".hystgen-*"):  # what a kill in the middle of a write leaves, under another name
-        assert sent == signal.SIGKILL
-        shutil.rmtree(litter) if litter.is_dir() else litter.unlink()
     assert tree(output) == whole
 
 
@@ -410,12 +449,43 @@ def test_a_scheduler_that_is_not_there(
     assert not (tmp_path / "params").exists()
 
 
+def test_a_scheduler_that_dies_is_one_message(units: Path, tmp_path: Path) -> None:
+    """Without the tracebacks that Dask logs."""
+    output = tmp_path / "params"
+    code = (
+        "import os, sys\n"
+        "from distributed import LocalCluster\n"
+        "if __name__ == '__main__':\n"
+        "    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:\n"
+        "        print(cluster.scheduler_address, flush=True)\n"
+        "        sys.stdin.read()\n"
+    )
+    (tmp_path / "cluster.py").write_text(code)
+    cluster = subprocess.Popen(
+        [sys.executable, str(tmp_path / "cluster.py")], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True, start_new_session=True,
+    )  # fmt: skip
+    assert cluster.stdout is not None
+    address = cluster.stdout.readline().strip()
+    words = ["identify", "--batch", str(units), "-o", str(output), "--scheduler", address]
+    started = subprocess.Popen(
+        [sys.executable, "-m", "hystgen", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    while started.poll() is None and len(list(output.glob(".hystgen/*.json"))) < 2:
+        time.sleep(0.01)
+    os.killpg(cluster.pid, signal.SIGKILL)
+    cluster.communicate()
+    out, err = started.communicate(timeout=120)
+    assert (started.returncode, out) == (2, "")
+    assert err == "error: the Dask scheduler was lost; the same command goes on from here\n"
+
+
 def test_without_dask_one_line_says_what_to_install(
     few: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     code, _, err = run("identify", "--batch", few, "-o", tmp_path / "params", "--scheduler", "tcp://127.0.0.1:1")
-    assert (code, err) == (2, "error: a scheduler needs Dask; install it with: pip install 'hystgen[fleet]'")
+    assert (code, err) == (2, f"error: a scheduler needs Dask; install it with: {extras.install('fleet')}")
 
 
 # -- usage -------------------------------------------------------------------------------------------------------------
@@ -429,7 +499,7 @@ def test_without_dask_one_line_says_what_to_install(
         (["--batch", "clash", "-o", "new"], "clash/a-1.csv and clash/a_1.csv would both be unit a_1; rename one"),
         (["--batch", "few", "-o", "new", "--holdout", "few/SN-100.csv"], "write {unit} for the unit's name"),
         (["--batch", "few", "-o", "few"], "few has records in it"),
-        (["--batch", "few", "-o", "few/SN-100.csv"], "File exists: 'few/SN-100.csv'"),
+        (["--batch", "few", "-o", "few/SN-100.csv"], "few/SN-100.csv: File exists"),
         (["--batch", "few", "-o", "new", "--thresholds", "-1"], "thresholds is a number of plays"),
         (["--batch", "few", "-o", "new", "--name", "stage"], "--name is for one model"),
         (["--batch", "few", "-o", "new", "--plot", "a.svg"], "--plot is for one model"),

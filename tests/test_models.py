@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise, permutations
 
 import numpy as np
@@ -537,3 +538,41 @@ def test_a_start_beyond_the_range_takes_the_branch_of_the_limited_drive() -> Non
 def test_decimal_states_of_a_history_are_no_projection() -> None:
     assert not PI([0, 0.45, 0.9], [1, 1, 1], [1, 0.55, 0.1]).projected
     assert PI([0, 0.45, 0.9], [1, 1, 1], [1, 0.55, 0.0999]).projected
+
+
+def _sum_of_terms(stage: DeadZone, x: float) -> float:
+    """(41), term by term, rounded once."""
+    terms = []
+    for rho, eta in zip(stage.thresholds, stage.weights, strict=True):
+        terms.append(eta * (max(x - rho, 0.0) if rho > 0 else min(x - rho, 0.0) if rho < 0 else x))
+    return math.fsum(terms)
+
+
+@settings(max_examples=200)
+@given(
+    st.lists(st.floats(-1e3, 1e3), max_size=12), st.lists(st.floats(-10.0, 10.0), min_size=13, max_size=13),
+    st.floats(-1e4, 1e4), st.floats(0.0, 1e4),
+)  # fmt: skip
+def test_dead_zone_sums_are_those_of_their_terms(
+    places: list[float], weights: list[float], low: float, width: float
+) -> None:
+    """To the last bit, also at the breaks, and what is kept from one call to the next is of the same range."""
+    thresholds = sorted({0.0, *places})
+    stage = DeadZone(thresholds, weights[: len(thresholds)])
+    high = low + width
+    inside = [b for b in stage.breaks if low < b < high]
+    expected = [_sum_of_terms(stage, x) for x in (low, high, *inside)]
+    assert stage.image(low, high) == (min(expected), max(expected))
+    assert stage.over(low, high).values == tuple(_sum_of_terms(stage, b) for b in stage.over(low, high).breaks)
+    for x, value in stage.anchors:
+        assert value == _sum_of_terms(stage, x)
+
+
+def test_a_stage_that_two_models_share_keeps_their_ranges_apart() -> None:
+    stage = DeadZone([-1.0, 0.0, 1.0], [1.0, 1.0, 2.0])
+    narrow, wide = (Cascade(PI([0], [1]), (stage,), 0.0, (-end, end)) for end in (0.5, 5.0))
+    for model in (narrow, wide, narrow):
+        v = np.linspace(*model.input_range, 7)
+        assert model.front_inverse(model.front(v)) == pytest.approx(v)
+    assert narrow.stage_ranges(True) == ((-0.5, 0.5),)
+    assert wide.stage_ranges(False) == ((-5.0, 5.0),)

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from modelfiles import FILES
 
+import hystgen
+from hystgen.api import Model
+from hystgen.params import parse_parameters
 from tests.oracle import check, models
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*initial_state cannot have come:UserWarning")
@@ -87,6 +90,90 @@ def test_a_limit_that_is_a_code_off_is_noticed(limit: str, by: int, tmp_path: Pa
     assert all(limit in finding.result.message.decode() for finding in check.follow([case], tmp_path))
 
 
+# Models at which stated bounds or status bits were once wrong
+ONCE_WRONG = {
+    # rounding at the kink of a flat piece ran on along the steep one behind it
+    "flat_first": """
+hystgen: 1
+name: flat_first
+input_range: [-1, 6]
+model:
+  pi: {thresholds: [0, 0.4, 1.2, 2.5], weights: [0.0002, 2, 0.7, 30]}
+""",
+    # behind a reset plays are at 0, outside the hull of range and start memory; outputs exceed every code
+    "reset_afar": """
+hystgen: 1
+name: reset_afar
+input_range: [20, 22]
+model:
+  pi: {thresholds: [0, 12, 300], weights: [0.5, 1, 2], initial_state: 60}
+  output_offset: -210
+""",
+    # the start memory stands for a drive above, below and between codes: the first move takes that branch
+    "above_the_range": """
+hystgen: 1
+name: above_the_range
+input_range: [-1.2, 1.2]
+model:
+  pi: {thresholds: [0, 0.2, 0.5], weights: [1, 0.8, 0.4], initial_state: 0.9}
+  memoryless:
+    kind: tanh
+    ascending: {a0: 4, a1: 0.1, a2: -0.05, a3: 0}
+    descending: {a0: 4, a1: 0.1, a2: 0, a3: 0.1}
+""",
+    "below_the_range": """
+hystgen: 1
+name: below_the_range
+input_range: [-1.2, 1.2]
+model:
+  pi: {thresholds: [0, 0.2, 0.5], weights: [1, 0.8, 0.4], initial_state: -0.95}
+  memoryless:
+    kind: tanh
+    ascending: {a0: 4, a1: 0.1, a2: -0.05, a3: 0}
+    descending: {a0: 4, a1: 0.1, a2: 0, a3: 0.1}
+""",
+    "between_codes": """
+hystgen: 1
+name: between_codes
+input_range: [-1.2, 1.2]
+model:
+  pi: {thresholds: [0, 0.2, 0.5], weights: [1, 0.8, 0.4], initial_state: 0.0125}
+  memoryless:
+    kind: tanh
+    ascending: {a0: 4, a1: 0.1, a2: -0.05, a3: 0}
+    descending: {a0: 4, a1: 0.1, a2: 0, a3: 0.1}
+""",
+    # plays lie far from a range that is narrow beside their thresholds, so that rounded weights count for more
+    "narrow_range": """
+hystgen: 1
+name: narrow_range
+input_range: [0, 0.0003]
+model:
+  pi: {thresholds: [0, 0.15], weights: [1, 4.0e-5], initial_state: [0, -0.1499]}
+""",
+}
+
+
+@EACH
+@pytest.mark.parametrize("name", ONCE_WRONG)
+def test_models_that_were_once_wrong(name: str, arithmetic: str, engine: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(ONCE_WRONG[name])
+    found, refused = check.follow_file(path, arithmetic, engine, tmp_path, seeds=4, calls=check.CALLS)
+    assert refused == ((name, arithmetic) in {("reset_afar", "q31"), ("flat_first", "q15"), ("narrow_range", "q31")})
+    assert not [finding.result.message.decode() for finding in found if finding.result.faults]
+
+
+@pytest.mark.parametrize(
+    ("name", "arithmetic"), [("flat_first", "float32"), ("reset_afar", "q15"), ("above_the_range", "q15")]
+)
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+def test_bits_of_models_that_were_once_wrong(name: str, arithmetic: str, engine: str) -> None:
+    model = Model(parse_parameters(ONCE_WRONG[name], f"{name}.yaml"))
+    report = hystgen.verify(model, arithmetic=arithmetic, operator="both", engine=engine, length=20_000)
+    assert report.ok, report.table()
+
+
 def test_models_are_of_every_kind() -> None:
     kinds: Counter[str] = Counter()
     for seed in range(400):
@@ -113,6 +200,7 @@ def test_models_are_of_every_kind() -> None:
         kinds["two branches"] += any("descending" in stage for stage in stages)
         kinds["two stages"] += len(stages) > 1
         kinds["offset"] += "output_offset" in data["model"]
+        kinds["a given LSB"] += "emit" in data
         kinds["small unit"] += high - low < 1e-6
         kinds["large unit"] += high - low > 1e6
     assert min(kinds.values()) >= 4, kinds

@@ -25,6 +25,7 @@ from recordings import brute_output, brute_plays, noisy, wander, write_csv
 from scipy.stats import binned_statistic
 
 import hystgen
+from hystgen import extras
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import drawing, fit_figures
@@ -406,7 +407,7 @@ class TestCommand:
         monkeypatch.setitem(sys.modules, "matplotlib", None)
         code, said, told = run("identify", a, "-o", tmp_path / "a.yaml", "--report", tmp_path / "out")
         assert (code, said) == (2, "")
-        assert "pip install 'hystgen[plot]'" in told
+        assert extras.install("plot") in told
         assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "b.csv"}
 
     def test_a_file_in_the_way_and_an_input_in_the_folder(self, run: Run, tmp_path: Path) -> None:
@@ -462,7 +463,7 @@ class TestDrawing:
     def shown(self, residual: Array, v: Array) -> Shown:
         n, none = len(residual), np.empty(0, dtype=np.intp)
         record = Record("made", np.arange(n) * 0.01, v, residual, sample_time=0.01)
-        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none), np.zeros(n))
+        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none, none), np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
     def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:

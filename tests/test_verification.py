@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -13,12 +14,12 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen import fixed, reference, tables
+from hystgen import extras, fixed, reference, tables
 from hystgen.api import Model
 from hystgen.emission import module
 from hystgen.fixed import FixedTables
 from hystgen.params import parse_parameters
-from hystgen.verification import compilers, signals
+from hystgen.verification import compilers, host, loading, signals
 
 
 def model(name: str) -> Model:
@@ -122,11 +123,96 @@ def test_a_compiler_that_is_asked_for_and_missing_is_a_failure(monkeypatch: pyte
     assert "gcc is not installed" in report.table()
 
 
+def test_a_compiler_may_be_a_command_of_several_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Distributors set CC='ccache gcc'; the first word is what has to be there."""
+    launcher = tmp_path / "ccache"
+    launcher.write_text(f'#!/bin/sh\necho "$@" >> "{tmp_path}/calls"\nexec "$@"\n')
+    launcher.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    commands = ["ccache gcc", "gcc '-DNAME=a b'"]
+    report = hystgen.verify(model("plain"), compiler=commands, length=1000)
+    assert report.ok, report.table()
+    assert [row.compiler for row in report.rows] == [commands[0], commands[0], commands[1], commands[1]]
+    calls = (tmp_path / "calls").read_text().splitlines()
+    assert len(calls) == 2
+    assert all(call.startswith("gcc -shared ") for call in calls)
+    report = hystgen.verify(model("plain"), compiler=["no-ccache gcc"], length=1000)
+    assert "no-ccache is not installed" in report.table()
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ("gcc 'a", "the compiler \"gcc 'a\" is no command: No closing quotation; correct it"),
+        (" ", "a compiler is named by a command; write gcc, clang, zig or another"),
+    ],
+)
+def test_what_is_no_command_is_refused(command: str, message: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
+        hystgen.verify(model("plain"), compiler=[command], length=1000)
+
+
+def test_a_compiler_that_cannot_be_started_is_a_failure(tmp_path: Path) -> None:
+    broken = tmp_path / "cc"
+    broken.write_text("#!/nowhere/sh\n")
+    broken.chmod(0o755)
+    report = hystgen.verify(model("plain"), compiler=[str(broken)], length=1000)
+    assert not report.ok
+    assert "cannot be started: No such file or directory" in report.table()
+
+
+def test_compilers_keep_their_temporary_files_where_the_output_goes(tmp_path: Path) -> None:
+    script = tmp_path / "cc"
+    script.write_text('#!/bin/sh\necho "$TMPDIR" >&2\nexit 1\n')
+    script.chmod(0o755)
+    with pytest.raises(compilers.CompileError, match=f"failed:\n{tmp_path}/build$"):
+        compilers.Compiler("cc", (str(script),)).run(["-o", tmp_path / "build" / "a.o"])
+
+
+def test_where_temporary_files_may_not_be_executed_a_library_is_loaded_from_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As with a TMPDIR that is mounted noexec: there the loader fails with these words."""
+    blocked, free = tmp_path / "tmp", tmp_path / "run"
+    blocked.mkdir()
+    free.mkdir()
+    asked: list[str] = []
+
+    def loader(path: str) -> str:
+        asked.append(path)
+        if path.startswith(str(blocked)):
+            raise OSError(f"cannot load library '{path}': failed to map segment from shared object.  Additionally, ..")
+        return Path(path).read_text()
+
+    library = blocked / "a.so"
+    library.write_text("code")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(free))
+    assert loading.load(library, loader) == "code"
+    assert all(Path(path).is_relative_to(place) for path, place in zip(asked, (blocked, free), strict=True))
+    assert list(free.iterdir()) == []
+    monkeypatch.setattr(loading, "_elsewhere", lambda: iter([blocked]))
+    with pytest.raises(loading.LoadError) as caught:
+        loading.load(library, loader)
+    assert str(caught.value) == (
+        f"the compiled library cannot be loaded: cannot load library '{library}': failed to map segment from shared "
+        f"object; if {blocked} is on a file system mounted noexec, set TMPDIR to a folder where programs may run"
+    )
+
+
+def test_a_library_that_loads_nowhere_is_a_failed_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise loading.LoadError("the compiled library cannot be loaded")
+
+    monkeypatch.setattr(host, "load", refused)
+    report = hystgen.verify(model("plain"), compiler=["gcc"], length=1000)
+    assert [row.error for row in report.rows] == ["the compiled library cannot be loaded"] * 2
+
+
 def test_no_compiler_at_all_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compilers, "available", list)
     report = hystgen.verify(model("plain"), length=1000)
     assert not report.ok
-    assert "hystgen[zig]" in report.table()
+    assert extras.install("zig") in report.table()
 
 
 @pytest.mark.parametrize("inverse", [False, True])

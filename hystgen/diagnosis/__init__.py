@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import arguments
 from hystgen.diagnosis import believed, channels, disturbances, floor, intervals, selection, starts, structure, told
 from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.disturbances import Cleaned
@@ -27,11 +28,12 @@ from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
 from hystgen.effects.base import Place
-from hystgen.identification import remarks, stage_content, threads
-from hystgen.identification.fit import Source, visited
-from hystgen.identification.pi import DIGITS, DUST, IdentificationError
+from hystgen.identification import P0_FLOOR, remarks, stage_content, threads
+from hystgen.identification.fit import visited
+from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError
 from hystgen.identification.thresholds import rounded
-from hystgen.records import Record, read_records
+from hystgen.identification.weights import Weights
+from hystgen.records import Source, read_records, several
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -72,6 +74,11 @@ class Diagnosis:
     FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about the inverse of the model that is written, one or two sentences each."""
+        return tuple(self.content.get("inverse", {}).get("warnings", ()))
+
+    @property
     def verdict(self) -> str:
         """`nothing_missing`, `effects_found` or `unexplained`."""
         return str(self.content["verdict"])
@@ -105,6 +112,17 @@ class Diagnosis:
             return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
         return f"{missing}. The records are disturbed too: {first}{more}.{but}"
 
+    def not_emitted(self) -> str:
+        """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
+        from hystgen.api import Model, emit_options
+        from hystgen.problems import UnsupportedEffectsError
+
+        try:
+            emit_options(Model(self.parameters))
+        except UnsupportedEffectsError as error:
+            return str(error)
+        return ""
+
     def _name(self, name: str) -> str:
         """An effect with those that it cannot be told from."""
         others = [other for one, other in self.content["not_separable"] if one == name]
@@ -123,7 +141,8 @@ class Diagnosis:
         from hystgen.params import dump_parameters
         from hystgen.report import diagnosis as report
 
-        text = dump_parameters(self.parameters, header=f"Diagnosed by hystgen. {self.sentence()}")
+        said = [f"Diagnosed by hystgen. {self.sentence()}", *(f"Warning: {text}" for text in self.warnings)]
+        text = dump_parameters(self.parameters, header="\n".join(said))
         made = zip(self.FILES, (self.to_json(), report.html(self, text), text), strict=True)
         return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
 
@@ -152,32 +171,47 @@ def diagnose(
     weights on the free-run error, and accepted when it removes a worthwhile part of the held-out error that chance does
     not explain. Raises RecordError, IdentificationError, ValueError.
     """
-    from hystgen.api import Model, load
+    from hystgen.api import as_model
+    from hystgen.effects import Effect
     from hystgen.progress import Progress
 
-    model = parameters if isinstance(parameters, Model) else load(parameters)
+    model = as_model(parameters)
     given = model.parameters.model.effects
-    several = [records] if isinstance(records, Record | str | os.PathLike) else list(records)
-    others = [holdout] if isinstance(holdout, Record | str | os.PathLike) else list(holdout)
-    if not several:
+    fitted, others = several(records), several(holdout)
+    if not fitted:
         raise ValueError("there is no record to fit")
-    read = read_records([*several, *others], columns, sample_time, delimiter, progress=progress)
+    arguments.number("rest", rest, "seconds", 0.0)
+    if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
+        raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
+    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
     with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
         first = believed.as_given(model.cascade, given)
         usable, odd = channels.checked(read, *first, before)
         to_fit, to_hold = (
             [record for record in group if record is not None]
-            for group in (usable[: len(several)], usable[len(several) :])
+            for group in (usable[: len(fitted)], usable[len(fitted) :])
         )
 
-        def searched(history: tuple[float, ...] | None) -> tuple[Cleaned, Floor, Records, Outcome]:
-            ready = believed.prepare(to_fit or read[: len(several)], to_hold, history, rest)
+        def begun(history: tuple[float, ...] | None) -> tuple[believed.Prepared, Callable[[believed.Prepared], Fitted]]:
+            ready = believed.prepare(to_fit or read[: len(fitted)], to_hold, history, rest)
             base, start = believed.structure_of(model.cascade, given, ready)
             weights = believed.believed_weights(model.cascade, base)
+            return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
 
-            def refit(ready: believed.Prepared) -> Fitted:
-                return selection.refit(base, ready.to_fit, start, weights)
+        def foreign(history: tuple[float, ...] | None) -> dict[str, Any] | None:
+            """What is said of a history to which the model can be bent, and should not."""
+            if history is None:
+                return None
+            ready, refit = begun(history)
+            try:
+                others, refit_others = begun(None)
+            except IdentificationError:  # nothing is left that does not depend on it
+                return None
+            return starts.bends(ready.to_fit, refit(ready), refit_others(others))
+
+        def searched(history: tuple[float, ...] | None) -> tuple[Cleaned, Floor, Records, Outcome]:
+            ready, refit = begun(history)
 
             def prepared(clean: believed.Prepared, refitted: Fitted) -> tuple[Floor, Records]:
                 noise = floor.noise_floor([*clean.to_fit, *clean.held])
@@ -196,8 +230,10 @@ def diagnose(
                 found = selection.select(records, refitted)
             return cleaned, noise, records, found
 
-        cleaned, noise, compared, found = searched(before)
-        wrong = starts.contradicted(cleaned.clean.to_fit, found.fitted)
+        wrong = foreign(before)
+        if wrong is None:
+            cleaned, noise, compared, found = searched(before)
+            wrong = starts.contradicted(cleaned.clean.to_fit, found.fitted)
         if wrong is not None:
             odd.append(wrong)
             try:
@@ -205,16 +241,29 @@ def diagnose(
             except IdentificationError as error:
                 said = told.sentence(wrong, model.parameters.units.output)
                 raise IdentificationError(f"{said}, and without it {error}") from None
+        found, made = selection.invertible(found, compared, P0_FLOOR)
         ready, odd = cleaned.clean, [*odd, *cleaned.told]
         as_given = [
             structure.rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held)
         ]
         content = content_of(model.parameters, ready, noise, found, as_given, odd, compared.one_loop)
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
-    notes += [*remarks.repeated(read[: len(several)], read[len(several) :]), *ready.notes]
+    notes += [*remarks.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += cleaned.notes(model.parameters.units.output)
     extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
+    content["inverse"] = _about_inverse(extended, made)
     return Diagnosis(content, extended, tuple(notes), _signals(ready, found))
+
+
+def _about_inverse(extended: Parameters, made: Weights) -> dict[str, Any]:
+    """Whether the static part of the model that is written has an inverse, and what the user should know about it."""
+    from hystgen.api import cascade_of
+
+    problems = cascade_of(extended).inverse_problems()
+    said = remarks.about_inverse(np.array(extended.model.pi.weights), made)
+    if problems and extended.model.pi.weights[0] > 0.0:
+        said = [*said, f"the model has no inverse: {'; '.join(problems)}"]
+    return {"exists": not problems, "warnings": said}
 
 
 def _signals(ready: believed.Prepared, found: Outcome) -> tuple[Signals, ...]:
@@ -236,11 +285,16 @@ def _extended(
     ready: believed.Prepared,
     user: Sequence[type[Effect]],
 ) -> Parameters:
-    """The parameter file with the model refitted and the effects added; `cascade`: the believed model."""
+    """The parameter file with the model refitted and the effects added; `cascade`: the believed model.
+
+    Raises IdentificationError where nothing is left of it.
+    """
     from hystgen.params import make_parameters
 
     p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
     p[p < DUST * float(np.sum(p))] = 0.0
+    if not np.any(p > 0.0):
+        raise IdentificationError(FALLS)
     r = fitted.structure.thresholds
     kept = (p > 0.0) | (r == 0.0)
     actuator = fitted.actuator

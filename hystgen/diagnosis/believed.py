@@ -30,6 +30,9 @@ WIDE = float(np.log(3.0))
 SINGLY = 4
 """Numbers of a longer list change by a factor that they have in common."""
 
+TOUCHING = 1e-6
+"""By so much a front may fall short of what is asked of its shape: ten digits of a file are rounded."""
+
 PLAYS = 32
 """With half as many, what the steps between thresholds leave is up to 1.4 times the noise in effect-free records, and
 takes part in every comparison of effects; more leave no less."""
@@ -50,13 +53,25 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
         for up in (True, False) if stages[0].branches_differ else (True,):
             _, a1, a2, _ = stages[0].branch(up)
             shape += [abs(a1) * half, (-a2 / a1 - middle) / half]
-        if not stages[0].branches_differ:
-            return Tanh(drive), np.array(shape)
-        (low, high), (down_low, down_high) = (stages[0].image(*drive, up) for up in (True, False))
-        lift = float(stages[0].forward(middle, False) - stages[0].forward(middle, True))
-        scale = high - low
-        return Tanh(drive, 2), np.array([*shape, math.log((down_high - down_low) / scale), max(lift / scale, 0.0)])
+        tanh = Tanh(drive)
+        if stages[0].branches_differ:
+            (low, high), (down_low, down_high) = (stages[0].image(*drive, up) for up in (True, False))
+            lift = float(stages[0].forward(middle, False) - stages[0].forward(middle, True))
+            scale = high - low
+            if scale > 0.0 and down_high > down_low:
+                tanh = Tanh(drive, 2)
+                shape += [math.log((down_high - down_low) / scale), max(lift / scale, 0.0)]
+        found = np.array(shape)
+        if len(found) == len(tanh.straight) and _inside(tanh, found):
+            return tanh, found
     return Kept(tuple(stages)), np.empty(0)
+
+
+def _inside(front: Front, shape: Array) -> bool:
+    """Whether a search may begin at a shape: another one near it would not be the front that is believed."""
+    low, high = front.bounds
+    slack = front.slack(np.clip(shape, low, high))
+    return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -TOUCHING))
 
 
 @dataclass(frozen=True)
@@ -105,7 +120,7 @@ def prepare(
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
         for channel, wrong, what in (
             ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),
-            ("y", _outliers(course, record), faults.NOT_COMPARED),
+            ("y", _outliers(course), faults.NOT_COMPARED),
         ):
             if len(wrong):
                 notes.append(faults.told(course.name, wrong, what))
@@ -118,6 +133,9 @@ def prepare(
         to_fit, held = held_out.parted(to_fit)
         share = f"{100 * held_out.SET_ASIDE:g} %"
         notes.append(f"no record was given that can judge: the last {share} of each is set aside")
+    if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
+        names = ", ".join(item.name for item in to_fit)
+        raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
     reach = thresholds.largest(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
@@ -130,8 +148,13 @@ def _courses(
     records: Sequence[Record], history: tuple[float, ...] | None
 ) -> tuple[list[Course], list[dict[str, Any]]]:
     """The records as they take part, and what was left out at a converter's end."""
-    courses = [prepared.bridged(pi.course(record, history, 0)) for record in records]
-    return courses, _without_rails(courses)
+    courses, told = [], []
+    for record in records:
+        course, ends = prepared.without_rails(pi.course(record, history, 0))
+        courses.append(course)
+        for name, level, number in ends:
+            told.append({"kind": "saturated", "record": course.name, "end": name, "level": level, "count": number})
+    return courses, told
 
 
 def _without_faults(ready: Prepared) -> Prepared:
@@ -152,25 +175,11 @@ def _item(course: Course, record: Record, rest: float) -> Item:
     return Item(course.name, run, y, course.history, course.output_range)
 
 
-def _without_rails(courses: list[Course]) -> list[dict[str, Any]]:
-    """Leave out the samples at which the converter stood at its end; what was left out."""
-    told = []
-    for k, course in enumerate(courses):
-        for name, level in bad_samples.rails(course.y, course.v):
-            at = course.y == level
-            courses[k] = replace(courses[k], y=np.where(at, np.nan, courses[k].y))
-            what = {"kind": "saturated", "record": course.name, "end": name, "level": level}
-            told.append({**what, "count": int(np.count_nonzero(at))})
-    return told
-
-
-def _outliers(course: Course, record: Record) -> NDArray[np.intp]:
-    """Compared samples whose output was left out as isolated: in runs shorter than those at a rail."""
-    assert record.y is not None
+def _outliers(course: Course) -> NDArray[np.intp]:
+    """Samples whose output was left out as isolated, where it would be compared."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
-    levels = [level for _, level in bad_samples.rails(np.asarray(record.y), course.v)]
-    return np.flatnonzero(missing & ~np.isin(record.y, levels))
+    return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)
 
 
 def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[Item]]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis.structure import Actuator, Item
 from hystgen.effects.base import Run
-from hystgen.records import Record
+from hystgen.identification import faults
+from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]
 
@@ -63,20 +64,23 @@ def checked(
     """The records as they can be used, None for one that cannot, and what was found, one entry a record.
 
     Exchanged columns are put right; a record in other units than the others, or with another's output, is left out.
+    Wrong samples take no part in the judgement.
     """
-    turned: list[Record] = []
+    kept: list[Record | None] = []
+    seen: list[Record] = []
     told: list[dict[str, Any]] = []
     found: dict[int, Against] = {}
     predicted: dict[int, Array] = {}
     for k, record in enumerate(records):
-        right = record
-        if _tells(record):
-            right, predicted[k], found[k] = _right_way_round(record, actuator, weights, history)
-        if right is not record:
+        plain = right = faults.smooth(record) if _whole(record) else record
+        if _tells(plain):
+            right, predicted[k], found[k] = _right_way_round(plain, actuator, weights, history)
+        swapped = right is not plain
+        if swapped:
             told.append({"kind": "swapped_channels", "record": record.name, "repaired": True})
-        turned.append(right)
-    records, tells = turned, list(found)
-    kept: list[Record | None] = list(turned)
+        kept.append(replace(record, v=np.asarray(record.y), y=record.v) if swapped else record)
+        seen.append(right)
+    records, tells = seen, list(found)
     widths = np.array([float(np.ptp(record.v)) for record in records])
     moving = widths[widths > 0.0]
     widest = float(np.max(moving[moving <= OTHER_UNIT * np.median(moving)], initial=0.0))
@@ -108,12 +112,17 @@ def _spread(x: Any) -> float:
     return float(np.subtract(*np.quantile(x, (0.75, 0.25))))
 
 
-def _tells(record: Record) -> bool:
-    """Whether a record has an output that moves; what else is wrong with it is told later."""
-    y = record.y
-    if y is None or len(y) != len(record.v):
+def _whole(record: Record) -> bool:
+    """Whether a record has values of drive and output for nearly all samples; what is wrong otherwise is told later."""
+    v, y = record.v, record.y
+    if y is None or len(y) != len(v) or not (np.isfinite(y).all() and np.isfinite(v).all()):
         return False
-    return bool(np.isfinite(y).all() and np.isfinite(record.v).all() and np.ptp(y) > 0.0 and np.ptp(record.v) > 0.0)
+    return all(np.count_nonzero(no_value(x)) <= faults.most(len(x)) for x in (v, y))
+
+
+def _tells(record: Record) -> bool:
+    """Whether a record has an output that moves as well."""
+    return _whole(record) and bool(np.ptp(np.asarray(record.y)) > 0.0 and np.ptp(record.v) > 0.0)
 
 
 def _predicted(record: Record, actuator: Actuator, weights: Array, history: tuple[float, ...] | None) -> Array:

@@ -93,7 +93,7 @@ def content_of(
         "hystgen": 1,
         "verdict": verdict,
         "noise_floor": noise.rms,
-        "output_range": max(item.output_range for item in (*ready.to_fit, *ready.held)),
+        "output_range": max(float(np.ptp(item.y[item.known])) for item in everything if item.known.any()),
         "unit": units.output,
         "gap": {
             "as_given": {"fit": as_given[0], "holdout": as_given[1]},

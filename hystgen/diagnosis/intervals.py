@@ -23,6 +23,9 @@ TAILS = (0.025, 0.975)
 
 SEED = 1
 
+HALVINGS = 20
+"""Halvings of the way to a shape that cannot be, to where it can: a millionth of an interval's width."""
+
 WEAKEST = 1e-9
 """Directions whose singular value is below this share of the largest tell nothing of the numbers."""
 
@@ -77,7 +80,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     sigma = fitted.rms * float(np.sqrt(tau * samples / max(samples - len(active), 1)))
     drawn = np.random.default_rng(SEED).standard_normal((DRAWS, len(root))) @ root
     low, high = fitted.structure.bounds
-    shapes = np.clip(shape + sigma * drawn, low, high)
+    shapes = [_admissible(fitted, one) for one in np.clip(shape + sigma * drawn, low, high)]
     of_front: dict[str, Any] = {}
     if front:
         made = [stage(fitted, one) for one in shapes]
@@ -91,6 +94,22 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
         made = [entry(part.candidate.build(each)) for each in numbers]
         found.append(_spread(made, entry(part.candidate.build(fitted.structure.pieces(shape)[1][k]))))
     return Sure(of_front, tuple(found))
+
+
+def _admissible(fitted: Fitted, drawn: Array) -> Array:
+    """The shape nearest to a drawn one, on the way to it from the one found, that is as possible as that is."""
+    limits, found = fitted.structure, fitted.shape
+    least = np.minimum(limits.slack(found), 0.0)
+    if np.all(limits.slack(drawn) >= least):
+        return drawn
+    inside, outside = 0.0, 1.0
+    for _ in range(HALVINGS):
+        share = 0.5 * (inside + outside)
+        if np.all(limits.slack(found + share * (drawn - found)) >= least):
+            inside = share
+        else:
+            outside = share
+    return np.asarray(found + inside * (drawn - found))
 
 
 def stage(fitted: Fitted, shape: Array) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import arguments
 from hystgen.problems import PlanError
 
 if TYPE_CHECKING:
@@ -180,11 +181,15 @@ def plan(
     shortest time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range`
     and below `max_rate`. Raises ParameterError, PlanError with every problem.
     """
-    from hystgen.api import Model, load
+    from hystgen.api import Model, as_model, load
 
-    model = parameters if isinstance(parameters, Model) else load(parameters, effects)
+    model = load(parameters, effects) if isinstance(parameters, str | os.PathLike) else as_model(parameters)
     source = f"{model.name}.yaml" if isinstance(parameters, Model) else os.fspath(parameters)
     file = model.parameters
+    if max_rate is not None:
+        max_rate = arguments.real("max_rate", max_rate, "input units per second")
+    if sample_time is not None:
+        sample_time = arguments.real("sample_time", sample_time, "seconds")
     given = (("max rate", max_rate, "input units per second"), ("sample time", sample_time, "seconds"))
     problems = [
         f"the {name} {value!r} is no number above 0; give {unit}"

@@ -20,6 +20,7 @@ from hystgen.diagnosis.thinning import everything, thinned
 from hystgen.diagnosis.trials import Records, Tried, free_numbers
 from hystgen.identification import joint
 from hystgen.identification.fronts import Kept
+from hystgen.identification.weights import Weights
 
 Array = NDArray[np.float64]
 
@@ -72,6 +73,21 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, believed: Array
 def again(fitted: Fitted, ready: Prepared) -> Fitted:
     """A hypothesis fitted anew to other records."""
     return fits.fit(fitted.structure, _quick(ready.to_fit), fitted.shape, fitted.weights)
+
+
+def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
+    """What was found with p_0 of the model that is written raised to the floor of `identify`, and what was done.
+
+    The errors behind the last effect are those of this model; without an effect it is the refitted one.
+    """
+    fitted, made = fits.invertible(outcome.fitted, records.full, floor)
+    if fitted is outcome.fitted:
+        return outcome, made
+    found = outcome.found
+    if not found:
+        return replace(outcome, refitted=fitted, fitted=fitted), made
+    last = replace(found[-1], after=records.left(fitted))
+    return replace(outcome, fitted=fitted, found=(*found[:-1], last)), made
 
 
 def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:

@@ -349,7 +349,7 @@ class Actuator:
         a = item.run.v
         for effect in self.at(Place.DRIVE):
             a = effect.drive(a, item.run)
-        course = reduction.Course(item.name, a, a, item.history, 0, len(a), 0.0)
+        course = reduction.Course(item.name, a, a, item.history, 0, len(a))
         course = joint.through_front(course, self.stages)
         start = reduction.start_states(course.v, course.history, self.thresholds)
         return course.v, item.run, self.thresholds, start
@@ -644,6 +644,23 @@ def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -
 def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:
     """The end of a search from a start; `p`: weights near which to begin."""
     return begun(structure, items, start, p).further().found(p)
+
+
+def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, weights.Weights]:
+    """A hypothesis with p_0 raised to a share `floor` of the sum of weights where the records allow it, as `identify`
+    does it (`weights.fit`), and what was done; all other numbers are as they were."""
+    p, here = fitted.weights, fitted.actuator
+    kept = weights.Weights(p, fitted.rms)
+    if len(p) < 2 or p[0] >= floor * float(np.sum(p)):
+        return fitted, kept
+    blocks = [_Block(here, item, p) for item in items if item.known.any()]
+    whole = reduction.triangle(*(block.system() for block in blocks))
+    samples = sum(block.samples for block in blocks)
+    system = Reduced(fitted.structure.thresholds, whole, (), (samples,))
+    made = weights.fit(system, np.arange(len(p)), floor)
+    if made.free_p0 is None:
+        return fitted, kept
+    return replace(fitted, weights=made.p, rms=made.rms), replace(made, free_p0=float(p[0]))
 
 
 def rms(errors: Sequence[Array]) -> float:

@@ -16,110 +16,171 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Cost:
-    """Bytes on a 32-bit target, and worst-case operations of a step in words, for each operator."""
+class Layout:
+    """How a target lays out data: sizes of `int` and of pointers; packed where nothing is aligned."""
 
-    table_bytes: int
-    instance_bytes: list[tuple[str, int]]
+    integer: int
+    pointer: int
+    packed: bool
+
+    def struct(self, *fields: tuple[int, int]) -> tuple[int, int]:
+        """Size and alignment of a C struct of fields of these sizes and alignments."""
+        if self.packed:
+            return sum(size for size, _ in fields), 1
+        at, most = 0, 1
+        for size, alignment in fields:
+            at = -(-at // alignment) * alignment + size
+            most = max(most, alignment)
+        return -(-at // most) * most, most
+
+
+CORE_32 = Layout(integer=4, pointer=4, packed=False)
+AVR = Layout(integer=2, pointer=2, packed=True)
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Bytes of the constant tables and of an instance of each operator; `play`: of both, those of one play more."""
+
+    tables: int
+    instances: list[tuple[str, int]]
+    play: int
+
+    @property
+    def all(self) -> int:
+        """Bytes of the tables and of one instance of each operator."""
+        return self.tables + sum(size for _, size in self.instances)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Memory on a 32-bit target and on an 8-bit AVR, where tables lie in RAM too (None in float64, which it lacks), and
+    worst-case operations of a step in words, for each operator."""
+
+    memory: Memory
+    avr: Memory | None
     worst_case: list[tuple[str, str]]
 
 
-def _struct(*fields: tuple[int, int]) -> tuple[int, int]:
-    """Size and alignment of a C struct of fields of these sizes and alignments."""
-    at, most = 0, 1
-    for size, alignment in fields:
-        at = -(-at // alignment) * alignment + size
-        most = max(most, alignment)
-    return -(-at // most) * most, most
-
-
+REAL_BYTES = {"float32": 4, "float64": 8, "q31": 4, "q15": 2}
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
-_STRUCTS = {"dead_zone_t": 28}  # of pointers and counts
 
 
-def _corner_structs(real: int) -> dict[str, int]:
-    """Bytes of the structures of the corner engine in floating point."""
-    fields = {
-        "segment_t": (real,) * 4,
-        "corner_t": (real,) * 3 + (2, 1),
-        "curve_t": (4,) + (real,) * 6,
-        "start_t": (4, 2, 2) + (real,) * 3 + (2, 1),
-        "drive_t": (real, real, 1),
+def _corner_structs(real: int, layout: Layout) -> dict[str, tuple[int, int]]:
+    """Sizes and alignments of the structures of the corner engine in floating point."""
+    reals = (real, real)
+    pointer = (layout.pointer, layout.pointer)
+    corner = layout.struct(*3 * [reals], (2, 2), (1, 1))
+    return {
+        "segment_t": layout.struct(*4 * [reals]),
+        "corner_t": corner,
+        "curve_t": layout.struct(pointer, *6 * [reals]),
+        "start_t": layout.struct(pointer, (2, 2), (2, 2), corner),
+        "drive_t": layout.struct(reals, reals, (1, 1)),
     }
-    return {name: _struct(*((size, size) for size in sizes))[0] for name, sizes in fields.items()}
 
 
-def _constants(text: str, real: int, fixed: bool) -> int:
-    """Bytes of the constants that the C text defines, alignment left out."""
+def _constants(text: str, real: int, fixed: bool, layout: Layout, each: bool = False) -> int:
+    """Bytes of the constants that the C text defines, alignment between them left out; `each`: of one entry of each."""
+    reach = (real, real)
+    pointers = 6 * [(layout.pointer, layout.pointer)]
+    count = (2, 2)
+    structs = {
+        "dead_zone_t": layout.struct(*pointers, count),
+        "envelope_t": layout.struct(*(7 * [reach])),
+        "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
+        "tables_t": layout.struct(*pointers, (8, 8), reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
+    }
+    if not fixed:
+        structs |= _corner_structs(real, layout)
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
     for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
         found += re.findall(r"^    (\w+) \w+(\[\d+\]);", members, flags=re.MULTILINE)
     for kind, sizes in found:
-        own = next((width for ending, width in _STRUCTS.items() if kind.endswith(ending)), None)
-        if kind.endswith("envelope_t"):
-            own = 7 * real
-        elif kind.endswith("ends_t"):
-            own = 16 + 2 * real + 8
-        elif kind.endswith("tables_t"):
-            own = 40 + 2 * real if fixed else 20
-        elif not fixed and kind.endswith(tuple(_corner_structs(real))):
-            own = next(width for ending, width in _corner_structs(real).items() if kind.endswith(ending))
-        elif own is None:
+        own = next((size for ending, (size, _) in structs.items() if kind.endswith(ending)), None)
+        if own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
-        total += own * math.prod(map(int, re.findall(r"\d+", sizes)))
+        total += own * (1 if each else math.prod(map(int, re.findall(r"\d+", sizes))))
     return total
 
 
-def estimate(cascade: Cascade, options: Options, numbers: reference.Tables | FixedTables, text: str) -> Cost:
-    """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs."""
-    n = cascade.pi.n
+def estimate(
+    cascade: Cascade, options: Options, numbers: reference.Tables | FixedTables, text: str, plays: str
+) -> Cost:
+    """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs.
+
+    `plays`: the part of it that defines the tables with an entry for each play.
+    """
     fixed = isinstance(numbers, FixedTables)
-    real = {"float32": 4, "float64": 8, "q31": 4, "q15": 2}[options.arithmetic]
+    corners = options.engine == "corners"
+    known = options.arithmetic != "float64"  # a double of the AVR is a float
+    worst = [
+        (op, _worst(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
+    ]
+    memory, avr = (_memory(cascade, options, fixed, text, plays, layout) for layout in (CORE_32, AVR))
+    return Cost(memory, avr if known else None, worst)
+
+
+def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
+    """Bytes of a self-test's samples, and of the instance that its operators use one after the other."""
+    real = REAL_BYTES[options.arithmetic]
+    sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
+    return samples * sample, max(size for _, size in memory.instances)
+
+
+def _memory(cascade: Cascade, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
+    n = cascade.pi.n
+    real = REAL_BYTES[options.arithmetic]
     play, reach, sums = (4, 8 if options.arithmetic == "q31" else 4, 8) if fixed else (real, real, real)
     corners = options.engine == "corners"
     branches = cascade.branches_differ
     sizes = []
+    a_play = play
+    integer = layout.integer
     for op in ("forward", "inverse"):
         if not getattr(options, op):
             continue
         if corners and not fixed:
-            sizes.append((op, _corner_instance(n, op, real, bool(cascade.stages))))
+            size, a_play = _corner_instance(n, op, real, bool(cascade.stages), layout)
+            sizes.append((op, size))
             continue
-        fields = [real] * (1 + branches) + [1] * branches + [4]
+        fields = [real] * (1 + branches) + [1] * branches + [integer]
         if op == "inverse":
             fast = corners and not cascade.stages
-            fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [4, 4]
+            fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [integer, integer]
             if fast:  # what stands before them
                 fields = [8, 4, 4, play, play, 4, 4, 1] + fields
         scalars = [(size, size) for size in fields]
         if corners:
-            place = _struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
-            memory = _struct(place, place, (play, play), (2, 2))
-            size, alignment = _struct(*((size, size) for size in (sums, play, 2, 1)))
+            place = layout.struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
+            memory = layout.struct(place, place, (play, play), (2, 2), (1, 1))
+            a_play, alignment = layout.struct(*((size, size) for size in (sums, play, 2, 1)))
             order = [*scalars, memory] if op == "inverse" else [memory, *scalars]
-            whole = _struct(*order, (max(n, 1) * size, alignment))
+            whole = layout.struct(*order, (max(n, 1) * a_play, alignment))
         else:
-            whole = _struct(*scalars, ((n + 1) * play, play))
+            whole = layout.struct(*scalars, ((n + 1) * play, play))
         sizes.append((op, whole[0]))
-    worst = [(op, _worst(n, op, corners, numbers)) for op, _ in sizes]
-    return Cost(_constants(text, reach if fixed else real, fixed), sizes, worst)
+    width = reach if fixed else real
+    more = _constants(plays, width, fixed, layout, each=True) + a_play * len(sizes)
+    return Memory(_constants(text, width, fixed, layout), sizes, more)
 
 
-def _corner_instance(n: int, op: str, real: int, front: bool) -> int:
-    """Bytes of an instance of the corner engine in floating point."""
-    place = _struct((real, real), (real, real), (2, 2), (2, 2), (1, 1), (1, 1))
-    plays = _struct(place, *[(real, real)] * 8)
-    corner = _corner_structs(real)["corner_t"]
+def _corner_instance(n: int, op: str, real: int, front: bool, layout: Layout) -> tuple[int, int]:
+    """Bytes of an instance of the corner engine in floating point, and of one corner."""
+    reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
+    place = layout.struct(reals, reals, (2, 2), (2, 2), flag, flag)
+    plays = layout.struct(place, *8 * [reals])
+    corner, alignment = _corner_structs(real, layout)["corner_t"]
     if op == "forward":
-        beside = [(real, real), (1, 1), (4, 4)] if front else [(4, 4)]
+        beside = [reals, flag, status] if front else [status]
     elif front:
-        beside = [place, *[(real, real)] * 5, *[(1, 1)] * 5, (4, 4), (4, 4)]
+        beside = [place, *5 * [reals], *5 * [flag], status, status]
     else:
-        beside = [place, (real, real), (real, real), (1, 1), (1, 1), (4, 4)]
-    return _struct(plays, *beside, ((n + 1) * corner, real))[0]
+        beside = [place, reals, reals, flag, flag, status]
+    return layout.struct(plays, *beside, ((n + 1) * corner, alignment))[0], corner
 
 
 def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:

@@ -12,13 +12,13 @@ from typing import Any
 import jinja2
 
 import hystgen
-from hystgen.emission import cost, numbers, runtime, selftest
+from hystgen.emission import banner, cost, numbers, runtime, selftest
 from hystgen.models import Cascade, NotInvertibleError, TanhEnvelope
 from hystgen.names import comment_text
 from hystgen.params import Parameters, parameters_sha256
 
-LAYOUTS = ("self-contained", "shared-runtime", "single-header")
-OPERATORS = ("inverse", "forward", "both")
+LAYOUTS = banner.OPTIONS["layout"]
+OPERATORS = banner.OPTIONS["operator"]
 LICENCE_WIDTH = 100
 
 
@@ -84,11 +84,16 @@ def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[st
         )
     if shared:
         made.update(runtime_files(options.arithmetic))
-    samples = selftest.operators(values.numbers, options)
-    for ending, about in ((".h", f"checks {name} on the target"), (".c", "recorded samples and their exact answers")):
+    operators = selftest.operators(values.numbers, options)
+    costs = _selftest_cost(options, values.cost, sum(len(each["samples"]) for each in operators))
+    for ending, about, details in (
+        (".h", f"checks {name} on the target", costs),
+        (".c", "recorded samples and their exact answers", []),
+    ):
         file = f"{name}_selftest{ending}"
-        made[file] = render(f"selftest{ending}.j2", values, banner=_banner(values, file, about), operators=samples)
-    return {file: _tidy(text) for file, text in made.items()}
+        top = _banner(values, file, about, details)
+        made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
+    return {file: banner.seal(_tidy(text)) for file, text in made.items()}
 
 
 def _implementation(values: SimpleNamespace) -> str:
@@ -199,15 +204,13 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
         values.operators = runtime.operators(sources, name, n + 1, prefix, values.family)
     kernels = _kernels(values, options)
     values.kernels = "" if shared else kernels
-    values.details = _details(parameters, cascade, options, values, kernels)
+    values.cost = _cost(cascade, options, values, kernels)
+    values.details = _details(parameters, cascade, options, values)
     return values
 
 
 def _command(name: str, options: Options) -> str:
-    return (
-        f"hystgen emit {name}.yaml --operator {options.operator} --arithmetic {options.arithmetic} "
-        f"--engine {options.engine} --layout {options.layout}"
-    )
+    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}"
 
 
 def _units(parameters: Parameters) -> SimpleNamespace:
@@ -291,14 +294,35 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     )
 
 
-def _details(
-    parameters: Parameters, cascade: Cascade, options: Options, values: SimpleNamespace, kernels: str
-) -> list[str]:
+def cost_of(parameters: Parameters, cascade: Cascade, options: Options) -> cost.Cost:
+    """What the emitted model costs, as its banner says."""
+    found: cost.Cost = _values(parameters, cascade, options).cost
+    return found
+
+
+def _cost(cascade: Cascade, options: Options, values: SimpleNamespace, kernels: str) -> cost.Cost:
+    text = _implementation(values) + (kernels if values.shared else "")
+    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays))
+
+
+def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str]:
+    constants, instance = cost.selftest_bytes(options, found.memory, samples, cost.CORE_32)
+    lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
+    if found.avr is not None:
+        both = sum(cost.selftest_bytes(options, found.avr, samples, cost.AVR))
+        lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in all")
+    return lines
+
+
+def _details(parameters: Parameters, cascade: Cascade, options: Options, values: SimpleNamespace) -> list[str]:
     about = comment_text(parameters.description)
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in cascade.stages]
     model = f"{cascade.pi.n} plays" + (f" behind {', '.join(kinds)}" if kinds else "")
-    text = _implementation(values) + (kernels if values.shared else "")
-    estimate = cost.estimate(cascade, options, values.numbers, text)
+    estimate: cost.Cost = values.cost
+    avr = [] if estimate.avr is None else [
+        f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in all, "
+        f"{estimate.avr.play} of them for each play"
+    ]  # fmt: skip
     rounding = "" if values.fixed else (
         " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "
         "reorder sums (-fassociative-math) or contract products whatever the source says (clang's "
@@ -318,9 +342,10 @@ def _details(
         *values.precision,
         "",
         "Cost, derived from the model (32-bit target):",
-        f"    constant tables   {estimate.table_bytes} bytes",
-        *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.instance_bytes),
+        f"    constant tables   {estimate.memory.tables} bytes",
+        *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
+        *avr,
         "",
         *textwrap.wrap(use, 108),
     ]

@@ -259,7 +259,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         # output codes of half a drive code and of what the reciprocal can be off, on the steepest piece
         "shy": (int(max(numbers.slope)) * ((2**fine + 1) // 2 + 8) >> int(limits[fixed.FRACTION])) + 1,
         # so far on that w goes on by less than 2^30 least steps
-        "most_on": f"UINT64_C({int(min(numbers.slope[1:])) << 30})",
+        "most_on": f"{int(min(numbers.slope[1:])) << 30}ULL",
         "narrow_shift": all(1 <= shift - 1 <= 31 for shift in numbers.shift[1:]),
         "half_code": 2**fine // 2,
         "wide_t": f"{prefix}_reach_t",

@@ -53,7 +53,7 @@ class Family:
     @property
     def sum_max(self) -> str:
         """Beyond any output before it is rounded."""
-        return "(INT64_MAX / 2)" if self.fixed else self.reach_max
+        return _FAR_64 if self.fixed else self.reach_max
 
     @property
     def fixed(self) -> bool:
@@ -76,11 +76,14 @@ class Family:
         return ("hystgen_corner_fixed.h", "hystgen_state.h") if self.fixed else ("hystgen_corners_state.h",)
 
 
+# C++98 has the limits of <stdint.h> only where __STDC_LIMIT_MACROS was defined before its first include
+_FAR_64, _FAR_32 = "(((int64_t)1 << 62) - 1)", "2147483647"
+
 FAMILIES = {
     "float32": Family("f32", "float", "FLT_MAX"),
     "float64": Family("f64", "double", "DBL_MAX"),
-    "q31": Family("q31", "int32_t", "(INT64_MAX / 2)", "int64_t"),
-    "q15": Family("q15", "int16_t", "INT32_MAX", "int32_t"),
+    "q31": Family("q31", "int32_t", _FAR_64, "int64_t"),
+    "q15": Family("q15", "int16_t", _FAR_32, "int32_t"),
 }
 
 

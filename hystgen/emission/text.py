@@ -11,12 +11,22 @@ WIDTH = 110
 
 
 def literal(x: Any) -> str:
-    """The C literal that gives exactly this float32, float64 or whole number back, the shortest one."""
+    """The C literal that gives exactly this float32, float64 or whole number back, the shortest one.
+
+    Whole numbers keep their value in every dialect: without the suffix C90 and C++98 take one beyond `long` as
+    unsigned, and the smallest number of a type is no literal in any.
+    """
     if isinstance(x, np.integer | int):
-        return str(x)
+        return _whole(int(x))
     if not np.isfinite(x):
         raise ValueError("only finite numbers have a literal")
     return f"{np.float32(x)!s}f" if isinstance(x, np.float32) else repr(float(x))
+
+
+def _whole(x: int) -> str:
+    if x in (-(1 << 31), -(1 << 63)):
+        return f"({_whole(x + 1)} - 1)"
+    return f"{x}LL" if abs(x) >= 1 << 31 else str(x)
 
 
 def operand(x: Any) -> str:
@@ -29,7 +39,7 @@ def _wrapped(values: Sequence[Any], suffix: str, indent: str) -> list[str]:
     """Lines of literals."""
     lines = [indent]
     for i, value in enumerate(values):
-        item = " " + literal(value) + suffix + ("," if i + 1 < len(values) else "")
+        item = " " + (f"{value}{suffix}" if suffix else literal(value)) + ("," if i + 1 < len(values) else "")
         if len(lines[-1]) + len(item) > WIDTH:
             lines.append(indent)
         lines[-1] += item

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,9 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import memory
+from hystgen import arguments, memory
 from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads, uncertainty, used
-from hystgen.identification.fit import HELD_OUT, Fit, Source, visited
+from hystgen.identification.fit import HELD_OUT, Fit, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
@@ -29,7 +28,7 @@ from hystgen.identification.thresholds import rounded
 from hystgen.identification.used import Used
 from hystgen.models import DeadZone, Stage, TanhEnvelope
 from hystgen.progress import Progress
-from hystgen.records import SHORTEST, Record, agreed_units, read_records
+from hystgen.records import SHORTEST, Record, Source, agreed_units, read_records, several
 
 if TYPE_CHECKING:
     from hystgen.params import Parameters
@@ -91,9 +90,9 @@ def identify(
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
     actuator: no record tells in which state the firmware will find it. Raises RecordError for unusable files,
-    IdentificationError for records that nothing can be fitted to, ValueError for wrong arguments.
+    IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
     """
-    how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve)
+    how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
@@ -160,21 +159,22 @@ def check_options(
     skip: int = 0,
     p0_floor: float = P0_FLOOR,
     loading_curve: bool = False,
+    units: Mapping[str, str] | None = None,
     **_: object,
 ) -> tuple[_How, tuple[float, ...] | None]:
-    """What is asked of a fit, and the history, from options of `identify`. Raises ValueError for wrong ones."""
-    if model not in MODELS:
-        raise ValueError(f"model {model!r} is none of {', '.join(MODELS)}")
+    """What is asked of a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
+    arguments.choice("model", model, MODELS)
+    p0_floor = arguments.real("p0_floor", p0_floor, "the sum of weights, as a share")
     how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
     before = None if history is None else visited(history)
     if loading_curve:
         if before:
             raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
         before = ()
-    if not (math.isfinite(rest) and rest >= 0.0):
-        raise ValueError(f"rest is a number of seconds, not negative, not {rest}")
-    if skip < 0:
-        raise ValueError(f"skip is a number of samples, not negative, not {skip}")
+    arguments.number("rest", rest, "seconds", 0.0)
+    arguments.whole("skip", skip, "samples", 0)
+    if units is not None:
+        arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:
         raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
     return how, before
@@ -242,11 +242,6 @@ def _check_loading_curve(record: Record) -> None:
         )
 
 
-def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One record or path, or several, as a list."""
-    return [sources] if isinstance(sources, Record | str | os.PathLike) else list(sources)
-
-
 def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | tuple[float, ...] | None:
     """None, a number of breaks, or their places. Raises ValueError."""
     if breaks is None:
@@ -259,7 +254,7 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
         return int(breaks)
     if isinstance(breaks, str | float | bool):
         raise ValueError("breaks is a whole number or a list of drive values")
-    places = tuple(float(x) for x in breaks if float(x) != 0.0)
+    places = tuple(x for x in arguments.numbers("breaks", breaks, "[-20, 20]") if x != 0.0)
     if not places or not all(map(math.isfinite, places)) or any(b <= a for a, b in itertools.pairwise(places)):
         raise ValueError("breaks are finite drive values that rise strictly, at least one beside 0")
     return places
@@ -292,7 +287,10 @@ def _trial(
     best = tried[chosen]
     own = pi.row("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
-    return [*rows, own, replace(best.held_out, model="trial")], kinds[chosen], best.errors, ""
+    rows += [own, replace(best.held_out, model="trial")]
+    # of an amplitude that fades the end alone is a smaller range, and no measure for the errors of both
+    whole = max(replace(item, last=len(item.v)).output_range for item in best.compared)
+    return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
 
 
 def _parameters(
@@ -368,6 +366,5 @@ __all__ = [
     "check_options",
     "identifier_from",
     "identify",
-    "several",
     "stage_content",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import textwrap
 import warnings as python_warnings
@@ -13,12 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import arguments
 from hystgen.identification import faults, joint, reduction, remarks
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
 from hystgen.identification.uncertainty import Intervals
 from hystgen.identification.used import Used
-from hystgen.records import Record, read_record, write_atomically
+from hystgen.records import Record, Source, read_record, write_atomically
 from hystgen.words import counted
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 HELD_OUT = 0.25
 """Share of each record, its end, that is held out for the figures when no record is given for that."""
-
-Source = Record | str | os.PathLike[str]
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ class Fit:
         from hystgen.api import cascade_of
 
         v = np.ascontiguousarray(record.v, dtype=np.float64)
-        course = Course(record.name, v, v, history, 0, len(v), 0.0)
+        course = Course(record.name, v, v, history, 0, len(v))
         return joint.through_front(course, cascade_of(self.parameters).stages)
 
     def text(self) -> str:
@@ -146,12 +144,12 @@ class Fit:
         n = len(self.parameters.model.pi.thresholds) - 1
         told = [
             f"{counted(n, 'play')}. Errors of a free run with a free offset a record; % of the largest "
-            "peak-to-peak output of the row's records, each taken whole."
+            "peak-to-peak output that was compared of one of the row's records."
         ]
         if any(row.model == "trial" for row in self.rows):
             told.append(
                 f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the "
-                "rest (row held out). written: fitted to everything."
+                "rest (row held out), both in % of the whole. written: fitted to everything."
             )
         elif any(row.part == "held out" for row in self.rows):
             told.append("written: fitted to the records of row fit only.")
@@ -168,8 +166,5 @@ def _read(source: Source) -> Record:
 
 
 def visited(values: Sequence[float]) -> tuple[float, ...]:
-    """A history as plain numbers. Raises ValueError unless all are finite."""
-    places = tuple(float(x) for x in values)
-    if not all(math.isfinite(x) for x in places):
-        raise ValueError("history is a list of finite drive values")
-    return places
+    """A history as plain numbers. Raises ValueError unless all are finite, TypeError for what is no list of numbers."""
+    return arguments.numbers("history", values, "[100, -100]")

@@ -16,20 +16,22 @@ import io
 import json
 import math
 import os
+import warnings
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import hystgen
-from hystgen import identification
+from hystgen import api, arguments, identification, writing
 from hystgen.emission import files
-from hystgen.identification import outliers, workers
+from hystgen.identification import outliers, settings, workers
+from hystgen.identification.settings import Settings
 from hystgen.identification.workers import Result, Task
 from hystgen.progress import Progress
-from hystgen.records import FORMATS, Record, write_atomically
+from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", *FORMATS)
 """Files that are taken from a folder."""
@@ -50,7 +52,8 @@ class Unit:
 
     `name`: C identifier of the model; `file`: its record; `done`, else `message` says in one line what failed;
     `figures`: see `FIGURES`; `outlier`: the figures by which the unit is unlike the rest, and how far; empty if it is
-    not; `sha256`: of records, options and tool version; `kept`: done by an earlier call.
+    not; `sha256`: of records, options, settings and tool version; `kept`: done by an earlier call; `settings`: keys
+    taken over from the parameter file that was there.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Unit:
     sha256: str
     outlier: str = ""
     kept: bool = False
+    settings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -103,6 +107,10 @@ class Fleet:
         ]
         if not self.judged:
             lines.append(f"outliers are marked from {outliers.FEWEST} units on")
+        taken = [unit for unit in self.units if unit.settings and unit.done and not unit.kept]
+        if taken:
+            keys = ", ".join(dict.fromkeys(key for unit in taken for key in unit.settings))
+            lines.append(f"{keys} kept from the parameter files that were there, of {len(taken)} units")
         marked = [("failed", unit.name, unit.message) for unit in self.failed]
         marked += [("outlier", unit.name, unit.outlier) for unit in self.outliers]
         width = max((len(name) for _, name, _ in marked), default=0)
@@ -117,6 +125,7 @@ class _Job:
     unit: str
     file: str
     holdout: tuple[str, ...]
+    settings: Settings = field(default_factory=Settings)
     key: str = ""
 
 
@@ -144,7 +153,8 @@ def identify_batch(
 
     A unit that fails is a row with its message and stops no other; its older files stay. What is done is not done
     again by a later call, as long as record, options and tool version are the same and the files are as they were
-    written. A call that is interrupted leaves complete files only, and what it had done.
+    written. A call that is interrupted leaves complete files only, and what it had done. Of a parameter file that is
+    there and is written anew its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error far above the others (its logarithm,
     in %), or a gain (output range over drive range), width or p_0 far off; with fewer than 8 units that are done none
@@ -153,19 +163,24 @@ def identify_batch(
     """
     options = _complete(options)
     identification.check_options(**options)
-    if jobs is not None and jobs < 1:
-        raise ValueError(f"jobs is a number of processes from 1 on, not {jobs}")
+    if jobs is not None:
+        arguments.whole("jobs", jobs, "processes", 1)
+    if emission is not None:
+        arguments.known_options("emission of identify_batch", api.emit_options, emission)
     patterns = [holdout] if isinstance(holdout, str) else list(holdout)
     found = _jobs(sources, patterns)
-    folder = Path(output)
-    if any(Path(file).resolve().parent == folder.resolve() for job in found for file in (job.file, *job.holdout)):
-        raise ValueError(f"{folder} has records in it, among which summary.csv would be one more; use another folder")
+    folder = writing.destination(output)
+    if any(Path(file).resolve().parent == folder for job in found for file in (job.file, *job.holdout)):
+        what = f"{os.fspath(output)} has records in it, among which summary.csv would be one more"
+        raise ValueError(f"{what}; use another folder")
     wanted = dict(emission or {}) if emit else None
     with workers.cluster(scheduler) if scheduler is not None else contextlib.nullcontext() as client:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / KEPT_IN).mkdir(exist_ok=True)
+        files.check(folder, ["summary.csv"])
+        found = [replace(job, settings=settings.of(folder / f"{job.unit}.yaml")) for job in found]
         found = [_keyed(job, options, wanted) for job in found]
-        rows = {job.unit: kept for job in found if (kept := _kept(folder, job)) is not None}
+        rows = _kept_rows(folder, found)
         todo = {job.unit: job for job in found if job.unit not in rows}
         tasks = (_task(job, options, wanted) for job in todo.values())
         with Progress(len(found), progress, "fleet") as bar:
@@ -183,6 +198,7 @@ def identify_batch(
 def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
     """All options of `identify` that are the same for every unit, its defaults for those not given."""
     own = {"holdout": (), "name": "", "progress": False}
+    arguments.known_options("identify_batch", identification.identify, options)
     bound = inspect.signature(identification.identify).bind((), **own, **options)
     bound.apply_defaults()
     return {name: value for name, value in bound.arguments.items() if name not in ("records", *own)}
@@ -198,8 +214,11 @@ def _jobs(
     for pattern in patterns:
         if "{unit}" not in pattern:
             raise ValueError(f"holdout {pattern!r} would be that of every unit; write {{unit}} for the unit's name")
-    given = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
-    paths = {path.resolve(): path for source in given for path in _expanded(os.fspath(source))}
+    paths: dict[Path, Path] = {}
+    for source in several(sources):
+        if isinstance(source, Record):
+            raise TypeError("a fleet is made of files, not of records in memory; fit those with hystgen.identify")
+        paths |= {path.resolve(): path for path in _expanded(os.fspath(source))}
     jobs = []
     for path in paths.values():
         held = tuple(pattern.replace("{unit}", path.stem) for pattern in patterns)
@@ -244,6 +263,8 @@ def _keyed(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | N
         "options": options,
         "emission": emission,
     }
+    if job.settings.values:
+        content["settings"] = job.settings.values
     text = json.dumps(content, sort_keys=True, default=lambda value: np.asarray(value).tolist())
     return replace(job, key=hashlib.sha256(text.encode()).hexdigest())
 
@@ -257,17 +278,48 @@ def _digest(path: Path) -> str | None:
         return None
 
 
+def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
+    """The units that an earlier call left done; a warning where what it noted of some cannot be read."""
+    rows = {}
+    unreadable = []
+    for job in jobs:
+        try:
+            kept = _kept(folder, job)
+        except (OSError, ValueError, RecursionError):
+            unreadable.append(job.unit)
+            continue
+        if kept is not None:
+            rows[job.unit] = kept
+    if unreadable:
+        files_of = f"{folder / KEPT_IN / unreadable[0]}.json cannot be read"
+        more = f", and {len(unreadable) - 1} more" if len(unreadable) > 1 else ""
+        warnings.warn(f"{files_of}{more}; the fit of these units is done again", stacklevel=3)
+    return rows
+
+
 def _kept(folder: Path, job: _Job) -> Unit | None:
-    """The unit as an earlier call left it; None if anything has changed since."""
+    """The unit as an earlier call left it; None if it left nothing, or anything has changed since.
+
+    Raises OSError, ValueError or RecursionError for notes that no call has written so.
+    """
     try:
         known = json.loads((folder / KEPT_IN / f"{job.unit}.json").read_text("ascii"))
-        if known["sha256"] != job.key:
-            return None
-        if any(_digest(folder / name) != digest for name, digest in known["outputs"].items()):
-            return None
-        return Unit(job.unit, job.file, True, "", known["figures"], job.key, kept=True)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except FileNotFoundError:
         return None
+    if not (isinstance(known, dict) and isinstance(known.get("sha256"), str)):
+        raise ValueError("no notes of a unit")
+    if known["sha256"] != job.key:
+        return None
+    outputs, figures = known.get("outputs"), known.get("figures")
+    if not (isinstance(outputs, dict) and isinstance(figures, dict) and figures.keys() == set(FIGURES)):
+        raise ValueError("no outputs or figures")
+    for name, value in figures.items():
+        sort = str if name == "kind" else int | float | None
+        if not isinstance(value, sort) or isinstance(value, bool):
+            raise ValueError(f"{name} is none")
+    if any(_digest(folder / name) != digest for name, digest in outputs.items()):
+        return None
+    return Unit(job.unit, job.file, True, "", figures, job.key, kept=True)
 
 
 def _keep(folder: Path, job: _Job, result: Result) -> Unit:
@@ -289,7 +341,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
             write_atomically(folder / KEPT_IN / f"{job.unit}.json", json.dumps(known, indent=1) + "\n")
     except OSError as failure:
         message = f"cannot be written: {failure}"
-    return Unit(job.unit, job.file, not message, message, result.figures, job.key)
+    return Unit(job.unit, job.file, not message, message, result.figures, job.key, settings=tuple(job.settings.values))
 
 
 # -- the work ---------------------------------------------------------------------------------------------------------
@@ -297,7 +349,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
 
 def _task(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | None] | None) -> Task:
     held = tuple((path, _bytes(path)) for path in job.holdout)
-    return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission)
+    return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission, job.settings)
 
 
 def _bytes(path: str) -> bytes | None:

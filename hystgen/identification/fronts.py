@@ -247,7 +247,9 @@ class Tanh:
     def slack(self, shape: Array) -> Array:
         """How far the ends stay from where a branch is flat, and the descending branch above the ascending one."""
         held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
-        if self.branches == 2:
+        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, and have no length
+            held += [-1.0] * len(self._places)
+        elif self.branches == 2:
             stage = self._stage(shape, None)
             places = self._places
             gap = stage.forward(places, False) - stage.forward(places, True)

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.identification import reduction, thresholds, weights
+from hystgen import arguments
+from hystgen.identification import faults, reduction, thresholds, weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
 from hystgen.identification.thresholds import Candidate, rounded
 from hystgen.identification.weights import Weights
-from hystgen.records import SHORTEST, Record
+from hystgen.records import LARGEST, SHORTEST, Record, no_value
 
 Array = NDArray[np.float64]
 
@@ -26,6 +27,17 @@ DUST = 1e-9
 """A weight of less than this share of their sum is rounding, not a play."""
 
 MOST_PLAYS = 1000
+
+SMALLEST = 1e-20
+"""Drive or output that moves by less is no measurement: squares of it, and ratios to the other one, leave the numbers
+that there are in double precision and in parameter files."""
+
+
+FALLS = (
+    "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
+    "else check which column is which"
+)
+"""What is said of records from which nothing is left of a model."""
 
 
 class IdentificationError(ValueError):
@@ -48,7 +60,8 @@ class Solution:
 
 
 def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it takes part, its start ignored as far as the start memory is unknown.
+    """The record as it takes part: its start ignored as far as the start memory is unknown, isolated faults that show
+    without a model bridged (drive) or left out (output).
 
     Raises IdentificationError for a record without what a fit needs.
     """
@@ -62,12 +75,28 @@ def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Cour
         raise IdentificationError(f"{record.name} has samples without a value; drop them first")
     if len(v) < skip + SHORTEST:
         raise IdentificationError(f"{record.name} has {len(v)} samples, at least {skip + SHORTEST} are needed")
+    for name, x in (("v", v), ("y", y)):
+        missing = int(np.count_nonzero(no_value(x)))
+        if missing > faults.most(len(x)):
+            raise IdentificationError(
+                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
+                f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
+                f"convert {name}"
+            )
+    y = np.where(faults.wrong_output(v, y), np.nan, y)
+    v = faults.bridged(v, faults.wrong_drive(v, y))
     if np.ptp(v[skip:]) == 0.0:
         raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
-    if np.ptp(y[skip:]) == 0.0:
+    measured = y[skip:][np.isfinite(y[skip:])]
+    if not len(measured) or np.ptp(measured) == 0.0:
         raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
-    first = 0 if history is not None else reduction.settled(v, math.inf)
-    return Course(record.name, v, y, history, max(first, skip), len(v), float(np.ptp(y[skip:])), skip)
+    for name, x in (("v", v), ("y", measured)):
+        if np.ptp(x) < SMALLEST:
+            raise IdentificationError(
+                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
+                "to a smaller unit, or name another column"
+            )
+    return resettled(Course(record.name, v, y, history, skip, len(v), skip), math.inf)
 
 
 def resettled(item: Course, largest: float) -> Course:
@@ -113,10 +142,7 @@ def solve(
     p[p < DUST * float(np.sum(p))] = 0.0
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
-        raise IdentificationError(
-            "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the "
-            "sign of y, else check which column is which"
-        )
+        raise IdentificationError(FALLS)
     solution = Solution(r, p, reach, fitted)
     return (solution if wanted is not None else solution.without_idle_plays()), compared
 
@@ -163,9 +189,9 @@ def checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[floa
         return int(wanted)
     if isinstance(wanted, str | float | bool):
         raise ValueError("thresholds is a whole number of plays or a list of thresholds")
-    places = tuple(float(r) for r in wanted)
+    places = arguments.numbers("thresholds", wanted, "[0, 1.5, 3]")
     if not places or places[0] != 0.0:
         places = (0.0, *places)
-    if not all(math.isfinite(r) for r in places) or any(b <= a for a, b in itertools.pairwise(places)):
+    if any(b <= a for a, b in itertools.pairwise(places)):
         raise ValueError("thresholds are finite, not negative, and rise strictly")
     return places

@@ -1,4 +1,8 @@
-"""Records as a fit compares them: cut at gaps, spikes of the drive bridged, outliers of the output left out."""
+"""Records as a fit compares them: cut at gaps, faults of the drive bridged, wrong samples of the output left out.
+
+What shows without a model is looked for when a course is made, before anything is fitted; isolated samples far from
+what a first, robust fit makes of their neighbours behind it.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +11,24 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hystgen.identification import faults, pi
+from hystgen.identification import faults, pi, stretches
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
-from hystgen.records import Record
+from hystgen.records import SHORTEST, Record
 from hystgen.words import counted
+
+Array = NDArray[np.float64]
+
+LEFT = 0.1
+"""Least share of a record that has to be left of it where its output stood at a converter's end."""
+
+ROUNDS = 4
+"""Most robust fits; there is one where it changes nothing about what is found."""
+
+HALF = 0.25
+"""The drive is what is wrong where the output is then missed by less than half as much, squared."""
 
 
 def courses(
@@ -44,16 +60,66 @@ def courses(
             f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
-    return [bridged(item) for item in made], told
+    for k, item in enumerate(made):
+        made[k], more = _without_stretches(item)
+        told += more
+    return made, told
 
 
-def bridged(item: Course) -> Course:
-    """The course with straight lines in place of isolated spikes of its drive."""
-    spikes = faults.drive_spikes(item.v, item.y)
-    if not spikes.any():
-        return item
-    # a spike is no extreme of the drive: the start memory is known at another sample than it looked
-    return pi.resettled(replace(item, v=faults.bridged(item.v, spikes)), math.inf)
+def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
+    """The course without the samples at which the converter stood at its end; which end, its level and how many.
+
+    Raises IdentificationError where next to nothing is left.
+    """
+    levels = stretches.rails(item.y, item.v)
+    if not levels:
+        return item, []
+    at = np.isin(item.y, [level for _, level in levels])
+    left, before = np.count_nonzero(np.isfinite(item.y) & ~at), np.count_nonzero(np.isfinite(item.y))
+    if left < max(LEFT * before, SHORTEST):
+        raise IdentificationError(
+            f"{item.name}: y stands at the converter's end in {before - left} of {len(at)} samples; set the sensor's "
+            "range so that the whole motion lies inside it, and record again"
+        )
+    return _less(item, at), [(name, level, int(np.count_nonzero(item.y == level))) for name, level in levels]
+
+
+def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
+    """The course without drop-outs and held samples, and where these are."""
+    found = []
+    for what, find in (("drop-out", stretches.drop_outs), ("run", stretches.held)):
+        runs = find(item.y, item.v)
+        if runs:
+            wrong = np.zeros(len(item.y), dtype=bool)
+            for a, b in runs:
+                wrong[a:b] = True
+            item = _less(item, wrong)
+            found.append((what, runs))
+    return item, found
+
+
+def _less(item: Course, wrong: NDArray[np.bool_]) -> Course:
+    """The course without these samples of y."""
+    faulty = wrong if item.stretches is None else wrong | item.stretches
+    return replace(item, y=np.where(wrong, np.nan, item.y), stretches=faulty)
+
+
+def _without_stretches(item: Course) -> tuple[Course, list[str]]:
+    """The course without the samples of y in stretches that are plainly wrong, and what they were."""
+    left, ends = without_rails(item)
+    told = [
+        f"{item.name}: {counted(number, 'sample')} of y at the converter's end, the {name} of {level:.6g}, not compared"
+        for name, level, number in ends
+    ]
+    left, runs = _without_runs(left)
+    for what, places in runs:
+        number = counted(sum(b - a for a, b in places), "sample")
+        held = " of equal samples while the drive moves" if what == "run" else ""
+        told.append(
+            f"{item.name}: {counted(len(places), what)}{held}, {number} of y not compared; the first is sample "
+            f"{places[0][0]}"
+        )
+    return left, told
 
 
 def mask_outliers(
@@ -61,12 +127,72 @@ def mask_outliers(
 ) -> None:
     """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
 
-    Those at the start too: how much of it is compared is known only in the end.
+    Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
+    that is bridged. The play sum is one of least trimmed squares (Rousseeuw and Van Driessen, Data Mining and Knowledge
+    Discovery 12, 2006): it is fitted again without the samples that it misses most, as many as may be left out, so that
+    none of them draws it near.
     """
-    solution, _ = pi.solve(to_fit, wanted, floor)
+    solution, _ = pi.solve([_without_runs(item)[0] for item in to_fit], wanted, floor)
+    places = tuple(float(r) for r in solution.thresholds)
+    before: list[Array] = []
+    for number in range(ROUNDS):
+        to_fit[:] = [_with_drive_right(item, solution, number > 0) for item in to_fit]
+        wrong = [faults.outliers(_errors(item, solution), item.v, item.output_range) for item in to_fit]
+        now = [np.stack([item.v, flags]) for item, flags in zip(to_fit, wrong, strict=True)]
+        if before and all(np.array_equal(one, other) for one, other in zip(before, now, strict=True)):
+            break
+        before = now
+        trimmed = [_trimmed(_without_runs(item)[0], _errors(item, solution)) for item in to_fit]
+        solution, _ = pi.solve(trimmed, places, floor)
     for group in (to_fit, held):
         for k, item in enumerate(group):
-            error = pi.compare(replace(item, first=0), solution.thresholds, solution.weights).error
-            wrong = faults.outliers(error, item.v)
-            if wrong.any():
-                group[k] = replace(item, y=np.where(wrong, np.nan, item.y))
+            right = _with_drive_right(item, solution, True)
+            flags = faults.outliers(_errors(right, solution), right.v, right.output_range)
+            group[k] = replace(right, y=np.where(flags, np.nan, right.y)) if flags.any() else right
+
+
+def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
+    """The course with its drive bridged at isolated samples where a model then misses the output by far less.
+
+    And the rest of it by no more: a wrong drive is remembered, where a wrong output is not. A `robust` solution is
+    asked about the largest and the least drive too, if it misses the output there by as much as anywhere: what they
+    spoil may hide them, and the range of the model ends at them.
+    """
+    error = _errors(item, solution)
+    suspects = faults.far_from_others(error, item.output_range)
+    if robust:
+        missed = _most_missed(item, error).tolist()
+        suspects += [(k, k + 1) for k in (int(np.argmax(item.v)), int(np.argmin(item.v))) if k in missed]
+    for first, last in suspects:
+        if not faults.returns(item.v, first, last):
+            continue
+        run = np.zeros(len(item.v), dtype=bool)
+        run[first:last] = True
+        other = pi.resettled(replace(item, v=faults.bridged(item.v, run)), math.inf)
+        less = _errors(other, solution)
+        if _size(less[run]) < HALF * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
+            item, error = other, less
+    return item
+
+
+def _size(error: Array) -> float:
+    """Sum of squares of the errors that are known."""
+    return float(np.nansum(error**2))
+
+
+def _errors(item: Course, solution: pi.Solution) -> Array:
+    """Errors (N,) of a course from its very start."""
+    return pi.compare(replace(item, first=0, last=len(item.v)), solution.thresholds, solution.weights).error
+
+
+def _most_missed(item: Course, error: Array) -> NDArray[np.intp]:
+    """As many of the samples compared as may be isolated faults, those with the largest errors."""
+    compared = item.compared
+    return compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
+
+
+def _trimmed(item: Course, error: Array) -> Course:
+    """The course without those."""
+    y = item.y.copy()
+    y[_most_missed(item, error)] = np.nan
+    return replace(item, y=y)

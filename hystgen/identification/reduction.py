@@ -36,10 +36,9 @@ class Course:
     """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
 
     The drive before `first` runs through the plays all the same, as it does where `y` is NaN: such a sample is not
-    compared. `history` are drive values visited before the record;
-    None when it is not known. `output_range`: peak-to-peak output of the whole record, which percentages refer to.
-    `begin`: where comparing may begin, its start memory aside. `origin`: which record it is a part of, counted from 0,
-    and at which of its samples it begins.
+    compared. `history` are drive values visited before the record; None when it is not known. `begin`: where comparing
+    may begin, its start memory aside. `origin`: which record it is a part of, counted from 0, and at which of its
+    samples it begins. `stretches`: samples whose y was left out in a stretch, and not as isolated; None for none.
     """
 
     name: str
@@ -48,9 +47,9 @@ class Course:
     history: tuple[float, ...] | None
     first: int
     last: int
-    output_range: float
     begin: int = 0
     origin: tuple[int, int] = (0, 0)
+    stretches: NDArray[np.bool_] | None = None
 
     @property
     def used(self) -> int:
@@ -58,10 +57,20 @@ class Course:
         return int(np.count_nonzero(np.isfinite(self.y[self.first : self.last])))
 
     @property
+    def compared(self) -> NDArray[np.intp]:
+        """Indices of the samples compared."""
+        return self.first + np.flatnonzero(np.isfinite(self.y[self.first : self.last]))
+
+    @property
     def drive_range(self) -> tuple[float, float]:
-        """Least and largest drive among the samples compared."""
-        part = self.v[self.first : self.last]
+        """Least and largest drive among the samples compared; of none that of all from `first` on."""
+        part = self.v[self.compared] if self.used else self.v[self.first : self.last]
         return float(part.min()), float(part.max())
+
+    @property
+    def output_range(self) -> float:
+        """Peak-to-peak output of the samples compared."""
+        return float(np.ptp(self.y[self.compared])) if self.used else 0.0
 
 
 def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:

@@ -11,6 +11,7 @@ from hystgen.identification import pi, reduction
 from hystgen.identification.pi import Solution
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
+from hystgen.identification.weights import Weights
 from hystgen.records import Record
 from hystgen.words import counted
 
@@ -28,23 +29,7 @@ def about_model(
     solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
 ) -> list[str]:
     """What the user should know about the model itself."""
-    told = []
-    p, made = solution.weights, solution.fitted
-    if made.free_p0 is not None and made.free_rms is not None:
-        told.append(
-            f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
-            f"hardly tell: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement lowers "
-            "p_0: record more slowly if you can"
-        )
-    elif p[0] == 0.0:
-        told.append(
-            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
-            "of use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
-        )
-    elif np.sum(p) > AMPLIFIES * p[0]:
-        told.append(
-            f"p_0 is small: the inverse amplifies small movements {np.sum(p) / p[0]:.0f} times as much as large ones"
-        )
+    told = about_inverse(solution.weights, solution.fitted)
     low = min(item.drive_range[0] for item in compared)
     high = max(item.drive_range[1] for item in compared)
     if solution.reach < SMALL_REACH * (high - low):
@@ -68,6 +53,26 @@ def about_model(
             "which, and the units"
         )
     return told
+
+
+def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
+    """What the user should know about p_0, which the inverse divides by; `p` as written, `made` as fitted."""
+    if made.free_p0 is not None and made.free_rms is not None:
+        return [
+            f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
+            f"hardly tell: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement lowers "
+            "p_0: record more slowly if you can"
+        ]
+    if p[0] == 0.0:
+        return [
+            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
+            "of use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
+        ]
+    if np.sum(p) > AMPLIFIES * p[0]:
+        return [
+            f"p_0 is small: the inverse amplifies small movements {np.sum(p) / p[0]:.0f} times as much as large ones"
+        ]
+    return []
 
 
 def about_start(errors: pi.Errors, largest: float) -> str:

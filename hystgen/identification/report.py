@@ -12,7 +12,8 @@ class Row:
 
     `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples` were compared, `ignored` were not;
     `rms`, `max`: errors in output units with a free offset a record; `output_range`: the largest peak-to-peak output
-    of the row's records, each taken whole, of which `rms_percent` and `max_percent` are taken.
+    that was compared of one of the row's records, of which `rms_percent` and `max_percent` are taken; for a trial that
+    of both its rows.
     """
 
     part: str

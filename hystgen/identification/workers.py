@@ -7,8 +7,12 @@ neither the records nor the output folder.
 from __future__ import annotations
 
 import contextlib
+import logging
+import os
 import signal
 import tempfile
+import threading
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
@@ -17,6 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import hystgen
+from hystgen import extras, writing
+from hystgen.identification.settings import Settings
 
 DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
 
@@ -24,7 +30,10 @@ PATIENCE = 15.0
 """Seconds for a scheduler to answer, and for it to have a worker."""
 
 IDLE = 30.0
-"""Seconds after which a process without work ends; so do those whose parent was killed."""
+"""Seconds after which a process without work ends."""
+
+WATCH = 1.0
+"""Seconds between two looks of a process for the one that started it."""
 
 
 class SchedulerError(OSError):
@@ -35,7 +44,7 @@ class SchedulerError(OSError):
 class Task:
     """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and what is wanted.
 
-    `options`: of `identify`; `emission`: of `emit`, or None to leave it out.
+    `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
     """
 
     unit: str
@@ -43,6 +52,7 @@ class Task:
     holdout: tuple[tuple[str, bytes | None], ...]
     options: Mapping[str, Any]
     emission: Mapping[str, str | None] | None
+    settings: Settings = field(default_factory=Settings)
     version: str = hystgen.__version__
 
 
@@ -64,10 +74,10 @@ def fit_unit(task: Task) -> Result:
     """Fit and emit one unit. Never raises an Exception: whatever goes wrong is the result's message."""
     if task.version != hystgen.__version__:
         return Result(task.unit, f"the worker has hystgen {hystgen.__version__}, not {task.version}; install the same")
-    with tempfile.TemporaryDirectory(prefix="hystgen-") as folder:
+    with writing.temporary() as folder:
         paths = {}
         for k, (path, data) in enumerate((*task.records, *task.holdout)):
-            copy = Path(folder) / str(k) / Path(path).name
+            copy = folder / str(k) / Path(path).name
             copy.parent.mkdir()
             paths[str(copy)] = path
             if data is not None:
@@ -85,7 +95,7 @@ def fit_unit(task: Task) -> Result:
 def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
     from hystgen import api, identification
 
-    fit = identification.identify(records, holdout=holdout, name=task.unit, **task.options)
+    fit = task.settings.on(identification.identify(records, holdout=holdout, name=task.unit, **task.options))
     model = api.Model(fit.parameters)
     text, figures = fit.text(), _figures(fit, model)
     if task.emission is None:
@@ -132,9 +142,22 @@ def _figures(fit: Any, model: Any) -> dict[str, Any]:
     }
 
 
-def _leave_interrupts() -> None:
-    """Ctrl-C reaches all processes of a terminal; the one that was started there ends the others."""
+def _begin(folder: str, parent: int) -> None:
+    """Set a process up for work: whoever started it, `parent`, ends it and clears up behind it.
+
+    Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
+    a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the one that started it is gone."""
+    while os.getppid() == parent:
+        time.sleep(WATCH)
+    os._exit(1)
 
 
 def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:
@@ -143,6 +166,11 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
     A process that dies takes the whole pool along. What was under way is then repeated one by one: only the unit that
     dies alone too has failed, and the rest goes on.
     """
+    with writing.temporary() as folder:
+        yield from _pooled(tasks, jobs, work, str(folder))
+
+
+def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Generator[Result, None, None]:
     from joblib import Parallel, delayed, parallel_config
 
     waiting = iter(tasks)
@@ -154,7 +182,8 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
             yield delayed(work)(task)
 
     def pool(**how: Any) -> Any:
-        apart = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE, "initializer": _leave_interrupts}
+        apart: dict[str, Any] = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE}
+        apart |= {"initializer": _begin, "initargs": (folder, os.getpid())}
         with parallel_config("loky", **apart) if jobs > 1 else parallel_config("sequential"):
             return Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered", **how)
 
@@ -179,25 +208,40 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
 
 
 @contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the libraries of a cluster from logging, with tracebacks, what an exception says in one line."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
+    before = {logger: logger.level for logger in map(logging.getLogger, [*names, "asyncio"])}
+    for logger in before:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)
+
+
+@contextlib.contextmanager
 def cluster(address: str) -> Iterator[Any]:
     """A client of the Dask scheduler at `address`, which has a worker. Raises SchedulerError."""
     try:
         from distributed import Client
         from distributed.comm import get_address_host_port
     except ModuleNotFoundError:
-        raise SchedulerError("a scheduler needs Dask; install it with: pip install 'hystgen[fleet]'") from None
-    try:
-        get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as failure:
-        reason = (str(failure).splitlines() or [type(failure).__name__])[0]
-        raise SchedulerError(f"no Dask scheduler answers at {address}: {reason}") from None
-    with client:
+        raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
+    with _quiet():
         try:
-            client.wait_for_workers(1, timeout=PATIENCE)
-        except TimeoutError:
-            raise SchedulerError(f"the Dask scheduler at {address} has no workers; start some") from None
-        yield client
+            get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
+            client = Client(address, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as failure:
+            reason = (str(failure).splitlines() or [type(failure).__name__])[0]
+            raise SchedulerError(f"no Dask scheduler answers at {address}: {reason}") from None
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=PATIENCE)
+            except TimeoutError:
+                raise SchedulerError(f"the Dask scheduler at {address} has no workers; start some") from None
+            yield client
 
 
 def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Generator[Result, None, None]:

@@ -15,18 +15,24 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
+from hystgen import arguments
 from hystgen.problems import RecordError, printable
 from hystgen.progress import Progress
 from hystgen.records.array_files import read_mat, read_npz
 from hystgen.records.columns import parse_columns
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
+from hystgen.records.no_value import LARGEST, no_value
 from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
 from hystgen.records.repair import SHORTEST, repaired
 from hystgen.records.units import agreed_units, headers
-from hystgen.records.writing import columns_text, write_atomically, write_columns
+from hystgen.records.writing import columns_text, write_columns
+from hystgen.writing import write_atomically
+
+Source = Record | str | os.PathLike[str]
+"""A record, or the path of a data file."""
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -62,16 +68,19 @@ def read_records(
     """Read several data files as `read_record` does; records that are in memory already are kept.
 
     `progress`: a bar on a terminal's stderr when it takes more than a second. Raises RecordError with every problem in
-    all files.
+    all files, ValueError and TypeError for other arguments.
     """
-    everything = list(sources)
+    everything = several(sources)
+    _check_options(columns, sample_time, delimiter)
     found: list[Record] = []
     refused: list[str] = []
     with Progress(sum(_size(source) for source in everything), progress, "reading") as bar:
         for source in everything:
             try:
-                if not isinstance(source, Record):
-                    source = _read(os.fspath(source), columns, sample_time, delimiter, need, bar.tick)
+                if isinstance(source, Record):
+                    _check_arrays(source)
+                else:
+                    source = _read(arguments.path("a record", source), columns, sample_time, delimiter, need, bar.tick)
                 found.append(source)
             except RecordError as error:
                 refused.extend(error.problems)
@@ -99,6 +108,45 @@ def read_record(
     Raises RecordError with every problem in the file.
     """
     return read_records([path], columns, sample_time, delimiter, need)[0]
+
+
+def several(sources: Source | Iterable[Source]) -> list[Source]:
+    """One record or path, or several, as a list. Raises TypeError for what is neither, such as a table or arrays."""
+    if isinstance(sources, Record | str | os.PathLike):
+        return [sources]
+    # Tables and mappings would give the names of their columns, which are no paths
+    named = isinstance(sources, Mapping | bytes) or hasattr(sources, "keys") or hasattr(sources, "readline")
+    found = [] if named or not isinstance(sources, Iterable) else list(sources)
+    strange = [each for each in found if not isinstance(each, Record | str | os.PathLike)]
+    if named or strange or not isinstance(sources, Iterable):
+        of = f" with {arguments.kind(strange[0])} in it" if strange else ""
+        raise TypeError(
+            f"give a path, a hystgen.records.Record, or a list of these, not {arguments.kind(sources)}{of}; arrays and "
+            "columns of a table become a record by hystgen.records.Record(name, t, v, y)"
+        )
+    return found
+
+
+def _check_options(columns: object, sample_time: object, delimiter: object) -> None:
+    """Raise TypeError for options of `read_record` that are of another type."""
+    if columns is not None:
+        arguments.texts("columns", columns, (), "{'t': 'Time', 'v': 'U', 'y': 'Pos'}")
+    if sample_time is not None:
+        arguments.real("sample_time", sample_time, "seconds")
+    if delimiter is not None and not isinstance(delimiter, str):
+        raise TypeError(f"delimiter is a character such as ';', not {arguments.kind(delimiter)}")
+
+
+def _check_arrays(record: Record) -> None:
+    """Raise ValueError or TypeError for a record made of arrays that are none, or not of one dimension."""
+    if not isinstance(record.name, str):
+        raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
+    for name, values in record.columns().items():
+        found = arguments.signal(f"{name} of {record.name}", values)
+        if name not in ("v", "y") and len(found) != len(record.t):
+            raise ValueError(f"{record.name} has {len(record.t)} samples of t and {len(found)} of {name}")
+    if len(record.v) not in (0, len(record.t)):
+        raise ValueError(f"{record.name} has {len(record.t)} samples of t and {len(record.v)} of v")
 
 
 def _read(
@@ -138,15 +186,19 @@ def _size(source: Record | str | os.PathLike[str]) -> int:
 
 __all__ = [
     "FORMATS",
+    "LARGEST",
     "SHORTEST",
     "Record",
     "RecordError",
+    "Source",
     "agreed_units",
     "columns_text",
     "headers",
+    "no_value",
     "parse_columns",
     "read_record",
     "read_records",
+    "several",
     "write_atomically",
     "write_columns",
 ]

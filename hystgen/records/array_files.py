@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import IO, Any
 
@@ -18,14 +18,21 @@ MATLAB_NUMBERS = frozenset(
 )
 """MATLAB's classes of arrays whose values are numbers."""
 
+TOGETHER = 1 << 20
+"""Samples of a .mat file loaded at a time, in several vectors as long as these are short."""
+
+MOST_TOGETHER = 1000
+"""Vectors loaded at a time; the library looks each name of the file up among theirs one by one."""
+
 
 def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
     """Read a NumPy archive; only the arrays that the record takes are loaded."""
     with reading.parsing("a NumPy .npz archive"), np.load(stream, allow_pickle=False) as archive:
         columns = []
         ignored = []
+        members = frozenset(archive.zip.namelist())
         for name in archive.files:
-            length = _npy_length(archive, name)
+            length = _npy_length(archive, name if name in members else f"{name}.npy")
             if length:
                 columns.append(column(name, length=length, read=partial(_npy_vector, archive, name)))
             else:
@@ -33,9 +40,8 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
         return reading.table(columns, ignored)
 
 
-def _npy_length(archive: Any, name: str) -> int:
+def _npy_length(archive: Any, file: str) -> int:
     """Length of an archived vector of numbers from its header alone; 0 for anything else."""
-    file = name if name in archive.zip.namelist() else f"{name}.npy"
     with archive.zip.open(file) as member:
         header: Mapping[tuple[int, int], Callable[..., Any]] = {
             (1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0,
@@ -61,25 +67,51 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
     with reading.parsing("a MATLAB v5 .mat file"):
         columns: list[Column] = []
         ignored: list[str] = []
+        vectors = _MatVectors(stream)
         for name, shape, kind in whosmat(stream):
             if kind == "struct":
-                _fields(_mat_variable(stream, name), f"{name}.", columns, ignored)
+                _fields(_mat_variables(stream, [name])[name], f"{name}.", columns, ignored)
             elif kind in MATLAB_NUMBERS and one_dimension(shape):
-                columns.append(column(name, length=one_dimension(shape), read=partial(_mat_vector, stream, name)))
+                vectors.add(name, one_dimension(shape))
+                columns.append(column(name, length=one_dimension(shape), read=partial(vectors.read, name)))
             else:
                 ignored.append(name)
         return reading.table(columns, ignored)
 
 
-def _mat_variable(stream: IO[bytes], name: str) -> Any:
+def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, Any]:
     from scipy.io import loadmat
 
     stream.seek(0)
-    return loadmat(stream, variable_names=[name])[name]
+    found: dict[str, Any] = loadmat(stream, variable_names=names)
+    return found
 
 
-def _mat_vector(stream: IO[bytes], name: str) -> NDArray[Any]:
-    return np.asarray(_mat_variable(stream, name)).ravel()
+class _MatVectors:
+    """Vectors of a file that is searched from its start for each: neighbours are therefore loaded together."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self._groups: list[list[str]] = []
+        self._group: dict[str, int] = {}
+        self._samples = 0
+        self._loaded: tuple[int, dict[str, Any]] = (-1, {})
+
+    def add(self, name: str, length: int) -> None:
+        """A vector of the file, in its order."""
+        if not self._groups or self._samples + length > TOGETHER or len(self._groups[-1]) == MOST_TOGETHER:
+            self._groups.append([])
+            self._samples = 0
+        self._groups[-1].append(name)
+        self._group[name] = len(self._groups) - 1
+        self._samples += length
+
+    def read(self, name: str) -> NDArray[Any]:
+        """The vector of that name."""
+        group = self._group[name]
+        if self._loaded[0] != group:
+            self._loaded = group, _mat_variables(self._stream, self._groups[group])
+        return np.asarray(self._loaded[1].pop(name)).ravel()
 
 
 def _fields(struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str]) -> None:

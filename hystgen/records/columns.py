@@ -77,10 +77,17 @@ def parse_columns(text: str) -> dict[str, str]:
 class Finder:
     """Finds the columns that are asked for; `problems` says what is wrong with the others."""
 
-    def __init__(self, columns: Sequence[Column], mapping: Mapping[str, str], ignored: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        columns: Sequence[Column],
+        mapping: Mapping[str, str],
+        ignored: Sequence[str] = (),
+        outside: Sequence[str] = (),
+    ) -> None:
         self.columns = columns
         self.mapping = mapping
         self.ignored = ignored
+        self.outside = outside
         self.problems: list[str] = []
 
     def find(self, need: Sequence[str], timed: bool) -> dict[str, Column]:
@@ -127,6 +134,15 @@ class Finder:
             self.problems.append(
                 f'"{printable(theirs)}" is no column of numbers; export a vector of numbers, or name another column '
                 f'with --columns "{ours}=COLUMN"'
+            )
+            return
+        wanted = theirs.removeprefix("/")
+        for name in self.outside:
+            if wanted != name and not name.endswith(("/" + wanted, "." + wanted)) and not wanted.startswith(name + "/"):
+                continue
+            self.problems.append(
+                f'"{printable(name)}" is kept outside this file, and no other file is opened; copy its numbers into '
+                f'this one, or name another column with --columns "{ours}=COLUMN"'
             )
             return
         advice = self._advice(ours)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import os
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import IO
 
@@ -140,10 +141,11 @@ class _Body:
         self.wanted = frozenset(wanted)
         self.size = size
         # Columns of numbers, as far as is known; those with text, and those called alike, are not stored
+        alike = Counter(names)
         self.stored: dict[int, Array] = {
-            k: np.empty(0) for k, name in enumerate(names) if name and (names.count(name) == 1 or k in self.wanted)
+            k: np.empty(0) for k, name in enumerate(names) if name and (alike[name] == 1 or k in self.wanted)
         }
-        self.text_columns: list[int] = []
+        self.text_columns: set[int] = set()
         self.rows = 0
         self.line = line
         self.lines = Lines()
@@ -176,7 +178,8 @@ class _Body:
         reading.left_out("without numbers", [self.names[k] for k in sorted(self.text_columns)])
         numeric = [c for k, c in enumerate(columns) if k not in self.text_columns]
         taken = {**chosen, **reading.further(numeric, chosen)}
-        numbers = {name: self.stored[self.names.index(c.name)] for name, c in taken.items()}
+        place = {name: k for k, name in enumerate(self.names) if k in self.stored}
+        numbers = {name: self.stored[place[c.name]] for name, c in taken.items()}
         return reading.finished(numbers, taken, self.lines)
 
     def _room(self, rows: int, size: int) -> None:
@@ -253,7 +256,7 @@ class _Body:
                     number = float("nan")
                     if cell.strip().lower() not in MISSING:
                         if k not in self.wanted:
-                            self.text_columns.append(k)
+                            self.text_columns.add(k)
                             self.stored.pop(k, None)
                         else:
                             self._wrong(

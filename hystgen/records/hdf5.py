@@ -1,4 +1,8 @@
-"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; by h5py."""
+"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; by h5py.
+
+A record is one file: datasets behind external links, with external storage, or put together from others (virtual) would
+have whatever the file names opened, and are not read.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,10 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import extras
 from hystgen.records.array_files import MATLAB_NUMBERS
 from hystgen.records.columns import Column, column
-from hystgen.records.reading import INSTALL, Reading, Table, one_dimension
+from hystgen.records.reading import Reading, Table, one_dimension
 
 SLICE = 1 << 18
 """Samples read at a time."""
@@ -37,28 +42,35 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
     except ImportError:
         what = "MATLAB v7.3" if matlab else "HDF5"
         raise reading.refuse(
-            f"{what} files need the package h5py; {INSTALL}, or export CSV, .npz or MATLAB .mat (v7)"
+            f"{what} files need the package h5py; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat (v7)"
         ) from None
     with reading.parsing(kind), h5py.File(reading.file, "r") as file:
         columns: list[Column] = []
         ignored: list[str] = []
+        outside: list[str] = []
+        join = "." if matlab else "/"  # MATLAB writes a field of a struct with a point
+
+        def link(path: str, found: Any) -> None:
+            if isinstance(found, h5py.ExternalLink):
+                outside.append(path.replace("/", join))
 
         def visit(path: str, found: Any) -> None:
             if not isinstance(found, h5py.Dataset) or (matlab and path.split("/")[0] in _MATLAB_OWN):
                 return
             *folders, name = path.split("/")
-            # MATLAB writes a field of a struct with a point
-            join = "." if matlab else "/"
             folder = "".join(part + join for part in folders)
             length = _length(found, matlab)
-            if length:
+            if found.external or found.is_virtual:
+                outside.append(folder + name)
+            elif length:
                 unit = "" if matlab else _unit(found)
                 columns.append(column(name, folder, unit, length, partial(_vector, reading, found)))
             else:
                 ignored.append(folder + name)
 
         file.visititems(visit)
-        return reading.table(columns, ignored)
+        file.visititems_links(link)
+        return reading.table(columns, ignored, outside)
 
 
 def _length(dataset: Any, matlab: bool) -> int:

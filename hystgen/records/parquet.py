@@ -8,8 +8,9 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import extras
 from hystgen.records.columns import Column, column
-from hystgen.records.reading import INSTALL, Reading, Table
+from hystgen.records.reading import Reading, Table
 
 BATCH = 1 << 18
 """Samples read at a time."""
@@ -25,7 +26,8 @@ def read_parquet(reading: Reading, stream: IO[bytes]) -> Table:
         import pyarrow.parquet as pq
     except ImportError:
         raise reading.refuse(
-            f"Parquet files need the package pyarrow; {INSTALL}, or export CSV, .npz or MATLAB .mat (v7)"
+            f"Parquet files need the package pyarrow; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat "
+            "(v7)"
         ) from None
     with reading.parsing("a Parquet file"), pq.ParquetFile(stream, pre_buffer=False) as file:
         columns: list[Column] = []

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from hystgen.problems import RecordError, printable
 from hystgen.records.columns import LISTED, Column, Finder, further_names
+from hystgen.records.no_value import no_value
 from hystgen.records.record import Array
 from hystgen.records.units import to_seconds
-
-INSTALL = "pip install 'hystgen[formats]'"
 
 
 class Lines:
@@ -56,7 +55,10 @@ class Table:
 
 
 class Reading:
-    """One file being read: what was asked for, and what is found to be wrong or worth a note."""
+    """One file being read: what was asked for, and what is found to be wrong or worth a note.
+
+    `fills`: of each column with numbers that stand for no value which ones these are, in words.
+    """
 
     def __init__(
         self,
@@ -75,6 +77,7 @@ class Reading:
         self.tick = tick
         self.problems: list[str] = []
         self.notes: list[str] = []
+        self.fills: dict[str, str] = {}
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
         """Something for which the file is refused, with its place where it has lines."""
@@ -104,10 +107,14 @@ class Reading:
             raise self.refuse(f"is not {kind} ({printable(str(failure))}); export it again") from None
 
     def chosen(
-        self, columns: Sequence[Column], ignored: Sequence[str] = (), line: int | None = None
+        self,
+        columns: Sequence[Column],
+        ignored: Sequence[str] = (),
+        outside: Sequence[str] = (),
+        line: int | None = None,
     ) -> dict[str, Column]:
         """The columns that are asked for, by our names. Raises RecordError for those that are not there."""
-        finder = Finder(columns, self.columns, ignored)
+        finder = Finder(columns, self.columns, ignored, outside)
         found = finder.find(self.need, self.sample_time is not None)
         for text in finder.problems:
             self.problem(text, line)
@@ -119,7 +126,8 @@ class Reading:
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
-        self.left_out("whose name is taken", [c.name for c in others if c not in names.values() and c.name])
+        kept = {c.name for c in names.values()}
+        self.left_out("whose name is taken", [c.name for c in others if c.name not in kept and c.name])
         return names
 
     def left_out(self, which: str, names: Sequence[str]) -> None:
@@ -128,18 +136,20 @@ class Reading:
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
             self.notes.append(f"columns {which} were left out: {', '.join(map(printable, names[:LISTED]))}{more}")
 
-    def table(self, columns: Sequence[Column], ignored: Sequence[str]) -> Table:
+    def table(self, columns: Sequence[Column], ignored: Sequence[str], outside: Sequence[str] = ()) -> Table:
         """The table of a file whose columns are read one by one.
 
-        Read are the columns asked for and, out of the groups that hold these, all others of the same length.
+        Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
+        that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`).
         """
-        chosen = self.chosen(columns, ignored)
+        chosen = self.chosen(columns, ignored, outside)
         lengths = {c.length for c in chosen.values()}
         if len(lengths) > 1:
             told = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
             raise self.refuse(f"the columns differ in length: {told} samples; export them with one length")
         folders = {c.folder for c in chosen.values()}
         self.left_out("without numbers", ignored)
+        self.left_out("kept outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
         near = [c for c in columns if c.folder in folders]
         self.left_out("of another length", [c.name for c in near if c.length not in lengths])
@@ -152,8 +162,13 @@ class Reading:
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
         """A table with NaN for every value that is none, time in seconds and units by name."""
-        for x in numbers.values():
-            x[~np.isfinite(x)] = np.nan
+        for name, x in numbers.items():
+            wrong = no_value(x)
+            written = np.unique(x[wrong & np.isfinite(x)])
+            if len(written):
+                several, s = ("numbers such as ", "") if len(written) > 1 else ("", "s")
+                self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as none"
+            x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in units:
             numbers["t"], note = to_seconds(numbers["t"], units["t"])

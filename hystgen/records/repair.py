@@ -31,7 +31,10 @@ def repaired(reading: Reading, table: Table) -> Record:
         needed.append("t")
     for name in dict.fromkeys(needed):
         keep &= np.isfinite(columns[name])
-    _drop(reading, table, length, ~keep, "without a value in " + " or ".join(dict.fromkeys(needed)))
+    fills = "; ".join(said for name, said in reading.fills.items() if name in needed)
+    which = f"without a value in {' or '.join(dict.fromkeys(needed))}{f' ({fills})' if fills else ''}"
+    _drop(reading, table, length, ~keep, which)
+    reading.notes += [f"{name}: {said}" for name, said in reading.fills.items() if name not in needed]
     if "t" in columns:
         keep = _rising(reading, table, columns["t"], keep)
     samples = int(np.count_nonzero(keep))
@@ -43,7 +46,7 @@ def repaired(reading: Reading, table: Table) -> Record:
     shortest = SHORTEST if fit else 1
     if samples < shortest and not reading.problems:
         reading.problem(f"has {counted(samples, 'sample')}, at least {shortest} are needed; record for longer")
-    elif fit and samples and "v" in columns and float(np.ptp(columns["v"])) == 0.0:
+    elif fit and samples and not reading.problems and "v" in columns and float(np.ptp(columns["v"])) == 0.0:
         reading.problem(
             f"the drive v is {columns['v'][0]:g} throughout; a fit needs a drive that moves, check the columns"
         )

@@ -1,18 +1,17 @@
-"""Computed columns out, and files that are written all or nothing."""
+"""Computed columns out."""
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import os
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from hystgen.writing import write_atomically
 
 
 def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
@@ -29,34 +28,6 @@ def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
 def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: Sequence[ArrayLike]) -> None:
     """Write `columns_text` to a file, all or nothing."""
     write_atomically(path, columns_text(header, arrays))
-
-
-def write_atomically(path: str | os.PathLike[str], text: str) -> None:
-    """Write a text file so that it is either the old one or complete.
-
-    A link stays a link, and what is no regular file (a pipe, a terminal) is written to in place. Raises OSError.
-    """
-    target = Path(os.path.realpath(path))
-    if target.exists() and not target.is_file():
-        target.write_bytes(text.encode())
-        return
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=".hystgen-", dir=target.parent)
-    except OSError as failure:
-        # Name the file that was asked for, not the temporary one
-        raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None
-    try:
-        with os.fdopen(handle, "wb") as out:
-            out.write(text.encode())
-        # mkstemp makes files for the owner alone; give the one that stays the usual rights
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, target)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(temporary)
-        raise
 
 
 def _texts(values: NDArray[Any]) -> list[str]:

@@ -39,7 +39,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     }
     sections = [
         Section("How the gap shrinks", [figures["gap"], *_refitted(content)]),
-        Section("What was found", _found(content, found.parameters.model.effects)),
+        Section("What was found", _found(content, found.parameters.model.effects, found.not_emitted())),
         Section("What is left", _left(content)),
         Section("Faults of the data", _faults(content)),
         Section("Before and after, on held-out records", [figures["overlay"]]),
@@ -51,7 +51,8 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Parameters", [Details("Parameter file with the effects added", parameters_text)]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
     ]
-    return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence())], sections)
+    warnings = [Text(f"Mind the inverse: {said}.") for said in found.warnings]
+    return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence()), *warnings], sections)
 
 
 def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
@@ -78,7 +79,8 @@ def _refitted(content: Mapping[str, Any]) -> list[Text]:
     ]
 
 
-def _found(content: Mapping[str, Any], there: Sequence[Effect]) -> list[Text | Table]:
+def _found(content: Mapping[str, Any], there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
+    """`not_emitted`: why the compensators that the table speaks of cannot be had in C; empty where they can."""
     if not content["effects"]:
         return [Text("No effect of the catalogue removes enough of the held-out error to get a name.")]
     unit = content["unit"]
@@ -100,6 +102,7 @@ def _found(content: Mapping[str, Any], there: Sequence[Effect]) -> list[Text | T
         Table(rows, (0,)),
         Text("What they mean for a compensator:"),
         Table(means, (0, 1, 2)),
+        *([Text(f"{not_emitted}.")] if not_emitted else []),
         Text(
             "Their numbers, with intervals that count the correlation of the residuals and the freedom of the weights, "
             "but not that another shape may fit as well:"

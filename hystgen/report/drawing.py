@@ -6,12 +6,17 @@ matplotlib is imported when one is drawn; its settings, and those of the user, s
 from __future__ import annotations
 
 import io
+import logging
+import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from hystgen import extras
 
 Array = NDArray[np.float64]
 
@@ -58,20 +63,52 @@ class PlotError(ValueError):
 def require() -> None:
     """Raise PlotError without matplotlib."""
     try:
-        import matplotlib  # noqa: F401
+        with _quiet():
+            _import()
     except ImportError:
-        raise PlotError("plots need matplotlib; install it with: pip install 'hystgen[plot]'") from None
+        raise PlotError(f"plots need matplotlib; install it with: {extras.install('plot')}") from None
+
+
+def _import() -> None:
+    """Import matplotlib. Raises ImportError.
+
+    A notebook hands on its backend, which this environment may not have, and matplotlib then refuses to be imported.
+    Pictures here are files, for which no backend is needed; for others it is the one that was asked for, if there is.
+    """
+    backend = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
+    try:
+        import matplotlib
+    finally:
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+    if backend:
+        with suppress(ValueError):
+            matplotlib.rcParams["backend"] = backend
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep matplotlib from talking about its caches, which it makes elsewhere where the home folder is read-only."""
+    logger = logging.getLogger("matplotlib")
+    before = logger.level
+    if before == logging.NOTSET:
+        logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 @contextmanager
 def styled() -> Iterator[None]:
     """The style of all pictures, whatever matplotlib's own settings; to draw and to save in. Raises PlotError."""
     require()
-    from matplotlib import figure, style  # noqa: F401  # all that copies of this process would each import
-    from matplotlib.backends import backend_svg  # noqa: F401
+    with _quiet():
+        from matplotlib import figure, style  # noqa: F401  # all that copies of this process would each import
+        from matplotlib.backends import backend_svg  # noqa: F401
 
-    with style.context(["default", STYLE]):
-        yield
+        with style.context(["default", STYLE]):
+            yield
 
 
 def figure(width: float, height: float) -> Any:

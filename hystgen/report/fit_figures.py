@@ -53,10 +53,11 @@ class Shown:
 
     @cached_property
     def measured(self) -> Array:
-        """The measured output; NaN at outliers."""
+        """The measured output; NaN where it is faulty."""
         assert self.record.y is not None
         y = np.array(self.record.y)
         y[self.used.outliers] = np.nan
+        y[self.used.stretches] = np.nan
         return y
 
     @cached_property
@@ -160,7 +161,7 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
     t = each.time
     step = each.record.sample_time
     masked = np.zeros(each.used.samples + 2, dtype=np.int8)
-    for found in (each.used.skipped, each.used.ignored, each.used.left_out):
+    for found in (each.used.skipped, each.used.ignored, each.used.stretches, each.used.left_out):
         masked[found + 1] = 1
     starts, ends = np.flatnonzero(np.diff(masked) == 1), np.flatnonzero(np.diff(masked) == -1)
     for k, (a, b) in enumerate(zip(starts, ends, strict=True)):

@@ -169,7 +169,7 @@ def _table(fit: Fit) -> list[Text | Table | Listing]:
 def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
     head = (
         "record", "part", "samples", "compared", "start, as asked", "start, memory unknown", "outliers of y",
-        "v bridged", "gaps", "left out between gaps",
+        "faulty stretches of y", "v bridged", "gaps", "left out between gaps",
     )  # fmt: skip
     rows = [
         (
@@ -191,9 +191,10 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
         Table([head, *rows], (0, 1)),
         Text(
             "Not compared are samples at the start, before the drive has wiped an unknown memory, and outliers of y: "
-            "isolated samples far from their neighbours. Isolated samples of v that y takes no notice of are bridged "
-            "by a straight line. A record is cut at gaps, behind which the memory is unknown again; every part has a "
-            "free offset."
+            "isolated samples far from their neighbours. Nor are faulty stretches: drop-outs, samples that are held "
+            "while the drive moves, a converter at its end. Isolated samples of v that y takes no notice of are "
+            "bridged by a straight line. A record is cut at gaps, behind which the memory is unknown again; every part "
+            "has a free offset."
         ),
     ]
     return [*blocks, Text("On reading:"), Listing(notes)] if notes else blocks
@@ -202,10 +203,8 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
 def _masks(each: Shown) -> tuple[Sequence[int], ...]:
     """What is counted of a record, in the order of the table."""
     used = each.used
-    return tuple(
-        found.tolist()
-        for found in (used.skipped, used.ignored, used.outliers, used.bridged, used.gaps, used.left_out)
-    )
+    outputs = used.skipped, used.ignored, used.outliers, used.stretches
+    return tuple(found.tolist() for found in (*outputs, used.bridged, used.gaps, used.left_out))
 
 
 def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
@@ -295,13 +294,14 @@ def _loop_alt(fit: Fit, shown: Sequence[Shown]) -> str:
 def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
     said = []
     for each in fit_figures.drawn_ones(shown):
-        skipped, ignored, outliers, bridged, gaps, left_out = map(len, _masks(each))
+        skipped, ignored, outliers, stretches, bridged, gaps, left_out = map(len, _masks(each))
         counts = [
             counted(skipped + ignored, "sample") + " ignored at the start",
             counted(outliers, "outlier"),
             counted(bridged, "bridged drive sample"),
             counted(gaps, "gap"),
         ]
+        counts += [counted(stretches, "sample") + " in faulty stretches"] if stretches else []
         counts += [counted(left_out, "sample") + " left out between gaps"] if left_out else []
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (

@@ -12,6 +12,7 @@ import numpy as np
 from hystgen.api import Model
 from hystgen.report import drawing, fit_figures
 from hystgen.report.drawing import PlotError, label
+from hystgen.writing import write_atomically
 
 if TYPE_CHECKING:
     from hystgen.identification import Fit
@@ -32,14 +33,7 @@ def check_path(path: str | os.PathLike[str]) -> None:
 
 def _save(figure: Any, path: str | os.PathLike[str]) -> None:
     check_path(path)
-    target = Path(path)
-    kind = target.suffix.lower()
-    staging = target.with_name(f".{target.name}.part{kind}")
-    try:
-        staging.write_bytes(drawing.content(figure, kind[1:]))
-        os.replace(staging, target)
-    finally:
-        staging.unlink(missing_ok=True)
+    write_atomically(path, drawing.content(figure, Path(path).suffix.lower()[1:]))
 
 
 def show_model(model: Model, path: str | os.PathLike[str]) -> None:

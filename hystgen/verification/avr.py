@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
-from hystgen.emission import module
+from hystgen.emission import cost, module
 from hystgen.verification import compilers
 from hystgen.verification.emulator import EmulatorError
 from hystgen.verification.report import Row, failed, selftest
@@ -19,43 +20,120 @@ from hystgen.verification.targets import Board
 SECONDS = 120
 HERTZ = "16000000"  # simavr asks for a clock; the firmware needs none
 TELLS = "selftest returned"
+STACK = 512  # bytes for the firmware's stack and serial port; filling up the RAM, two branches in q31 failed below 264
+CONSTANTS = (".data", ".rodata")  # both lie in RAM, and in flash with what fills it at the start
+
+
+@dataclass(frozen=True)
+class Size:
+    """Number of plays of a model, and the memory that it should take."""
+
+    plays: int
+    memory: cost.Memory
+
+
+@dataclass(frozen=True)
+class Built:
+    """Object files, and as measured: bytes of flash of the module, of its constants, of an instance of each operator,
+    and of RAM of module and self-test."""
+
+    objects: tuple[Path, ...]
+    flash: int
+    constants: int
+    instances: int
+    with_selftest: int
+
+    @property
+    def ram(self) -> int:
+        """Bytes of RAM that the module and its instances take."""
+        return self.constants + self.instances
 
 
 def rows(
-    board: Board, sources: Sources, compiler: Sequence[str], folder: Path, progress: Callable[[str], None]
+    board: Board,
+    sources: Sources,
+    size: Size | None,
+    compiler: Sequence[str],
+    folder: Path,
+    progress: Callable[[str], None],
 ) -> list[Row]:
-    """One row: what the self-test says on the emulated board."""
+    """One row: what the self-test says on the emulated board, and what the module takes of its memory.
+
+    `size`: what a model that is too large for the board is measured by; None where it cannot be built for one.
+    """
     if compiler and "gcc" not in compiler:
         words = f"does not build for {board.name}; use gcc"
         return [Row(board.name, each, "-", "-", error=f"{each} {words}") for each in compiler]
     row = Row(board.name, "gcc", "firmware", "selftest")
-    missing = [command for command in (board.gcc, board.simulator) if shutil.which(command) is None]
+    missing = [command for command in (board.gcc, board.size, board.simulator) if shutil.which(command) is None]
     if missing:
         return [failed(row, f"{' and '.join(missing)} not installed")]
     progress(f"{board.name}, gcc, firmware on {board.simulator}")
     try:
-        return [selftest(row, sources.name, run(board, build(board, sources, folder / board.name)))]
+        built = build(board, sources, folder / board.name)
+        row = replace(row, flash=built.flash, ram=built.ram)
+        if size is not None and max(built.ram, built.with_selftest + STACK) > board.ram:
+            return [replace(row, error=_too_large(board, built, size))]
+        words = f"RAM has the {built.constants} bytes of constants, which lie there on an AVR"
+        row = replace(row, note=f"{words}, and an instance of each operator")
+        result = run(board, link(board, sources, built.objects, folder / board.name))
+        return [selftest(row, sources.name, result)]
     except (compilers.CompileError, EmulatorError) as error:
-        return [failed(row, error)]
+        return [replace(row, error=str(error))]
 
 
-def build(board: Board, sources: Sources, folder: Path) -> Path:
-    """Compile and link the firmware in the new folder `folder`. Raises CompileError.
+def _too_large(board: Board, built: Built, size: Size) -> str:
+    if built.ram <= board.ram:
+        return (
+            f"the self-test does not fit: with the module it takes {built.with_selftest} of {board.ram} bytes of RAM, "
+            f"and {STACK} are for the stack; the module alone takes {built.ram}"
+        )
+    fit = size.plays - -(-(built.ram - board.ram) // size.memory.play)
+    return (
+        f"{built.ram} bytes of RAM are needed, {built.constants} of them for constants, which lie in RAM on an AVR; "
+        f"{board.name} has {board.ram}: at {size.memory.play} bytes for each play not more than {fit} of the "
+        f"{size.plays} plays fit, fewer beside a stack and other firmware; reduce the plays, or emit one operator"
+    )
 
-    The emitted files have to be clean under the warnings of the host; the main, which is never shipped, need not be.
-    """
+
+def _gcc(board: Board) -> compilers.Compiler:
+    return compilers.Compiler("gcc", (board.gcc, *board.gcc_flags))
+
+
+def build(board: Board, sources: Sources, folder: Path) -> Built:
+    """Compile the emitted files in the new folder `folder`, with the warnings of the host. Raises CompileError."""
     folder.mkdir(parents=True)
+    gcc = _gcc(board)
+    objects = {source: folder / f"{source.stem}.o" for source in sources.emitted}
+    for source, output in objects.items():
+        gcc.object(source, output, compilers.USER)
+    instances = folder / "instances.c"
+    lines = [f'#include "{sources.name}.h"', *(f"{sources.name}_{op}_t hystgen_{op};" for op in sources.operators)]
+    instances.write_text("\n".join(lines) + "\n", encoding="ascii")
+    include = f"-I{sources.harness.parent}"
+    gcc.run([*compilers.USER, "-fno-common", include, "-c", "-o", folder / "instances.o", instances])
+    parts = sections(board, [objects[source] for source in sources.module])
+    constants = sum(size for name, size in parts if name.startswith(CONSTANTS))
+    flash = constants + sum(size for name, size in parts if name.startswith((".text", ".progmem")))
+    taken = sum(size for name, size in sections(board, [folder / "instances.o"]) if name.startswith(".bss"))
+    whole = sections(board, objects.values())
+    with_selftest = sum(size for name, size in whole if name.startswith((*CONSTANTS, ".bss")))
+    return Built(tuple(objects.values()), flash, constants, taken, with_selftest)
+
+
+def sections(board: Board, objects: Iterable[Path]) -> list[tuple[str, int]]:
+    """Names and sizes of all sections of object files."""
+    done = subprocess.run([board.size, "-A", *objects], capture_output=True, text=True, check=True)
+    return [(name, int(size)) for name, size in re.findall(r"^(\.\S+)\s+(\d+)\s", done.stdout, flags=re.MULTILINE)]
+
+
+def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) -> Path:
+    """Link a firmware in `folder`, its main, which is never shipped, compiled without warnings. Raises CompileError."""
     main = folder / "firmware.c"
     values = SimpleNamespace(name=sources.name, tells=TELLS)
     main.write_text(module.render("firmware_avr.c.j2", values), encoding="ascii")
-    gcc = compilers.Compiler("gcc", (board.gcc, *board.gcc_flags))
-    objects = []
-    for source in sources.emitted:
-        output = folder / f"{source.stem}.o"
-        gcc.object(source, output, compilers.USER)
-        objects.append(output)
     image = folder / "firmware.elf"
-    gcc.run([*compilers.USER, f"-I{sources.harness.parent}", "-o", image, main, *objects])
+    _gcc(board).run([*compilers.USER, f"-I{sources.harness.parent}", "-o", image, main, *objects])
     return image
 
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import functools
 import importlib.util
+import os
 import platform
+import shlex
 import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from hystgen import writing
 
 WARNINGS = [
     "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow", "-Wundef",
@@ -39,10 +45,15 @@ class Compiler:
     command: tuple[str, ...]
 
     def run(self, arguments: Sequence[str | Path]) -> None:
-        """Run the compiler. Raises CompileError with what it printed."""
-        done = subprocess.run(
-            [*self.command, *map(str, arguments)], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
-        )
+        """Run the compiler; its temporary files go where its output goes. Raises CompileError with what it printed."""
+        folder = Path(arguments[list(arguments).index("-o") + 1]).parent
+        try:
+            done = subprocess.run(
+                [*self.command, *map(str, arguments)], capture_output=True, encoding="utf-8", errors="replace",
+                check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
+            )  # fmt: skip
+        except OSError as failure:
+            raise CompileError(f"{self.name} cannot be started: {failure.strerror}") from None
         if done.returncode:
             raise CompileError(f"{self.name} failed:\n{(done.stderr or done.stdout).strip()}")
 
@@ -57,14 +68,47 @@ class Compiler:
 
 @functools.cache
 def find(name: str) -> Compiler | None:
-    """The compiler of that name, or None where it is not installed."""
-    if name == "zig":
+    """The compiler of that name, or None where it is not installed.
+
+    Any other name is a command as a shell takes it, words and quotes: `ccache gcc`, `gcc -m32`. Raises ValueError for a
+    quote that is not closed, and for no command at all.
+    """
+    if name.split() in (["zig"], ["zig", "cc"]):
         if importlib.util.find_spec("ziglang"):
             return Compiler("zig", (sys.executable, "-m", "ziglang", "cc"))
         path = shutil.which("zig")
         return Compiler("zig", (path, "cc")) if path else None
-    path = shutil.which(name)
-    return Compiler(name, (path,)) if path else None
+    path = shutil.which(name)  # first as it stands: a path may have spaces
+    if path:
+        return Compiler(name, (path,))
+    try:
+        words = shlex.split(name)
+    except ValueError as failure:
+        raise ValueError(f"the compiler {name!r} is no command: {failure}; correct it") from None
+    if not words:
+        raise ValueError("a compiler is named by a command; write gcc, clang, zig or another")
+    path = shutil.which(words[0])
+    return Compiler(name, (path, *words[1:])) if path else None
+
+
+def missing(name: str) -> str:
+    """What is not installed where `find` finds nothing."""
+    return f"{shlex.split(name)[0]} is not installed"
+
+
+@functools.cache
+def _own(name: str) -> dict[str, str]:
+    """Environment that a compiler needs; zig a folder for what it builds, if the home folder cannot have it."""
+    if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
+        return {}
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    while not os.path.exists(home):  # it would be made
+        home = os.path.dirname(home) or "."
+    if os.path.isdir(home) and os.access(home, os.W_OK | os.X_OK):
+        return {}
+    instead = contextlib.ExitStack()
+    atexit.register(instead.close)
+    return {"ZIG_GLOBAL_CACHE_DIR": str(instead.enter_context(writing.temporary()))}
 
 
 def available() -> list[Compiler]:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
+from hystgen import extras
 from hystgen.emission import module
 from hystgen.verification import compilers
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Target
 
-WHEELS = "pip install 'hystgen[targets]'"
+EXTRA = "targets"
 NAMES = ("zig", "gcc")
 
 # Flags of every firmware: no hosted library, no unwind tables
@@ -89,7 +90,7 @@ def find(target: Target, name: str) -> CrossCompiler:
     if name == "zig":
         found = compilers.find("zig")
         if found is None:
-            raise MissingError(f"zig is not installed: {WHEELS}")
+            raise MissingError(f"zig is not installed: {extras.install(EXTRA)}")
         return CrossCompiler(found, target.zig, ())
     if name == "gcc":
         path = shutil.which(target.gcc)
@@ -115,7 +116,7 @@ def wheel_problem() -> str:
     wheels = {"unicorn": "unicorn", "elftools": "pyelftools"}
     missing = [wheel for package, wheel in wheels.items() if importlib.util.find_spec(package) is None]
     if missing:
-        return f"{', '.join(missing)} not installed: {WHEELS}"
+        return f"{', '.join(missing)} not installed: {extras.install(EXTRA)}"
     for package, wheel in wheels.items():
         try:
             importlib.import_module(package)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import reference
+from hystgen import extras, reference, writing
 from hystgen.emission import runtime
 from hystgen.reference import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.cross import Layout
+from hystgen.verification.loading import LoadError, load
 from hystgen.verification.targets import Target
 
 RECORDS = 0x6000_0000  # where the arrays of a record are put
@@ -84,15 +84,18 @@ def _hook() -> Any:
     """The counting hook as machine code of this machine. Raises EmulatorError."""
     found = compilers.available()
     if not found:
-        raise EmulatorError("no C compiler for this machine; install gcc or clang, or: pip install 'hystgen[zig]'")
+        raise EmulatorError(f"no C compiler for this machine; install gcc or clang, or: {extras.install('zig')}")
     source = runtime.data_folder("templates") / "instruction_counter.c"
-    with tempfile.TemporaryDirectory(prefix="hystgen-counter-", ignore_cleanup_errors=True) as folder:
-        library = Path(folder) / "instruction_counter.so"
+    with writing.temporary() as folder:
+        library = folder / "instruction_counter.so"
         try:
             found[0].shared_library([source], library, compilers.STRICT)
         except compilers.CompileError as error:
             raise EmulatorError(f"the instruction counter: {error}") from None
-        return ctypes.CDLL(str(library)).hystgen_count_instruction
+        try:
+            return load(library, ctypes.CDLL).hystgen_count_instruction
+        except LoadError as error:
+            raise EmulatorError(f"the instruction counter: {error}") from None
 
 
 @dataclass(frozen=True)

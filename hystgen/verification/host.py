@@ -11,9 +11,11 @@ import cffi
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import extras
 from hystgen.reference import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.comparison import Expected, compare
+from hystgen.verification.loading import LoadError, load
 from hystgen.verification.report import Row
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import HOST
@@ -36,7 +38,7 @@ class _Library:
                 f"void hystgen_harness_{op}(const unsigned char *call, const {self._real} *x, {self._real} *answer,"
                 " unsigned char *status, size_t count);"
             )
-        self._lib = self._ffi.dlopen(str(path))
+        self._lib = load(path, self._ffi.dlopen)
 
     def selftest(self) -> int:
         return int(getattr(self._lib, self._selftest)())
@@ -71,22 +73,22 @@ def rows(
     """One row an operator, compiler and build; compilers: those named, else all that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
-        message = "no C compiler found; install gcc or clang, or: pip install 'hystgen[zig]'"
+        message = f"no C compiler found; install gcc or clang, or: {extras.install('zig')}"
         yield Row(HOST, "-", "-", "-", error=message)
         return
     for number, (name, found) in enumerate(chosen):
         for build, flags in BUILDS:
             progress(f"{name} {build}")
             if found is None:
-                yield Row(HOST, name, build, "-", error=f"{name} is not installed")
+                yield Row(HOST, name, build, "-", error=compilers.missing(name))
                 continue
             output = folder / f"{number}-{build}.so"
             try:
                 found.shared_library(sources.all, output, flags)
-            except compilers.CompileError as error:
+                library = _Library(output, sources, dtype)
+            except (compilers.CompileError, LoadError) as error:
                 yield Row(HOST, name, build, "-", error=str(error))
                 continue
-            library = _Library(output, sources, dtype)
             for op in sources.operators:
                 outcome = compare(functools.partial(library.run, op), records(op))
                 yield Row(HOST, name, build, op, **vars(outcome), ram=library.size(op))

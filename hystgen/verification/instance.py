@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import cffi
 
+from hystgen import extras, writing
 from hystgen.api import Model
 from hystgen.emission import module, runtime
 from hystgen.verification import compilers, sources
+from hystgen.verification.loading import load
 
 
 class Instance:
@@ -18,7 +18,7 @@ class Instance:
 
     `options`: one operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is installed; it is called as a
     user calls it, in its default dialect. The files lie in a temporary folder. Raises CompileError, also where there
-    is no compiler, and ValueError for another name.
+    is no compiler, LoadError, and ValueError for another name.
     """
 
     def __init__(self, model: Model, options: module.Options, compiler: str | None = None) -> None:
@@ -27,7 +27,7 @@ class Instance:
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
         if chosen is None:
             missing = f"{compiler} is not installed" if compiler else "no C compiler found"
-            raise compilers.CompileError(f"{missing}; install gcc or clang, or: pip install 'hystgen[zig]'")
+            raise compilers.CompileError(f"{missing}; install gcc or clang, or: {extras.install('zig')}")
         name, op = model.name, options.operator
         real = runtime.FAMILIES[options.arithmetic].real
         self._ffi = cffi.FFI()
@@ -36,11 +36,11 @@ class Instance:
             f"{real} {name}_{op}_step(void *, {real});"
         )
         # What is loaded stays so without its file; only Windows keeps the file until then
-        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            library = Path(folder) / "instance.so"
-            written = sources.write(Path(folder), model, options)
+        with writing.temporary() as folder:
+            library = folder / "instance.so"
+            written = sources.write(folder, model, options)
             chosen.shared_library([*written.module, written.harness], library, compilers.USER)
-            self._library = self._ffi.dlopen(str(library))
+            self._library = load(library, self._ffi.dlopen)
         size = getattr(self._library, f"hystgen_harness_{op}_size")()
         self._context = self._ffi.new("long long[]", size // 8 + 1)
         self._init = getattr(self._library, f"{name}_{op}_init")

@@ -15,7 +15,8 @@ class Row:
     Instructions are those of a call of `step`, from its first to its return, over the samples compared. `flash` are the
     bytes of code and constants of the emitted module, `library` those of what the compiler linked to it (soft float,
     and whatever else the image called), `ram` the size of an instance, `stack` the bytes below the caller's frame that
-    the deepest call used, as measured.
+    the deepest call used, as measured. On an AVR, where constants lie in RAM, `ram` has them too, beside an instance of
+    each operator. `note`: what to know about the figures.
     """
 
     target: str
@@ -32,6 +33,7 @@ class Row:
     library: int | None = None
     ram: int | None = None
     stack: int | None = None
+    note: str = ""
     error: str = ""
 
     @property
@@ -110,8 +112,9 @@ class Report:
             width = max(map(len, words))
             texts.append([word.rjust(width) if name in _RIGHT else word.ljust(width) for word in words])
         lines = ["  ".join(line).rstrip() for line in zip(*texts, strict=True)]
+        notes = [f"\n{row.target}: {row.note}" for row in self.rows if row.note]
         details = [f"\n{r.target} {r.compiler} {r.build}: {r.error}" for r in self.rows if "\n" in r.error]
-        return "\n".join(lines + details)
+        return "\n".join(lines + notes + details)
 
     def to_json(self) -> str:
         """The report for programs."""
@@ -132,8 +135,9 @@ class Report:
             )
             if not row.ok:
                 ElementTree.SubElement(case, "failure", message=row.verdict).text = row.error or row.verdict
-            elif row.max_instructions is not None:
+            elif row.flash is not None:
                 properties = ElementTree.SubElement(case, "properties")
-                for key in ("mean_instructions", "max_instructions", "flash", "library", "ram", "stack"):
+                keys = ("mean_instructions", "max_instructions", "flash", "library", "ram", "stack")
+                for key in (key for key in keys if getattr(row, key) is not None):
                     ElementTree.SubElement(properties, "property", name=key, value=str(getattr(row, key)))
         return ElementTree.tostring(suite, encoding="unicode") + "\n"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import functools
-import tempfile
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
+from hystgen import arguments, writing
 from hystgen.api import Model, emit_options
+from hystgen.emission import module
 from hystgen.verification import avr, cores, host, sources
 from hystgen.verification.comparison import REALS, Expected, expected_records
 from hystgen.verification.report import Report
@@ -35,28 +35,33 @@ def verify_model(
     the emitted self-test alone. What is named twice is done once. A compiler or target that is asked for and missing is
     a failed row. Raises what `emit` raises, and ValueError for a target that does not exist.
     """
+    compiler = tuple(dict.fromkeys(arguments.words("compiler", compiler, "gcc")))
+    targets = tuple(dict.fromkeys(arguments.words("targets", targets, HOST)))
+    arguments.whole("length", length, "calls", 1)
+    if target_length is not None:
+        arguments.whole("target_length", target_length, "calls", 1)
     options = emit_options(model, operator, arithmetic, engine, layout)
     numbers = model.tables(options.arithmetic, options.engine)
     real = REALS[options.arithmetic]
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
-    chosen = [known[name] if name in known else find(name) for name in dict.fromkeys(targets)]
-    compiler = tuple(dict.fromkeys(compiler))
+    chosen = [known[name] if name in known else find(name) for name in targets]
 
     @functools.cache
     def records(length: int, op: str) -> list[Expected]:
         progress(f"reference, {op}")
         return expected_records(numbers, real, op == "inverse", length)
 
-    with tempfile.TemporaryDirectory(prefix="hystgen-verify-") as name:
-        folder = Path(name)
+    with writing.temporary() as folder:
         written = sources.write(folder, model, options)
         for target in chosen:
             if target is None:
                 wanted = functools.partial(records, length)
                 report.rows.extend(host.rows(written, wanted, real, compiler, folder, progress))
             elif isinstance(target, Board):
-                report.rows.extend(avr.rows(target, written, compiler, folder, progress))
+                memory = module.cost_of(model.parameters, model.cascade, options).avr
+                size = None if memory is None else avr.Size(model.cascade.pi.n, memory)
+                report.rows.extend(avr.rows(target, written, size, compiler, folder, progress))
             else:
                 wanted = functools.partial(records, target_length or target.calls)
                 report.rows.extend(cores.rows(target, written, wanted, compiler, folder, progress))

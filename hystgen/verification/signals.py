@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from hystgen import compiled, fixed, reference
 from hystgen.fixed import FixedTables
 from hystgen.reference import Bytes
+from hystgen.verification import kinks
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
 
@@ -166,6 +167,11 @@ def _suite(
     if len(bends) > 0:
         generator = np.random.default_rng(20220918)
         yield record("onto the bends", _onto_the_bends(bends, bit, tables, inverse, length, generator))
+
+    generator = np.random.default_rng(20220919)
+    path = kinks.path(tables, real_type, min(length, kinks.POINTS), generator)
+    odd_ones = np.array([low, high] if whole else [np.nan, np.inf, low, high])
+    yield "from kink to kink", *kinks.along(path, bit, inverse, odd_ones, length, generator)
 
     if whole:
         most = float(np.iinfo(real_type).max)

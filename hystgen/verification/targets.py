@@ -39,13 +39,15 @@ class Target:
 class Board:
     """A controller whose core the emulator of `Target` lacks: gcc alone builds, another emulator runs a firmware.
 
-    Of 8 bits, with an `int` of 16: what an expression owes to a wider one shows there.
+    Of 8 bits, with an `int` of 16: what an expression owes to a wider one shows there. `ram` in bytes.
     """
 
     name: str
     gcc: str
     gcc_flags: tuple[str, ...]
     simulator: str
+    size: str  # the command that lists the sections of an object file
+    ram: int
 
 
 ARM_GCC, RISCV_GCC = "arm-none-eabi-gcc", "riscv64-unknown-elf-gcc"
@@ -90,7 +92,7 @@ TARGETS = (
     ),
 )  # fmt: skip
 
-AVR = Board("atmega1284p", "avr-gcc", ("-mmcu=atmega1284p",), "simavr")
+AVR = Board("atmega1284p", "avr-gcc", ("-mmcu=atmega1284p",), "simavr", "avr-size", 0x4000)
 
 NAMES = (HOST, *(target.name for target in TARGETS), AVR.name)
 

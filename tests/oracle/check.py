@@ -305,13 +305,26 @@ class Tally:
         self.same_branch = max(self.same_branch, r.worst_same_branch)
 
 
+class EmitError(Exception):
+    """Neither C nor a refusal: `finding` says what was raised."""
+
+    def __init__(self, case: Case, error: Exception) -> None:
+        super().__init__(str(error))
+        said = f"emit raised {type(error).__name__}: {error}"
+        self.finding = Finding(case, "emit", Result(wrong=1, message=said.encode()[:399]))
+
+
 def drawn(seed: int, arithmetic: str, engine: str, folder: Path, tally: Tally) -> Case:
-    """The first model of a seed that the package accepts, emitted into `folder`."""
+    """The first model of a seed that the package accepts, emitted into `folder`. Raises EmitError."""
     for attempt in range(MOST_TRIES):
         rng = np.random.default_rng([seed, attempt])
         name = f"m{seed}"
         case = Case(name, models.text(models.parameters(rng, arithmetic, name)), arithmetic, engine, seed)
-        if (made := emit(case, folder)) is not None:
+        try:
+            made = emit(case, folder)
+        except Exception as error:
+            raise EmitError(case, error) from error
+        if made is not None:
             return made
         tally.refused += 1
     raise AssertionError(f"{MOST_TRIES} models of seed {seed} were refused in {arithmetic}")
@@ -329,8 +342,11 @@ def run(
             cases = []
             for seed in range(start, min(start + BATCH, first + count)):
                 combination = combinations[seed % len(combinations)]
-                cases.append(drawn(seed, *combination, Path(name), tallies[combination]))
                 tallies[combination].models += 1
+                try:
+                    cases.append(drawn(seed, *combination, Path(name), tallies[combination]))
+                except EmitError as error:
+                    faults.append(error.finding)
             for finding in follow(cases, Path(name), calls, shrink):
                 tally = tallies[finding.case.arithmetic, finding.case.engine]
                 tally.add(finding)
@@ -364,7 +380,7 @@ def keep(faults: list[Finding], folder: Path) -> list[str]:
         case, r = finding.case, finding.result
         stem = f"{case.name}_{case.arithmetic}_{case.engine}_{finding.operator}"
         (folder / f"{stem}.yaml").write_text(case.yaml)
-        calls = trace(case, finding.operator, r.first + 1)
+        calls = [] if finding.operator == "emit" else trace(case, finding.operator, r.first + 1)
         words = ("init", "reset", "step", "commit")
         lines = [f"{words[call.call]},{call.x!r},{call.answer!r}" for call in calls]
         (folder / f"{stem}.csv").write_text("\n".join(["call,argument,answer", *lines]) + "\n")

@@ -32,7 +32,13 @@ def parameters(rng: Generator, arithmetic: str, name: str) -> dict[str, Any]:
     _scale(model, unit_in, unit_out)
     if offset:
         model["output_offset"] = offset * unit_out
-    return {"hystgen": 1, "name": name, "input_range": [low * unit_in, high * unit_in], "model": model}
+    made: dict[str, Any] = {
+        "hystgen": 1, "name": name, "input_range": [low * unit_in, high * unit_in], "model": model,
+    }  # fmt: skip
+    if fixed and rng.random() < 0.2:  # coarser than has to be
+        codes = (2**31 - 1) if arithmetic == "q31" else (2**15 - 1)
+        made["emit"] = {"drive_lsb": max(map(abs, made["input_range"])) / codes * 10.0 ** rng.uniform(0.01, 1.5)}
+    return made
 
 
 def _range(rng: Generator, fixed: bool) -> tuple[float, float]:

@@ -741,6 +741,10 @@ void oracle_forward(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
             exact = output_at(&f.c, &e, e.s[0]) + f.c.offset;
         }
         x = next_sample(&f, &e, false);
+        if (f.c.branches && !e.moved && choice(&f, 2) == 0) { /* right beside the drive that the start memory stands for */
+            x = neighbour(&f.c, coded(&f.c, drive_inside(&f.c, e.applied), p->drive_lsb), choice(&f, 3) - 1);
+            x = p->kind == ORACLE_FIXED ? fmin(fmax(x, p->drive_min), p->drive_max) : x;
+        }
         if (call != ORACLE_INIT && isfinite(x)
             && uncertain_start(&f.c, &e, physical(&f.c, x, p->drive_lsb), about_a_double(&f.c))) {
             x = p->drive_min + p->drive_max - x;
@@ -809,6 +813,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
     bool known = true;  /* which branch a drive so near to the start has moved on */
     bool often = false;
     bool agreed = true; /* `own` and the module have moved on the same branches */
+    bool same = true, same_own = true; /* `sent`, `own` and the module have given the last answer on the same branch */
     prepare(&f, m, p, seed, r);
     sent = memory(&f.c);
     own = memory(&f.c);
@@ -822,7 +827,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         double x, answer = 0;
         unsigned status;
         quad at, exact, exact_own, ignored, v;
-        bool up, up_own, fresh, moved_up, same;
+        bool up, up_own, fresh, moved_up;
         if (call == ORACLE_COMMIT) {
             x = rounded(c, choice(&f, 6) && isfinite((double)sent.pending)
                     ? neighbour(c, coded(c, sent.pending, p->drive_lsb), few(&f)) : some_drive(&f, &sent));
@@ -854,7 +859,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         if (call != ORACLE_STEP) {
             begin(c, &sent, call == ORACLE_RESET);
             begin(c, &own, call == ORACLE_RESET);
-            known = agreed = true;
+            known = agreed = same = same_own = true;
         }
         if (sent.has_pending) {
             known = known && !uncertain_start(c, &sent, sent.pending, about_a_number(c));
@@ -889,7 +894,10 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         }
         v = answer * (quad)p->drive_lsb;
         moved_up = v > sent.applied ? true : v < sent.applied ? false : sent.ascending;
-        same = known && !uncertain_start(c, &sent, v, about_a_number(c)) && (!fresh || moved_up == up);
+        if (fresh) { /* else it is the last answer once more */
+            same = known && !uncertain_start(c, &sent, v, about_a_number(c)) && moved_up == up;
+            same_own = same && up == up_own;
+        }
         sent.answer = sent.pending = v; /* what the actuator sees */
         if (call == ORACLE_RESET) {
             known = known && !uncertain_start(c, &sent, v, about_a_number(c));
@@ -922,7 +930,7 @@ void oracle_inverse(const oracle_model_t *m, const oracle_probe_t *p, uint64_t s
         if (c->branches && same) {
             judge(r, k, "inverse, memory as sent, same branch", v, exact, rounding, &r->over_same_branch,
                 &r->worst_same_branch);
-            if (agreed && (!fresh || up == up_own)) {
+            if (agreed && same_own) {
                 judge(r, k, "inverse, own memory, same branches", v, exact_own, rounding, &r->over_same_branch,
                     &r->worst_same_branch);
             }

@@ -1,0 +1,134 @@
+"""What the command line does about the terminal, pipe or file behind it, and about the signals that end a process."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import click
+
+ENDING = ("SIGTERM", "SIGHUP")
+"""Signals, by the names that the system may have, by which others end a process and expect it to clean up first."""
+
+
+class OutputError(click.ClickException):
+    """Standard output that cannot be written, as on a full disk."""
+
+    exit_code = 2
+
+    def __init__(self, failure: OSError) -> None:
+        super().__init__(f"standard output cannot be written: {failure.strerror}; free some space or write elsewhere")
+        _discard(sys.stdout)
+
+    def show(self, file: Any = None) -> None:
+        """Print the message in the words of all others."""
+        note(f"error: {self.message}", file)
+
+
+def say(result: str | bytes) -> None:
+    """Print a line, or data as they are, on standard output.
+
+    Raises OutputError, and BrokenPipeError where nobody reads any more.
+    """
+    with _output():
+        click.echo(result, nl=isinstance(result, str))
+
+
+def note(words: str, file: Any = None) -> None:
+    """Print talk on standard error, as far as it can be written; nothing depends on it."""
+    try:
+        click.echo(words, file=file, err=True)
+    except OSError:
+        _discard(sys.stderr)
+
+
+@contextlib.contextmanager
+def _output() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as failure:
+        if failure.filename:
+            raise
+        raise OutputError(failure) from None
+
+
+def _discard(stream: Any) -> None:
+    """Have what is left for a stream thrown away, else the interpreter tries once more when it ends."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
+
+
+class Commands(click.Group):
+    """A command line that ends in good order, whatever is behind its output and whoever ends it.
+
+    SIGTERM and SIGHUP end it as an exception does, so that nothing unfinished is left behind, with the exit code of a
+    process that the signal ended. A character that the terminal's code page lacks is written as an escape.
+    """
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run the command that the words name, and exit."""
+        with _ended_by_signals(), _any_character():
+            try:
+                return super().main(*arguments, **options)
+            except OSError as failure:
+                if failure.filename:
+                    raise
+                _discard(sys.stderr)  # a message of click's own could not be written
+                sys.exit(2)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; an error of the system that is not caught there comes of the output."""
+        with _output():
+            return super().invoke(ctx)
+
+    def make_context(self, *arguments: Any, **options: Any) -> click.Context:
+        """Parse the words; help is printed here."""
+        with _output():
+            return super().make_context(*arguments, **options)
+
+
+@contextlib.contextmanager
+def _any_character() -> Iterator[None]:
+    changed = []
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
+            changed.append(stream)
+    try:
+        yield
+    finally:
+        for stream in changed:
+            with contextlib.suppress(OSError, ValueError):
+                stream.reconfigure(errors="strict")
+
+
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Raise SystemExit at the signals of ENDING, unless they are ignored (nohup) or somebody else's."""
+    before: dict[signal.Signals, Any] = {}
+
+    def end(number: int, _: Any) -> None:
+        for each in before:
+            signal.signal(each, signal.SIG_IGN)  # once is enough; a second one would stop the clearing up
+        raise SystemExit(128 + number)
+
+    if threading.current_thread() is threading.main_thread():
+        for name in ENDING:
+            found = getattr(signal, name, None)
+            if found is not None and signal.getsignal(found) == signal.SIG_DFL:
+                before[found] = signal.signal(found, end)
+    try:
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)

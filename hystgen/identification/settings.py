@@ -1,0 +1,83 @@
+"""What a fit takes over from the parameter file that it replaces: whatever no record can tell."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hystgen.identification.fit import Fit
+
+KEPT = ("description", "sample_time", "emit")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of an older parameter file.
+
+    `values`: those of KEPT that it has; `name` and `units`, which stand where neither the user nor the records give
+    any; `effects`: names of its effects, which went with its weights; `problem`: why nothing could be read.
+    """
+
+    file: str = ""
+    values: Mapping[str, Any] = field(default_factory=dict)
+    name: str | None = None
+    units: Mapping[str, str] | None = None
+    effects: tuple[str, ...] = ()
+    problem: str = ""
+
+    def on(self, fit: Fit) -> Fit:
+        """The fit with these settings in its parameters."""
+        from hystgen.params import make_parameters
+
+        data = {**fit.parameters.model_dump(), **self.values}
+        if self._gives_units(fit):
+            data["units"] = self.units
+        return replace(fit, parameters=make_parameters(data))
+
+    def sentences(self, fit: Fit) -> list[str]:
+        """What was kept of the older file and what was not; `fit` as it was before."""
+        said = []
+        if self.problem:
+            said.append(f"{self.file}: nothing of what was there is kept, it is no parameter file: {self.problem}")
+        names = [key for key in KEPT if key in self.values]
+        if self._gives_units(fit):
+            names.insert(0, "units")
+        if self.name == fit.parameters.name:
+            names.insert(0, "name")
+        if names:
+            said.append(f"{self.file}: {', '.join(names)} kept from the file that was there")
+        if self.effects:
+            said.append(
+                f"{self.file}: the effects of the file that was there ({', '.join(self.effects)}) are left out, they "
+                "were fitted with its weights; find them anew with hystgen diagnose"
+            )
+        return said
+
+    def _gives_units(self, fit: Fit) -> bool:
+        units = fit.parameters.units
+        return self.units is not None and not (units.input or units.output)
+
+
+def of(path: str | os.PathLike[str]) -> Settings:
+    """The settings of the file at `path`; none where there is no file, or an empty one."""
+    from hystgen.params import ParameterError, make_parameters, parameter_data
+
+    file = os.fspath(path)
+    if not Path(path).is_file() or not Path(path).stat().st_size:
+        return Settings()
+    try:
+        data = parameter_data(path)
+        told = {key: data[key] for key in (*KEPT, "name", "units") if data.get(key) is not None}
+        pi = {"thresholds": (0,), "weights": (1,)}
+        make_parameters({"hystgen": 1, "name": "x", "input_range": (0, 1), "model": {"pi": pi}, **told}, file)
+    except ParameterError as error:
+        return Settings(file, problem=error.problems[0].named)
+    model = data.get("model")
+    effects = model.get("effects") if isinstance(model, Mapping) else ()
+    names = tuple(str(each["name"]) for each in effects or () if isinstance(each, Mapping) and "name" in each)
+    values = {key: told[key] for key in KEPT if key in told}
+    return Settings(file, values, told.get("name"), told.get("units"), names)

@@ -1,0 +1,44 @@
+"""Loading a shared library that has just been built, also where temporary files may not be executed."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TypeVar
+
+from hystgen import writing
+
+Loaded = TypeVar("Loaded")
+
+
+class LoadError(RuntimeError):
+    """The library was built and cannot be loaded; the message says why and what to do."""
+
+
+def load(library: Path, loader: Callable[[str], Loaded]) -> Loaded:
+    """What `loader` makes of the library, which stays loaded when its file is gone. Raises LoadError.
+
+    Where its folder is mounted noexec, as temporary folders of hardened machines are, a copy elsewhere is loaded.
+    """
+    try:
+        return loader(str(library))
+    except OSError as failure:
+        reason = str(failure).partition(".  Additionally")[0]  # cffi tells of a second search, by name
+    for around in _elsewhere():
+        with contextlib.suppress(OSError), writing.staging(around) as folder:
+            return loader(str(shutil.copy(library, folder)))
+    raise LoadError(
+        f"the compiled library cannot be loaded: {reason}; if {library.parent} is on a file system mounted noexec, set "
+        "TMPDIR to a folder where programs may run"
+    )
+
+
+def _elsewhere() -> Iterator[Path]:
+    """Other folders for files of the moment."""
+    named = [os.environ.get("XDG_RUNTIME_DIR"), os.environ.get("XDG_CACHE_HOME"), os.path.expanduser("~/.cache")]
+    for place in dict.fromkeys([*filter(None, named), "/var/tmp", "/dev/shm"]):
+        if os.path.isdir(place) and os.access(place, os.W_OK | os.X_OK):
+            yield Path(place)

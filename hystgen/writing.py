@@ -1,0 +1,168 @@
+"""Files that appear complete or not at all, and folders for what is under way.
+
+Whatever is written is made in a staging folder beside its place and then renamed. The folder goes when the work ends,
+however it ends; what a killed process leaves is removed by the next one that writes to the same place. A lock in it,
+which the system releases with the process, tells the two apart.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+PREFIX = ".hystgen-"
+"""What the names of staging folders begin with."""
+
+_LOCK, _FILES = "lock", "files"
+
+_swept: set[str] = set()
+"""Folders that this process has looked through for what others left."""
+
+
+@contextlib.contextmanager
+def staging(around: Path) -> Iterator[Path]:
+    """A new, empty folder in the folder `around`, for the time of the block. Raises OSError."""
+    sweep(around)
+    place, lock = _new(around)
+    try:
+        files = place / _FILES
+        files.mkdir()
+        yield files
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+@contextlib.contextmanager
+def temporary() -> Iterator[Path]:
+    """A new, empty folder where the system keeps temporary files, for the time of the block. Raises OSError."""
+    try:
+        around = tempfile.gettempdir()
+    except FileNotFoundError:
+        raise FileNotFoundError(
+            errno.ENOENT, "no folder for temporary files can be written to; set TMPDIR to one"
+        ) from None
+    with staging(Path(around)) as folder:
+        yield folder
+
+
+def sweep(around: Path) -> None:
+    """Remove the staging folders that killed processes left in a folder, once in each process."""
+    where = os.path.realpath(around)
+    if where in _swept:
+        return
+    _swept.add(where)
+    with contextlib.suppress(OSError), os.scandir(where) as entries:
+        for entry in [each for each in entries if each.name.startswith(PREFIX)]:
+            with contextlib.suppress(OSError):
+                _remove_stale(Path(entry.path))
+
+
+def _remove_stale(place: Path) -> None:
+    """Remove a staging folder of this user that no process holds. Raises OSError where that cannot be found out."""
+    if sys.platform == "win32" or place.is_symlink() or place.stat().st_uid != os.geteuid():
+        return
+    if not set(os.listdir(place)) <= {_LOCK, _FILES}:
+        return  # somebody else's
+    lock = _hold(place)
+    if lock is not None:
+        shutil.rmtree(place, ignore_errors=True)
+        os.close(lock)
+
+
+def _new(around: Path) -> tuple[Path, int | None]:
+    """A new folder and its lock, None where the file system has none."""
+    while True:
+        place = Path(tempfile.mkdtemp(prefix=PREFIX, dir=around))
+        try:
+            lock = _hold(place)
+        except OSError:
+            return place, None
+        if lock is not None:
+            return place, lock
+        # Another process has taken it for one that was left behind, between its making and its lock
+
+
+def _hold(place: Path) -> int | None:
+    """Lock a staging folder; None where another process holds it, or is removing it. Raises OSError without locks."""
+    if sys.platform == "win32":
+        raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
+    import fcntl
+
+    path = place / _LOCK
+    try:
+        handle = os.open(path, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW, 0o600)
+    except FileNotFoundError:
+        return None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(handle), os.stat(path)):
+            return handle
+    except (BlockingIOError, FileNotFoundError):
+        pass
+    except OSError:
+        os.close(handle)
+        raise
+    os.close(handle)
+    return None
+
+
+def destination(path: str | os.PathLike[str]) -> Path:
+    """What is written for `path`: where a link leads, whether or not there is anything. Raises OSError."""
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise OSError(errno.ELOOP, "leads back to itself; choose another output", os.fspath(path))
+    return target
+
+
+def place_for(path: str | os.PathLike[str]) -> Path:
+    """`destination` of a file, whose folder is there. Raises OSError."""
+    target = destination(path)
+    if not target.parent.is_dir():
+        what = f"the folder {target.parent} does not exist; make it, or choose another output"
+        raise FileNotFoundError(errno.ENOENT, what, os.fspath(path))
+    return target
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raise the OSError that `write_atomically` would end in, found by a trial in the folder."""
+    target = place_for(path)
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
+    if not target.exists() or target.is_file():
+        try_folder(target.parent, path)
+
+
+def try_folder(folder: Path, path: str | os.PathLike[str]) -> None:
+    """Raise the OSError, with the name `path`, that writing into an existing folder would end in."""
+    try:
+        with tempfile.TemporaryFile(prefix=PREFIX, dir=folder):
+            pass
+    except OSError as failure:
+        raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None
+
+
+def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None:
+    """Write a file, text as UTF-8, so that it is either the old one or complete.
+
+    A link stays a link, and what is no regular file (a pipe, a terminal) is written to in place. Raises OSError.
+    """
+    target = place_for(path)
+    data = content.encode() if isinstance(content, str) else content
+    if target.exists() and not target.is_file():
+        target.write_bytes(data)
+        return
+    try:
+        with staging(target.parent) as folder:
+            (folder / target.name).write_bytes(data)
+            os.replace(folder / target.name, target)
+    except OSError as failure:
+        # Name the file that was asked for, not the one on the way there
+        raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None

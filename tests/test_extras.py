@@ -1,0 +1,69 @@
+"""Hints to install an extra: the command works where hystgen came from."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import shlex
+import sys
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import hystgen
+from hystgen import extras
+
+ROOT = Path(hystgen.__file__).resolve().parents[1]
+
+
+def words(extra: str) -> list[str]:
+    """The arguments of `pip install` in the hint, which begins with this Python's own pip."""
+    command = shlex.split(extras.install(extra))
+    start = command.index("install")
+    assert command[:start] in (["pip"], [sys.executable, "-m", "pip"])
+    return command[start + 1 :]
+
+
+@pytest.mark.parametrize("extra", ["plot", "formats", "zig", "targets", "fleet"])
+def test_from_a_checkout_the_checkout_is_installed(extra: str) -> None:
+    """Not a package of that name from an index, on which there may be another one or none."""
+    option, place = words(extra)
+    folder, _, named = place.rstrip("]").partition("[")
+    project = tomllib.loads((Path(folder) / "pyproject.toml").read_text())["project"]
+    assert (option, project["name"]) == ("-e", "hystgen")
+    assert named in project["optional-dependencies"]
+
+
+@pytest.mark.parametrize(("url", "expected"), [
+    (None, ["hystgen[plot]"]),
+    ({"url": "file:///home/me/my%20wheels/hystgen-0.1.0.whl", "archive_info": {}},
+     ["/home/me/my wheels/hystgen-0.1.0.whl[plot]"]),
+    ({"url": "https://example.org/h.git", "vcs_info": {"vcs": "git", "commit_id": "abc"}},
+     ["hystgen[plot] @ git+https://example.org/h.git@abc"]),
+])  # fmt: skip
+def test_else_from_where_it_was_installed(
+    url: dict[str, object] | None, expected: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As pip notes it in direct_url.json (PEP 610)."""
+    text = None if url is None else json.dumps(url)
+    monkeypatch.setattr(extras, "__file__", str(tmp_path / "site-packages" / "hystgen" / "extras.py"))
+    monkeypatch.setattr(importlib.metadata, "distribution", lambda _: SimpleNamespace(read_text=lambda _: text))
+    assert words("plot") == expected
+
+
+def test_pip_is_that_of_the_python_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pip = tmp_path / "pip"
+    pip.write_text("")
+    pip.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert extras.install("plot").startswith(f"{shlex.quote(sys.executable)} -m pip install ")
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
+    assert extras.install("plot").startswith("pip install ")
+
+
+def test_no_hint_is_written_by_hand() -> None:
+    """Every message takes it from there."""
+    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "hystgen").rglob("*.py")}
+    assert [path.name for path, text in texts.items() if "pip install" in text] == ["extras.py"]
