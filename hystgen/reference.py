@@ -780,9 +780,9 @@ FRONT: list[Callable[..., Any]] = [envelope_forward, envelope_inverse, dead_zone
 COMPILED: list[Callable[..., Any]] = [
     multiple, activation, level, past, all_follow, reached, corners_settle, half, way, not_reached, opposite,
     corners_left, corners_find, entered_by, foretold, corners_rest, corners_start, corners_output, push_corner,
-    turns, corners_absorb, hint, corners_foretell, loop_rest, loop_start, loop_absorb, loop_output, loop_solve, envelope_forward,
-    envelope_inverse, dead_zone, front_forward, front_inverse, rest, absorb, output, solve, begin, init,
-    see_drive, foretell, finite, forward_step, answer, clamp_drive, fits, choose_branch, tells_limit,
+    turns, corners_absorb, hint, corners_foretell, loop_rest, loop_start, loop_absorb, loop_output, loop_solve,
+    envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse, rest, absorb, output, solve, begin,
+    init, see_drive, foretell, finite, forward_step, answer, clamp_drive, fits, choose_branch, tells_limit,
     inverse_step, inverse_commit, reset, visit, run,
 ]  # fmt: skip  (callees before callers)
 

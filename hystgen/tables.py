@@ -176,8 +176,9 @@ def build(
     """Tables of `cascade` in 'float32', 'float64', 'q31' or 'q15' for engine 'corners' or 'loop'.
 
     Without `clamp` the drive and output limits are those of the (float) arithmetic, and without `inverse` too the
-    stages are not cut to where they can be inverted; `lsb` are the physical units of a drive and an output code in fixed
-    point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises FormatError when the model does not fit the arithmetic.
+    stages are not cut to where they can be inverted; `lsb` are the physical units of a drive and an output code in
+    fixed point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises
+    FormatError when the model does not fit the arithmetic.
     """
     if arithmetic in FLOAT_ARITHMETICS:
         return build_float(cascade, arithmetic, engine, clamp, inverse, visited)
@@ -292,7 +293,10 @@ def build_float(
             tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
     for j, w in ((2, pi.start[0]), (3, 0.0)):  # plays at rest where the drive cannot be come to where it starts
         tables.begin[j] = w
-        if cascade.stages and cascade.start_is_defined and not low <= float(dtype(float(cascade.front_inverse(float(w))))) <= high:
+        if not (cascade.stages and cascade.start_is_defined):
+            continue
+        first = float(dtype(float(cascade.front_inverse(float(w)))))
+        if not low <= first <= high:
             tables.begin[j] = reference.front_forward(tables, tables.applied[j], int(tables.ascending[j]))
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_float import forget_line, move_in_block, move_to_input, move_to_output, start, stop_in_block
+from hystgen.corners.corners_float import (
+    forget_line,
+    move_in_block,
+    move_to_input,
+    move_to_output,
+    start,
+    stop_in_block,
+)
 from hystgen.corners.memory import (
     BEFORE,
     BEGIN,

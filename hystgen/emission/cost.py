@@ -90,7 +90,7 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, each: bool = F
         "dead_zone_t": layout.struct(*pointers, count),
         "envelope_t": layout.struct(*(7 * [reach])),
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
-        "tables_t": layout.struct(*pointers, (8, 8), reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
+        "tables_t": layout.struct(*pointers[: 6 if fixed else 4], *([(8, 8), reach, reach] if fixed else []), count),
     }
     if not fixed:
         structs |= _corner_structs(real, layout)
@@ -152,7 +152,7 @@ def _memory(cascade: Cascade, options: Options, fixed: bool, text: str, plays: s
             fast = corners and not cascade.stages
             fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [integer, integer]
             if fast:  # what stands before them
-                fields = [8, 4, 4, play, play, 4, 4, 1] + fields
+                fields = [8, 4, 4, play, play, 4, 4, 1, *fields]
         scalars = [(size, size) for size in fields]
         if corners:
             place = layout.struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))

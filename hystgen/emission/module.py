@@ -247,7 +247,9 @@ def _corner_kernels(values: SimpleNamespace, options: Options) -> str:
         roots.add("hystgen_plays_step")
     if options.inverse:
         roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put"}
-    types = {f"hystgen_{stage['kind']}_t" for stage in values.stages} | ({"hystgen_drive_t"} if values.fronts else set())
+    types = {f"hystgen_{stage['kind']}_t" for stage in values.stages}
+    if values.fronts:
+        types.add("hystgen_drive_t")
     for stage in values.stages:
         roots |= {f"hystgen_{stage['kind']}_{way}" for way in ("forward", *(["inverse"] if options.inverse else []))}
     wanted = {"hystgen_segment_t", "hystgen_curve_t", "hystgen_start_t", *types}

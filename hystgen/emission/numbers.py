@@ -155,7 +155,8 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
             found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{{text}}};\n")
         output, falling, rising = map(literal, start.bottom)
         memories.append(
-            f"    {{{before[text]}, {start.step}, {start.risen}, {{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
+            f"    {{{before[text]}, {start.step}, {start.risen}, "
+            f"{{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
         )
     found.append(
         f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(memories) + "\n};\n"
