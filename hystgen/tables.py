@@ -295,8 +295,8 @@ def build_float(
         tables.begin[j] = w
         if not (cascade.stages and cascade.start_is_defined):
             continue
-        first = float(dtype(float(cascade.front_inverse(float(w)))))
-        if not low <= first <= high:
+        begins = float(dtype(float(cascade.front_inverse(float(w)))))
+        if not low <= begins <= high:
             tables.begin[j] = reference.front_forward(tables, tables.applied[j], int(tables.ascending[j]))
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))
