@@ -89,8 +89,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
-        const bool one_by_one = corner[middle].rose != m->here.rising;
-        const hystgen_real_t reach = one_by_one ? t->segment[corner[middle].top].reach : 0;
+        const hystgen_real_t reach = corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
         if (hystgen_along(m, output - corner[middle].output) >= reach) {
             m->here.depth = (uint_least16_t)middle;
             m->here.k = corner[middle].top;
@@ -217,14 +216,13 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, 
 {
     hystgen_place_t p = {start->center[0][0], start->center[0][1], 0, 1, true, false};
     corner[0] = start->bottom;
-    for (p.k = (uint_least16_t)(start->bottom.top - 1u); p.k > 0; --p.k) {
+    for (p.k = (uint_least16_t)(start->bottom.top - 1u); p.k > 0; --p.k, ++p.depth) {
         const hystgen_real_t *center = start->center[start->step * p.k];
         p.rising = p.k <= start->risen;
         hystgen_put(m, &p);
         m->here.input = center[0] + hystgen_along(m, t->segment[p.k].way * HYSTGEN_HALF);
         m->here.output = center[1] + hystgen_along(m, t->segment[p.k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
-        p.depth = m->here.depth;
     }
     p.rising = true;
     hystgen_put(m, &p);
