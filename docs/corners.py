@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import matplotlib as mpl
@@ -37,7 +38,7 @@ def main() -> None:
     model = Model(parse_parameters(MODEL, "figure.yaml"))
     pi = model.parameters.model.pi
     ends = [*TURNS, END, NEXT]
-    steps = [np.linspace(a, b, 400) for a, b in zip(ends, ends[1:], strict=False)]
+    steps = [np.linspace(a, b, 400) for a, b in itertools.pairwise(ends)]
     drive = np.concatenate(steps)
     output = model.simulate(drive)
     now = 400 * (len(steps) - 1)  # samples up to END
