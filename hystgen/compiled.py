@@ -164,8 +164,7 @@ def _reference(fixed_point: bool, corners: bool, front: bool, compiled: bool) ->
         functions, inlined = [kernels.tanh, kernels.atanh, *plain.COMPILED], plain.INLINED
     else:
         operators = (forward_front, inverse_front) if front else (forward, inverse)
-        functions = [kernels.tanh, kernels.atanh, *plain.FRONT] if front else []
-        functions += corners_float.COMPILED
+        functions = [kernels.tanh, kernels.atanh, *plain.FRONT, *corners_float.COMPILED]
         inlined = set(corners_float.INLINED)
         for operator in operators:
             functions += operator.COMPILED

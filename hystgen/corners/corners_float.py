@@ -223,7 +223,6 @@ def start(t: Curve, m: Memory, s: Start) -> None:
         leave_corner(t, m)
     m.counts[K] = 0
     m.counts[RISING] = 1
-    m.counts[LIMITED] = 0
     m.real[SIGN] = t.constant[ONE]
     m.real[INPUT] = s.center[0, 0]
     m.real[OUTPUT] = s.center[0, 1]

@@ -14,8 +14,8 @@ Counts = NDArray[np.int64]
 (INPUT, OUTPUT, NEXT, CAP, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED, DRIVE,
  UNDO_DRIVE, REFERENCE, LEVEL) = range(18)  # fmt: skip
 # and in `Memory.counts`
-(K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, UNDO_LIMITED, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
- ASCENDING, UNDO_ASCENDING) = range(15)  # fmt: skip
+(K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
+ ASCENDING, UNDO_ASCENDING) = range(14)  # fmt: skip
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
 # places in `Curve.constant`
 MOST, ZERO, HALF, ONE = range(4)
@@ -59,7 +59,7 @@ def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     return Memory(
         real=np.zeros(18, dtype),
-        counts=np.zeros(15, np.int64),
+        counts=np.zeros(14, np.int64),
         output=np.zeros(plays + 1, dtype),
         passed=np.zeros((plays + 1, 2), dtype),
         top=np.zeros(plays + 1, np.int64),

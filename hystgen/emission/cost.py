@@ -55,8 +55,8 @@ class Memory:
 
 @dataclass(frozen=True)
 class Cost:
-    """Code of the module by core (`hystgen.engines`), memory on a 32-bit target and on an 8-bit AVR, where tables lie in
-    RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each operator."""
+    """Code of the module by core (`hystgen.engines`), memory on a 32-bit target and on an 8-bit AVR, where tables lie
+    in RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each operator."""
 
     code: Mapping[str, int]
     memory: Memory
@@ -180,8 +180,8 @@ def _memory(cascade: Cascade, options: Options, fixed: bool, text: str, plays: s
 def _corner_instance(n: int, op: str, real: int, front: bool, layout: Layout) -> tuple[int, int]:
     """Bytes of an instance of the corner engine in floating point, and of one corner."""
     reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
-    place = layout.struct(reals, reals, (2, 2), (2, 2), flag, flag)
-    plays = layout.struct(place, *8 * [reals])
+    place = layout.struct(reals, reals, (2, 2), (2, 2), flag)
+    plays = layout.struct(place, *8 * [reals], flag)
     corner, alignment = _corner_structs(real, layout)["corner_t"]
     if op == "forward":
         beside = [reals, flag, status] if front else [status]

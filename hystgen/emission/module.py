@@ -246,7 +246,7 @@ def _corner_kernels(values: SimpleNamespace, options: Options) -> str:
     if options.forward or values.fronts:
         roots.add("hystgen_plays_step")
     if options.inverse:
-        roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put"}
+        roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put", "hystgen_copy_place"}
     types = {f"hystgen_{stage['kind']}_t" for stage in values.stages}
     if values.fronts:
         types.add("hystgen_drive_t")
