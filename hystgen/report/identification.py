@@ -132,7 +132,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
 
 
 def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> list[Section]:
-    yaml = Details("Parameter file", fit.text())
+    yaml, model = Details("Parameter file", fit.text()), Model(fit.parameters)
     return [
         Section("How good it is", _table(fit)),
         Section("Loops", [figures["loop"]]),
@@ -143,6 +143,7 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> l
         Section("What was done to the data", _data(shown)),
         Section("Warnings", [Listing(fit.warnings) if fit.warnings else Text("None.")]),
         Section("Drive range", _range(fit, shown)),
+        Section("What the C costs", [Text(properties.cost(model) or "It does not fit the arithmetic.")]),
         Section("Parameters", [yaml]),
         Section("Provenance", _provenance(fit, shown)),
     ]

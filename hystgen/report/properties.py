@@ -61,26 +61,27 @@ def properties(model: Model) -> str:
                 f"{_most(bounds.rounding)}{drive} at most, against the exact model"
             )
         lines += _fixed(model, drive, output)
-        lines += _cost(model)
         if c.branches_differ:
             lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
+    if not model.effects and (words := cost(model)):
+        lines.append(f"cost of the C      {words}")
     return "\n".join(lines)
 
 
-def _cost(model: Model) -> list[str]:
-    """What the C costs that `emit` would write by default, or nothing where it would refuse."""
+def cost(model: Model) -> str:
+    """What the C costs that `emit` would write, of the forward operator where there is no inverse; "" if it refuses."""
     from hystgen.emission import module
 
-    options = emit_options(model)
+    options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
     try:
-        cost = module.cost_of(model.parameters, model.cascade, options)
+        found = module.cost_of(model.parameters, model.cascade, options)
     except FormatError:
-        return []
-    instances = (f"{op} instance {size} bytes of RAM" for op, size in cost.memory.instances)
-    return [
-        f"cost, {options.arithmetic:<7}      engine {options.engine}; code at -O2 {cost.code_words}; constant tables "
-        f"{cost.memory.tables} bytes; {', '.join(instances)}"
-    ]
+        return ""
+    instances = (f"{op} instance {size} bytes of RAM" for op, size in found.memory.instances)
+    return (
+        f"{options.operator} in {options.arithmetic}, engine {options.engine}; code at -O2 {found.code_words}; "
+        f"constant tables {found.memory.tables} bytes; {', '.join(instances)}"
+    )
 
 
 def _most(bound: float) -> str:
