@@ -55,8 +55,8 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hyst
 }
 
 /* The last of segments k .. last that begins before `way`; `step` is the way, or the reach, of segment 1. */
-static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
-                                         hystgen_real_t way)
+HYSTGEN_APART unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
+                                                hystgen_real_t way)
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
@@ -172,9 +172,8 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     return true;
 }
 
-/* Moves on to an input short of `cap`: more plays of the same block follow. */
-HYSTGEN_KERNEL hystgen_real_t hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                                    hystgen_corner_t *corner, hystgen_real_t input)
+/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a search is faster. */
+HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_real_t input)
 {
     const hystgen_real_t way = hystgen_along(m, input - m->from);
     unsigned int k = m->here.k;
@@ -188,15 +187,14 @@ HYSTGEN_KERNEL hystgen_real_t hystgen_move_in_block(const hystgen_curve_t *t, hy
     m->gain = s->gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
     if (k == far || hystgen_along(m, output - m->here.output) < 0) {
-        (void)hystgen_move_to_input(t, m, corner, input);
-        return m->here.output;
+        return false;
     }
     const hystgen_real_t next = m->from + hystgen_along(m, s[1].way);
     m->next = hystgen_along(m, next - m->cap) < 0 ? next : m->cap;
     m->here.k = (uint_least16_t)k;
     m->here.input = input;
     m->here.output = output;
-    return output;
+    return true;
 }
 
 /* The sum of the plays for the next input; a NaN moves nothing. */
@@ -209,8 +207,8 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
             m->here.output = m->start + (input - m->begin) * m->gain;
             return m->here.output;
         }
-        if (m->here.rising ? input < m->cap : input > m->cap) {
-            return hystgen_move_in_block(t, m, corner, input);
+        if ((m->here.rising ? input < m->cap : input > m->cap) && hystgen_move_in_block(t, m, input)) {
+            return m->here.output;
         }
     }
     if (input < m->here.input || input > m->here.input) {

@@ -51,7 +51,9 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         if (m->here.rising ? x < m->cap : x > m->cap) {
             hystgen_copy_place(&self->undo, &m->here);
             self->before = x;
-            return hystgen_move_in_block(&hystgen_inverse_curve, m, self->corner, x);
+            if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
+                return m->here.output;
+            }
         }
     }
     return hystgen_inverse_search(self, u);

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* The drive that gives w; `limited`: an envelope cannot give w. */
-static hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
+HYSTGEN_APART hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
                                              bool *limited, bool *moves)
 {
     (void)self;

@@ -9,7 +9,7 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_real_t v
 
 /* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one;
    `limited`: an envelope cannot give w; `moves` is cleared where the drive holds instead. */
-static hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
+HYSTGEN_APART hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
                                              bool *limited, bool *moves)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;

@@ -168,8 +168,8 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     return True
 
 
-def move_in_block(t: Curve, m: Memory, to: Any) -> Any:
-    """Move on to an input short of CAP: more plays of the same block follow."""
+def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
+    """Move on to an input short of CAP: more plays of the same block follow. False where a search is faster."""
     way = along(m, to - m.real[FROM])
     k = m.counts[K] + 1
     far = m.counts[K] + 8
@@ -180,14 +180,13 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> Any:
     m.real[GAIN] = t.gain[k]
     output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
     if k == far or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
-        move_to_input(t, m, to)
-        return m.real[OUTPUT]
+        return False
     after = m.real[FROM] + along(m, t.way[k + 1])
     m.real[NEXT] = after if along(m, after - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
     m.counts[K] = k
     m.real[INPUT] = to
     m.real[OUTPUT] = output
-    return output
+    return True
 
 
 def plays_step(t: Curve, m: Memory, to: Any) -> Any:
@@ -198,8 +197,8 @@ def plays_step(t: Curve, m: Memory, to: Any) -> Any:
             m.real[INPUT] = to
             m.real[OUTPUT] = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
             return m.real[OUTPUT]
-        if to < m.real[CAP] if rising else to > m.real[CAP]:
-            return move_in_block(t, m, to)
+        if (to < m.real[CAP] if rising else to > m.real[CAP]) and move_in_block(t, m, to):
+            return m.real[OUTPUT]
     if to < m.real[INPUT] or to > m.real[INPUT]:
         move_to_input(t, m, to)
     return m.real[OUTPUT]

@@ -122,7 +122,8 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
         if x < m.real[CAP] if rising else x > m.real[CAP]:
             set_undo(m)
             m.real[BEFORE] = x
-            return move_in_block(t.inverse, m, x)
+            if move_in_block(t.inverse, m, x):
+                return m.real[OUTPUT]
     return inverse_search(t, m, u)
 
 
