@@ -39,7 +39,7 @@ from hystgen.reference import (
 )
 
 # more places in `limits`, after those of `hystgen.reference`
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED = 16, 17, 18, 19, 20, 21, 22
+PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = 16, 17, 18, 19, 20, 21, 22, 23
 
 HALF = 1 << 30
 
@@ -55,9 +55,12 @@ class FixedTables(NamedTuple):
     slope: Reals  # of sums per least step of the plays' input
     lift: Reals
     start_level: Reals
+    way: Reals  # of the corner engine: 2 threshold, the input gained from a corner on by the time play k begins to follow
+    reach: Reals  # 2 start_level, the output likewise
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals
     start: Reals
+    zero: Reals  # all plays 0
     limits: Reals
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Reals  # direction before the first move, likewise
@@ -240,6 +243,7 @@ def tells_limit(t: FixedTables, s: State, v: Any, inside: Any) -> bool:  # noqa:
     return False
 
 
+SHARED: list[Callable[..., Any]] = [nearest, over_slope, curve, front_forward, front_inverse]
 _OWN: list[Callable[..., Any]] = [
     half, nearest, over_slope, going, corners_locate, corners_solve, loop_solve, curve, front_forward,
     front_inverse, output, solve, finite, tells_limit,
