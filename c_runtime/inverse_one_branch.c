@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
 /* The drive that gives w; `limited`: an envelope cannot give w. */
-static hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
-                                             bool *limited, bool *moves)
+static hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w,
+                                              bool *limited, bool *moves)
 {
     (void)self;
     (void)level;

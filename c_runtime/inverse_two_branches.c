@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Whether going to v is a move of the branch that v was computed on. */
-static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_real_t v, bool ascending)
+static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending)
 {
     const hystgen_real_t inside = hystgen_clamp_drive(v);
     return inside > self->drive ? ascending : inside < self->drive ? !ascending : self->ascending == ascending;
@@ -9,15 +9,15 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_real_t v
 
 /* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one;
    `limited`: an envelope cannot give w; `moves` is cleared where the drive holds instead. */
-static hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
-                                             bool *limited, bool *moves)
+static hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w,
+                                              bool *limited, bool *moves)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
-    hystgen_real_t v = hystgen_front_inverse(w, up, limited);
+    hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
     if (hystgen_inverse_fits(self, v, up)) {
         return v;
     }
-    const hystgen_real_t back = hystgen_clamp_drive(v) - self->drive;
+    const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_drive(v) - self->drive;
     if (up != self->ascending || back < -HYSTGEN_HOLD || back > HYSTGEN_HOLD) { /* else it is back by rounding alone */
         v = hystgen_front_inverse(w, !up, limited);
         if (hystgen_inverse_fits(self, v, !up)) {

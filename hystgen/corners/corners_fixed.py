@@ -123,6 +123,17 @@ def move_to_solution(t: FixedTables, m: FixedMemory, place: Place, to: Any) -> N
     move_to_input(t, m, to)
 
 
+def look_ahead(t: FixedTables, m: FixedMemory, end: Any) -> Any:
+    """Output, as the present move sees it, up to which the same plays follow, or up to where the input comes to
+    `end`."""
+    k = m.counts[K]
+    output = along(m, m.real[OUTPUT]) + t.slope[k + 1] * along(m, end - m.real[INPUT])
+    if m.counts[DEPTH] > 0:
+        following = along(m, kink(t, m, m.counts[DEPTH], k + 1)[1])
+        return following if following < output else output
+    return output
+
+
 def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     """Start memory: what each play holds, or all of them. Each is a block of its own, as if left by a move that ended
     where the play begins to follow."""
@@ -143,6 +154,7 @@ def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    along, leave_corner, turn_back, kink, has_begun, find, go_on, move_to_input, solve, move_to_solution, start,
+    along, leave_corner, turn_back, kink, has_begun, find, go_on, move_to_input, solve, move_to_solution,
+    look_ahead, start,
 ]  # fmt: skip  (callees before callers)
 INLINED: set[Callable[..., Any]] = {along}

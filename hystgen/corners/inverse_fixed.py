@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_fixed import along, kink, move_to_input, move_to_solution, solve, start
+from hystgen.corners.corners_fixed import along, look_ahead, move_to_input, move_to_solution, solve, start
 from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.memory import (
     BEFORE,
@@ -28,11 +28,13 @@ from hystgen.corners.memory import (
     K,
     Reals,
 )
-from hystgen.fixed import CODE_MAX, FINE, FRACTION, SHY, FixedTables, nearest, over_slope
+from hystgen.fixed import FINE, FRACTION, SHY, FixedTables, nearest, over_slope
 from hystgen.reference import DRIVE_MAX, DRIVE_MIN, INPUT_CLAMPED, OUTPUT_CLAMPED, OUTPUT_MAX, OUTPUT_MIN
 
+NEVER = -(2**31)
 
-def clamp_output(t: FixedTables, u: Any) -> Any:
+
+def inverse_clamp(t: FixedTables, u: Any) -> Any:
     """u inside the range of the output."""
     if u < t.limits[OUTPUT_MIN]:
         return t.limits[OUTPUT_MIN]
@@ -59,29 +61,25 @@ def put_undo(m: FixedMemory) -> None:
     m.counts[RISING] = m.counts[UNDO_RISING]
 
 
-def coded(m: FixedMemory, u: Any) -> Any:
+def inverse_sees(m: FixedMemory, u: Any) -> Any:
     """A reference as the present move sees it: ~u is one less than -u, and no less than the least number."""
     return u if m.counts[RISING] else ~u
 
 
-def inverse_stay(t: FixedTables, m: FixedMemory) -> None:
+def inverse_stay(m: FixedMemory) -> None:
     """The next sample searches; the next step begins here."""
-    m.real[NEXT] = -t.limits[CODE_MAX] - 1
+    m.real[NEXT] = NEVER
     m.counts[ON] = 0
 
 
 def inverse_look_ahead(t: FixedTables, m: FixedMemory) -> None:
-    """Up to which reference the same plays follow and nothing is limited, short of it by what rounding can add."""
-    k = m.counts[K]
-    end = along(m, (t.limits[DRIVE_MAX] if m.counts[RISING] else t.limits[DRIVE_MIN]) << t.limits[FINE])
-    last = along(m, m.real[OUTPUT]) + t.slope[k + 1] * (end - along(m, m.real[INPUT]))
-    if m.counts[DEPTH] > 0:
-        following = along(m, kink(t, m, m.counts[DEPTH], k + 1)[1])
-        last = following if following < last else last
-    last = (last >> t.limits[FRACTION]) - t.limits[SHY]
-    most = coded(m, t.limits[OUTPUT_MAX] if m.counts[RISING] else t.limits[OUTPUT_MIN])
+    """Steps are usual while the same plays follow and nothing is limited, short of that by what rounding can add."""
+    rising = m.counts[RISING]
+    most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
+    end = look_ahead(t, m, (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE])
+    last = (end >> t.limits[FRACTION]) - t.limits[SHY]
     if last > m.real[NEXT]:
-        m.real[NEXT] = most if most < last else last
+        m.real[NEXT] = last if last < most else most
 
 
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
@@ -89,13 +87,13 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     set_undo(m)
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
-        level = clamp_output(t, u)
-        inverse_stay(t, m)
+        level = inverse_clamp(t, u)
         w, place = solve(t, m, level << t.limits[FRACTION])
         v = nearest(w, t.limits[FINE])
         inside = clamp_drive(t, v)
-        m.counts[BITS] = (0 if level == u else INPUT_CLAMPED) | (0 if inside == v else OUTPUT_CLAMPED)
         move_to_solution(t, m, place, inside << t.limits[FINE])
+        inverse_stay(m)
+        m.counts[BITS] = (0 if level == u else INPUT_CLAMPED) | (0 if inside == v else OUTPUT_CLAMPED)
         if m.counts[BITS] == 0:
             inverse_look_ahead(t, m)
         m.real[REFERENCE] = u
@@ -107,7 +105,7 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """One sample."""
     on = along(m, (u << t.limits[FRACTION]) - m.real[OUTPUT])
-    if coded(m, u) < m.real[NEXT] and on > 0 and u != m.real[REFERENCE]:
+    if inverse_sees(m, u) < m.real[NEXT] and on > 0 and u != m.real[REFERENCE]:
         k = m.counts[K] + 1
         v = nearest(m.real[INPUT] + along(m, over_slope(t, on, k)), t.limits[FINE])
         m.real[BEFORE] = m.real[INPUT]
@@ -129,7 +127,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
         m.real[INPUT] = m.real[BEFORE]
         set_undo(m)
     put_undo(m)
-    inverse_stay(t, m)
+    inverse_stay(m)
     m.counts[REPEAT] = 0
     move_to_input(t, m, v << t.limits[FINE])
 
@@ -138,7 +136,7 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     """What init and reset have in common."""
     start(t, m, play)
     set_undo(m)
-    inverse_stay(t, m)
+    inverse_stay(m)
     m.real[BEFORE] = 0
     m.real[REFERENCE] = 0
     m.counts[REPEAT] = 0
@@ -161,11 +159,11 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
     set_undo(m)
-    inverse_stay(t, m)
+    inverse_stay(m)
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, clamp_output, set_undo, put_undo, coded, inverse_stay, inverse_look_ahead, inverse_search,
+    clamp_drive, inverse_clamp, set_undo, put_undo, inverse_sees, inverse_stay, inverse_look_ahead, inverse_search,
     inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
-INLINED: set[Callable[..., Any]] = {coded}
+INLINED: set[Callable[..., Any]] = {inverse_sees}

@@ -8,7 +8,7 @@ from typing import Any
 from hystgen.corners.corners_fixed import Place, move_to_input, move_to_solution, solve, start
 from hystgen.corners.forward_fixed import code
 from hystgen.corners.inverse import clamp_drive
-from hystgen.corners.inverse_fixed import clamp_output, put_undo, set_undo
+from hystgen.corners.inverse_fixed import inverse_clamp, put_undo, set_undo
 from hystgen.corners.inverse_front import inverse_choose, inverse_fits
 from hystgen.corners.memory import (
     ASCENDING,
@@ -48,7 +48,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """One sample."""
     inverse_keep(m)
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
-        level = clamp_output(t, u)
+        level = inverse_clamp(t, u)
         w, place = solve(t, m, level << t.limits[FRACTION])
         v, limited, _ = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
@@ -107,7 +107,7 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, clamp_output, set_undo, put_undo, inverse_keep, inverse_arrive, inverse_fits, inverse_choose,
+    clamp_drive, inverse_clamp, set_undo, put_undo, inverse_keep, inverse_arrive, inverse_fits, inverse_choose,
     inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
 INLINED: set[Callable[..., Any]] = set()
