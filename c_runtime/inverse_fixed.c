@@ -67,10 +67,12 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     const int64_t on = here->rising ? output - here->output : here->output - output;
     if (hystgen_inverse_sees(self, u) < self->next && on > 0 && u != self->reference) { /* usual: the same plays follow */
         const hystgen_segment_t *s = &hystgen_model_curve.segment[here->k];
-        const int32_t step = (int32_t)hystgen_over_slope(on, s->reciprocal, s->shift);
-        const hystgen_real_t v = (hystgen_real_t)hystgen_front_inverse(here->rising ? here->input + step : here->input - step);
+        const int64_t step = hystgen_over_slope(on, s->reciprocal, s->shift);
+        const int64_t w = here->rising ? here->input + step : here->input - step;
+        const hystgen_real_t v = (hystgen_real_t)hystgen_front_inverse((hystgen_reach_t)w);
         const int32_t to = hystgen_front(v);
-        const int64_t moved = (int64_t)hystgen_wide(s->slope, (uint32_t)(here->rising ? to - here->input : here->input - to));
+        const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)to;
+        const int64_t moved = (int64_t)hystgen_wide(s->slope, way);
         self->before = here->input;
         self->usual = true;
         self->reference = u;
