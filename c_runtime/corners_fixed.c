@@ -1,5 +1,15 @@
 #include "hystgen_runtime.h"
 
+/* One by one, since a copy of all may become a call of memcpy, which a freestanding target need not have. */
+HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
+{
+    to->output = from->output;
+    to->input = from->input;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x)
 {
@@ -26,19 +36,6 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The place where play k begins to follow the present move, until then held by the last of `depth` corners. */
-static hystgen_kink_t hystgen_kink(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
-                                   unsigned int depth, unsigned int k)
-{
-    const hystgen_corner_t *c = &corner[depth - 1u];
-    hystgen_kink_t place = {c->input, c->output, k, depth};
-    if (c->rose != here->rising) {
-        place.input += hystgen_along(here, t->segment[k].way);
-        place.output += hystgen_along(here, t->segment[k].reach);
-    }
-    return place;
-}
-
 /* Whether play k, held by corner c, follows by the time that the output, or the input, is x. */
 static inline bool hystgen_has_begun(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *c,
                                      unsigned int k, int64_t x, bool by_output)
@@ -48,104 +45,132 @@ static inline bool hystgen_has_begun(const hystgen_curve_t *t, const hystgen_pla
     return on >= (c->rose == here->rising ? 0 : by_output ? s->reach : (int64_t)s->way);
 }
 
-/* The last place before x on the present move where another play begins to follow, or the present one. */
-static inline hystgen_kink_t hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                          const hystgen_corner_t *corner, int64_t x, bool by_output)
+/* Where play k, held by corner c, begins to follow the present move. */
+static void hystgen_kink(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *c, unsigned int k,
+                         hystgen_kink_t *kink)
 {
-    hystgen_kink_t place = {here->input, here->output, here->k, here->depth};
+    const hystgen_segment_t *s = &t->segment[k];
+    kink->input = c->input;
+    kink->output = c->output;
+    if (c->rose != here->rising) {
+        kink->input += hystgen_along(here, s->way);
+        kink->output += hystgen_along(here, s->reach);
+    }
+}
+
+/* The last place before x on the present move where another play begins to follow, or the present one. */
+static inline void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
+                                int64_t x, bool by_output, hystgen_kink_t *kink)
+{
+    unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    if (left > 0 && hystgen_has_begun(t, here, &corner[left - 1u], corner[left - 1u].top, x, by_output)) {
-        unsigned int low = 0;
-        --left;
-        while (low < left) { /* corner `left` is passed, those below `low` are not */
-            const unsigned int middle = (low + left) / 2;
-            const bool passed = hystgen_has_begun(t, here, &corner[middle], corner[middle].top, x, by_output);
-            left = passed ? middle : left;
-            low = passed ? low : middle + 1u;
-        }
-        k = corner[left].top;
-        place = hystgen_kink(t, here, corner, left + 1u, k);
-        place.depth = left;
+    const hystgen_corner_t *holder = 0; /* of play k until it began to follow */
+    while (low < left) { /* corner `left` is passed, those below `low` are not */
+        const unsigned int middle = (low + left) / 2;
+        const bool passed = hystgen_has_begun(t, here, &corner[middle], corner[middle].top, x, by_output);
+        left = passed ? middle : left;
+        low = passed ? low : middle + 1u;
+    }
+    if (left < here->depth) {
+        holder = &corner[left];
+        k = holder->top;
     }
     if (left > 0) {
         const hystgen_corner_t *c = &corner[left - 1u];
         unsigned int last = c->top - 1u;
-        if (k < last && hystgen_has_begun(t, here, c, k + 1u, x, by_output)) {
-            ++k;
-            while (k < last) { /* play k follows, those above `last` do not */
-                const unsigned int middle = (k + last) / 2;
-                const bool begun = hystgen_has_begun(t, here, c, middle + 1u, x, by_output);
-                k = begun ? middle + 1u : k;
-                last = begun ? last : middle;
-            }
-            place = hystgen_kink(t, here, corner, left, k);
+        while (k < last) { /* play k follows, those above `last` do not */
+            const unsigned int middle = (k + last) / 2 + 1u;
+            const bool begun = hystgen_has_begun(t, here, c, middle, x, by_output);
+            holder = begun ? c : holder;
+            k = begun ? middle : k;
+            last = begun ? last : middle - 1u;
         }
     }
-    return place;
+    kink->input = here->input;
+    kink->output = here->output;
+    kink->k = (uint_least16_t)k;
+    kink->depth = (uint_least16_t)left;
+    if (holder) {
+        hystgen_kink(t, here, holder, k, kink);
+    }
+}
+
+HYSTGEN_APART void hystgen_find_by_input(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                         const hystgen_corner_t *corner, int32_t input, hystgen_kink_t *kink)
+{
+    hystgen_find(t, here, corner, input, false, kink);
+}
+
+HYSTGEN_APART void hystgen_find_by_output(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                          const hystgen_corner_t *corner, int64_t output, hystgen_kink_t *kink)
+{
+    hystgen_find(t, here, corner, output, true, kink);
 }
 
 /* Moves on from a place that the present move passes to an input at which the same plays follow. */
-static void hystgen_go_on(const hystgen_curve_t *t, hystgen_place_t *here, const hystgen_kink_t *place, int32_t to)
+static void hystgen_go_on(const hystgen_curve_t *t, hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to)
 {
-    const uint32_t way = (uint32_t)hystgen_along(here, to - place->input);
-    here->output = place->output + hystgen_along(here, (int64_t)hystgen_wide(t->segment[place->k].slope, way));
+    const uint32_t way = (uint32_t)hystgen_along(here, to - kink->input);
+    here->output = kink->output + hystgen_along(here, (int64_t)hystgen_wide(t->segment[kink->k].slope, way));
     here->input = to;
-    here->k = (uint_least16_t)place->k;
-    here->depth = (uint_least16_t)place->depth;
+    here->k = kink->k;
+    here->depth = kink->depth;
 }
 
 /* Moves the plays to any input. */
 HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                           int32_t to)
 {
+    hystgen_kink_t kink;
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
     }
-    const hystgen_kink_t place = hystgen_find(t, here, corner, to, false);
-    hystgen_go_on(t, here, &place, to);
+    hystgen_find_by_input(t, here, corner, to, &kink);
+    hystgen_go_on(t, here, &kink, to);
 }
 
-/* The input that gives `output`, kept near the range, and the place that it was counted from. Turns, moves nothing. */
-HYSTGEN_KERNEL int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                     int64_t output, hystgen_kink_t *place)
+/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. */
+HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                                  int64_t output, hystgen_kink_t *kink)
 {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
     }
-    *place = hystgen_find(t, here, corner, output, true);
-    const hystgen_segment_t *s = &t->segment[place->k];
-    const int64_t on = hystgen_along(here, output - place->output);
-    const int64_t x = hystgen_along(here, place->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
+    hystgen_find_by_output(t, here, corner, output, kink);
+    const hystgen_segment_t *s = &t->segment[kink->k];
+    const int64_t on = hystgen_along(here, output - kink->output);
+    const int64_t x = hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
     const int64_t most = t->range[here->rising];
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* Moves the plays to an input near the one that was solved for from `place`. */
-HYSTGEN_KERNEL void hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                             const hystgen_kink_t *place, int32_t to)
+/* Moves the plays to an input near the one that was solved for from a kink. */
+HYSTGEN_API void hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                                          const hystgen_kink_t *kink, int32_t to)
 {
-    bool same = hystgen_along(here, to - place->input) >= 0; /* plays follow */
-    if (same && place->depth > 0) {
-        const hystgen_kink_t next = hystgen_kink(t, here, corner, place->depth, place->k + 1u);
-        same = hystgen_along(here, next.input - to) >= 0;
+    bool same = hystgen_along(here, to - kink->input) >= 0; /* plays follow */
+    if (same && kink->depth > 0) {
+        same = !hystgen_has_begun(t, here, &corner[kink->depth - 1u], kink->k + 1u, to, false);
     }
     if (same) {
-        hystgen_go_on(t, here, place, to);
+        hystgen_go_on(t, here, kink, to);
     } else {
         hystgen_move_to_input(t, here, corner, to);
     }
 }
 
 /* Output, as the present move sees it, up to which the same plays follow, or up to where the input comes to `end`. */
-HYSTGEN_KERNEL int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                          const hystgen_corner_t *corner, int32_t end)
+HYSTGEN_API int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                       const hystgen_corner_t *corner, int32_t end)
 {
     const uint32_t room = (uint32_t)hystgen_along(here, (int64_t)end - here->input);
     const int64_t output = hystgen_along(here, here->output) + (int64_t)hystgen_wide(t->segment[here->k].slope, room);
     if (here->depth > 0) {
-        const int64_t next = hystgen_along(here, hystgen_kink(t, here, corner, here->depth, here->k + 1u).output);
-        return next < output ? next : output;
+        hystgen_kink_t kink;
+        hystgen_kink(t, here, &corner[here->depth - 1u], here->k + 1u, &kink);
+        kink.output = hystgen_along(here, kink.output);
+        return kink.output < output ? kink.output : output;
     }
     return output;
 }

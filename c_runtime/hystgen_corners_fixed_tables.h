@@ -21,10 +21,10 @@ typedef struct {
 /* A place on the present move where another play begins to follow, or where the move is now: from there on plays 0 .. k
    do and `depth` corners hold the others. */
 typedef struct {
-    int64_t input;
     int64_t output;
-    unsigned int k;
-    unsigned int depth;
+    int64_t input;
+    uint_least16_t k;
+    uint_least16_t depth;
 } hystgen_kink_t;
 
 /* The drive that a start memory stands for, within its range. */

@@ -51,11 +51,12 @@ int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *
                       unsigned int degree, int32_t x);
 hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
                                bool *limited);
+void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
 void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t to);
 int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int64_t output,
-                      hystgen_kink_t *place);
+                      hystgen_kink_t *kink);
 void hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                              const hystgen_kink_t *place, int32_t to);
+                              const hystgen_kink_t *kink, int32_t to);
 int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
                            int32_t end);
 void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, const int32_t *play,

@@ -34,15 +34,15 @@ static void hystgen_inverse_look_ahead(hystgen_inverse_t *self)
 /* Any other sample than a usual one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u)
 {
-    self->undo = self->here;
+    hystgen_copy_place(&self->undo, &self->here);
     self->usual = false;
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
-        hystgen_kink_t place;
+        hystgen_kink_t kink;
         const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)hystgen_solve(
-            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &place));
+            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &kink));
         const hystgen_real_t inside = hystgen_clamp_drive(v);
-        hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &place, hystgen_front(inside));
+        hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink, hystgen_front(inside));
         hystgen_inverse_stay(self);
         if (level != u || inside != v) {
             self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
@@ -90,11 +90,11 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     if (self->usual) {
-        self->undo = self->here;
+        hystgen_copy_place(&self->undo, &self->here);
         self->undo.input = self->before;
         self->undo.output -= (int64_t)hystgen_model_curve.segment[self->here.k].slope * ((int64_t)self->here.input - self->before);
     }
-    self->here = self->undo;
+    hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);
     self->repeat = false;
     hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_front(v));
@@ -103,7 +103,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step)
 {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
-    self->undo = self->here;
+    hystgen_copy_place(&self->undo, &self->here);
     hystgen_inverse_stay(self);
     self->before = 0;
     self->reference = 0;

@@ -8,7 +8,7 @@ static hystgen_real_t hystgen_inverse_clamp(hystgen_reach_t u)
 /* The next step begins here. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self)
 {
-    self->undo = self->here;
+    hystgen_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -28,9 +28,9 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     hystgen_inverse_keep(self);
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
-        hystgen_kink_t place;
+        hystgen_kink_t kink;
         const hystgen_reach_t w = (hystgen_reach_t)hystgen_solve(
-            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &place);
+            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &kink);
         bool limited = false;
         bool moves = true;
         const hystgen_reach_t v = hystgen_inverse_choose(self, level, w, &limited, &moves);
@@ -38,7 +38,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
                                      (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u) |
                                      (limited ? HYSTGEN_STATUS_DOMAIN : 0u));
-        hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &place,
+        hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink,
                                  hystgen_inverse_arrive(self, inside));
         self->reference = u;
         self->level = level;
@@ -54,7 +54,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     if (v != applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    self->here = self->undo;
+    hystgen_copy_place(&self->here, &self->undo);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     self->repeat = false;

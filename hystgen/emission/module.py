@@ -247,7 +247,7 @@ def _corner_roots(values: SimpleNamespace, options: Options) -> set[str]:
     if values.fixed:
         roots.add("hystgen_move_to_input")
         if options.inverse:
-            roots |= {"hystgen_solve", "hystgen_move_to_solution"}
+            roots |= {"hystgen_copy_place", "hystgen_solve", "hystgen_move_to_solution"}
             if not values.fronts:
                 roots |= {"hystgen_wide", "hystgen_over_slope", "hystgen_look_ahead"}
         return roots
