@@ -36,63 +36,48 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* Whether play k, held by corner c, follows by the time that the output, or the input, is x. */
-static inline bool hystgen_has_begun(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *c,
-                                     unsigned int k, int64_t x, bool by_output)
-{
-    const int64_t on = hystgen_along(here, x - (by_output ? c->output : c->input));
-    const hystgen_segment_t *s = &t->segment[k];
-    return on >= (c->rose == here->rising ? 0 : by_output ? s->reach : (int64_t)s->way);
-}
-
-/* Where play k, held by corner c, begins to follow the present move. */
-static void hystgen_kink(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *c, unsigned int k,
-                         hystgen_kink_t *kink)
-{
-    const hystgen_segment_t *s = &t->segment[k];
-    kink->input = c->input;
-    kink->output = c->output;
-    if (c->rose != here->rising) {
-        kink->input += hystgen_along(here, s->way);
-        kink->output += hystgen_along(here, s->reach);
-    }
-}
-
 /* The last place before x on the present move where another play begins to follow, or the present one. */
 static inline void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
                                 int64_t x, bool by_output, hystgen_kink_t *kink)
 {
+    const int64_t to = hystgen_along(here, x);
+    const hystgen_corner_t *c = 0; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    const hystgen_corner_t *holder = 0; /* of play k until it began to follow */
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
-        const bool passed = hystgen_has_begun(t, here, &corner[middle], corner[middle].top, x, by_output);
+        const hystgen_segment_t *s = &t->segment[corner[middle].top];
+        const int64_t on = to - hystgen_along(here, by_output ? corner[middle].output : corner[middle].input);
+        const int64_t whole = by_output ? s->reach : (int64_t)s->way;
+        const bool passed = on >= (corner[middle].rose == here->rising ? 0 : whole);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
     if (left < here->depth) {
-        holder = &corner[left];
-        k = holder->top;
+        c = &corner[left];
+        k = c->top;
     }
-    if (left > 0) {
-        const hystgen_corner_t *c = &corner[left - 1u];
-        unsigned int last = c->top - 1u;
+    if (left > 0 && corner[left - 1u].rose != here->rising) {
+        const hystgen_corner_t *top = &corner[left - 1u];
+        const int64_t on = to - hystgen_along(here, by_output ? top->output : top->input);
+        const unsigned int before = k;
+        unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
             const unsigned int middle = (k + last) / 2 + 1u;
-            const bool begun = hystgen_has_begun(t, here, c, middle, x, by_output);
-            holder = begun ? c : holder;
+            const bool begun = on >= (by_output ? t->segment[middle].reach : (int64_t)t->segment[middle].way);
             k = begun ? middle : k;
             last = begun ? last : middle - 1u;
         }
+        c = k > before ? top : c;
     }
-    kink->input = here->input;
-    kink->output = here->output;
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
-    if (holder) {
-        hystgen_kink(t, here, holder, k, kink);
+    kink->input = c ? c->input : here->input;
+    kink->output = c ? c->output : here->output;
+    if (c && c->rose != here->rising) {
+        kink->input += hystgen_along(here, t->segment[k].way);
+        kink->output += hystgen_along(here, t->segment[k].reach);
     }
 }
 
@@ -108,16 +93,6 @@ HYSTGEN_APART void hystgen_find_by_output(const hystgen_curve_t *t, const hystge
     hystgen_find(t, here, corner, output, true, kink);
 }
 
-/* Moves on from a place that the present move passes to an input at which the same plays follow. */
-static void hystgen_go_on(const hystgen_curve_t *t, hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to)
-{
-    const uint32_t way = (uint32_t)hystgen_along(here, to - kink->input);
-    here->output = kink->output + hystgen_along(here, (int64_t)hystgen_wide(t->segment[kink->k].slope, way));
-    here->input = to;
-    here->k = kink->k;
-    here->depth = kink->depth;
-}
-
 /* Moves the plays to any input. */
 HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                           int32_t to)
@@ -127,7 +102,11 @@ HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plac
         hystgen_turn_back(here, corner);
     }
     hystgen_find_by_input(t, here, corner, to, &kink);
-    hystgen_go_on(t, here, &kink, to);
+    const uint32_t way = (uint32_t)hystgen_along(here, to - kink.input);
+    here->output = kink.output + hystgen_along(here, (int64_t)hystgen_wide(t->segment[kink.k].slope, way));
+    here->input = to;
+    here->k = kink.k;
+    here->depth = kink.depth;
 }
 
 /* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. */
@@ -145,34 +124,44 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* Moves the plays to an input near the one that was solved for from a kink. */
-HYSTGEN_API void hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                          const hystgen_kink_t *kink, int32_t to)
+/* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left. */
+static int64_t hystgen_next(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
+                            unsigned int depth, unsigned int k)
 {
-    bool same = hystgen_along(here, to - kink->input) >= 0; /* plays follow */
-    if (same && kink->depth > 0) {
-        same = !hystgen_has_begun(t, here, &corner[kink->depth - 1u], kink->k + 1u, to, false);
+    if (depth == 0) {
+        return (int64_t)1 << 62;
     }
-    if (same) {
-        hystgen_go_on(t, here, kink, to);
-    } else {
-        hystgen_move_to_input(t, here, corner, to);
-    }
+    const hystgen_corner_t *c = &corner[depth - 1u];
+    return hystgen_along(here, c->output) + (c->rose == here->rising ? 0 : t->segment[k + 1u].reach);
 }
 
-/* Output, as the present move sees it, up to which the same plays follow, or up to where the input comes to `end`. */
-HYSTGEN_API int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                       const hystgen_corner_t *corner, int32_t end)
+/* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it, at
+   which another one begins to follow. */
+HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                                             const hystgen_kink_t *kink, int32_t to)
+{
+    const int64_t way = hystgen_along(here, to - kink->input);
+    if (way >= 0) {
+        const int64_t next = hystgen_next(t, here, corner, kink->depth, kink->k);
+        const int64_t moved = (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
+        if (hystgen_along(here, kink->output) + moved <= next) {
+            here->output = kink->output + hystgen_along(here, moved);
+            here->input = to;
+            here->k = kink->k;
+            here->depth = kink->depth;
+            return next;
+        }
+    }
+    hystgen_move_to_input(t, here, corner, to);
+    return hystgen_next(t, here, corner, here->depth, here->k);
+}
+
+/* The same at most where the input comes to `end`. */
+HYSTGEN_API int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end)
 {
     const uint32_t room = (uint32_t)hystgen_along(here, (int64_t)end - here->input);
-    const int64_t output = hystgen_along(here, here->output) + (int64_t)hystgen_wide(t->segment[here->k].slope, room);
-    if (here->depth > 0) {
-        hystgen_kink_t kink;
-        hystgen_kink(t, here, &corner[here->depth - 1u], here->k + 1u, &kink);
-        kink.output = hystgen_along(here, kink.output);
-        return kink.output < output ? kink.output : output;
-    }
-    return output;
+    const int64_t last = hystgen_along(here, here->output) + (int64_t)hystgen_wide(t->segment[here->k].slope, room);
+    return next < last ? next : last;
 }
 
 /* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its own, as if left by a

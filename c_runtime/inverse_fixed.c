@@ -18,14 +18,14 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
     self->usual = false;
 }
 
-/* Steps are usual while the same plays follow and nothing is limited, short of that by what rounding can add. */
-static void hystgen_inverse_look_ahead(hystgen_inverse_t *self)
+/* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. */
+static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const bool rising = self->here.rising;
     const int32_t most = hystgen_inverse_sees(self, rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
-    const int64_t end = hystgen_look_ahead(&hystgen_model_curve, &self->here, self->corner,
-                                           hystgen_front(rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN));
-    const int64_t last = (end >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
+    const int32_t end = hystgen_front(rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
+    const int64_t last =
+        (hystgen_look_ahead(&hystgen_model_curve, &self->here, next, end) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
     if (last > self->next) {
         self->next = last < most ? (int32_t)last : most;
     }
@@ -42,14 +42,14 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
         const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)hystgen_solve(
             &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &kink));
         const hystgen_real_t inside = hystgen_clamp_drive(v);
-        hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink, hystgen_front(inside));
+        const int64_t next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink, hystgen_front(inside));
         hystgen_inverse_stay(self);
         if (level != u || inside != v) {
             self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
                                          (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u));
         } else {
             self->bits = 0;
-            hystgen_inverse_look_ahead(self);
+            hystgen_inverse_look_ahead(self, next);
         }
         self->reference = u;
         self->repeat = true;
@@ -72,12 +72,12 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         const hystgen_real_t v = (hystgen_real_t)hystgen_front_inverse((hystgen_reach_t)w);
         const int32_t to = hystgen_front(v);
         const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)to;
-        const int64_t moved = (int64_t)hystgen_wide(s->slope, way);
+        const int64_t left = hystgen_inverse_left(on, s->slope, way);
         self->before = here->input;
         self->usual = true;
         self->reference = u;
         here->input = to;
-        here->output = here->rising ? here->output + moved : here->output - moved;
+        here->output = here->rising ? output - left : output + left;
         return v;
     }
     return hystgen_inverse_search(self, u);

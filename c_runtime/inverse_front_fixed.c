@@ -38,8 +38,8 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
                                      (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u) |
                                      (limited ? HYSTGEN_STATUS_DOMAIN : 0u));
-        hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink,
-                                 hystgen_inverse_arrive(self, inside));
+        (void)hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink,
+                                       hystgen_inverse_arrive(self, inside));
         self->reference = u;
         self->level = level;
         self->repeat = true;

@@ -17,10 +17,13 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
 #endif
 }
 
-/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal 2^(32 + shift) / slope. */
+/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal 2^(32 + shift) / slope;
+   of a slope of at least 16, so that `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift)
 {
     const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> 32;
     const uint64_t quotient = hystgen_wide((uint32_t)((uint64_t)d >> 32), reciprocal) + low;
-    return (int64_t)(((quotient >> (shift - 1u)) + 1u) >> 1);
+    const uint32_t high = (uint32_t)(quotient >> 32);
+    const uint32_t whole = high << (32u - shift) | (uint32_t)quotient >> shift;
+    return (int64_t)(((uint64_t)(high >> shift) << 32 | whole) + ((uint32_t)quotient >> (shift - 1u) & 1u));
 }

@@ -237,6 +237,8 @@ def _operator_files(values: SimpleNamespace, options: Options) -> tuple[list[str
             sources.append("clamp_drive.c")
         if values.fronts:
             sources.append("inverse_two_branches.c" if values.branches else "inverse_one_branch.c")
+        elif values.fixed:
+            sources.append("inverse_finer.c" if values.fine else "inverse_whole.c")
         sources.append(f"inverse{front}{kind}.c")
     return states, sources
 
