@@ -36,8 +36,9 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last place before x on the present move where another play begins to follow, or the present one. */
-static inline void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
+/* The last place on the present move where another play begins to follow before the output, or the input, is x; or the
+   present one. */
+HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
                                 int64_t x, bool by_output, hystgen_kink_t *kink)
 {
     const int64_t to = hystgen_along(here, x);
@@ -81,18 +82,6 @@ static inline void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
 }
 
-HYSTGEN_APART void hystgen_find_by_input(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                         const hystgen_corner_t *corner, int32_t input, hystgen_kink_t *kink)
-{
-    hystgen_find(t, here, corner, input, false, kink);
-}
-
-HYSTGEN_APART void hystgen_find_by_output(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                          const hystgen_corner_t *corner, int64_t output, hystgen_kink_t *kink)
-{
-    hystgen_find(t, here, corner, output, true, kink);
-}
-
 /* Moves the plays to any input. */
 HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                           int32_t to)
@@ -101,7 +90,7 @@ HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plac
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
     }
-    hystgen_find_by_input(t, here, corner, to, &kink);
+    hystgen_find(t, here, corner, to, false, &kink);
     const uint32_t way = (uint32_t)hystgen_along(here, to - kink.input);
     here->output = kink.output + hystgen_along(here, (int64_t)hystgen_wide(t->segment[kink.k].slope, way));
     here->input = to;
@@ -116,7 +105,7 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
     }
-    hystgen_find_by_output(t, here, corner, output, kink);
+    hystgen_find(t, here, corner, output, true, kink);
     const hystgen_segment_t *s = &t->segment[kink->k];
     const int64_t on = hystgen_along(here, output - kink->output);
     const int64_t x = hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
@@ -125,8 +114,8 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
 }
 
 /* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left. */
-static int64_t hystgen_next(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
-                            unsigned int depth, unsigned int k)
+static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                   const hystgen_corner_t *corner, unsigned int depth, unsigned int k)
 {
     if (depth == 0) {
         return (int64_t)1 << 62;
@@ -142,7 +131,7 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
 {
     const int64_t way = hystgen_along(here, to - kink->input);
     if (way >= 0) {
-        const int64_t next = hystgen_next(t, here, corner, kink->depth, kink->k);
+        const int64_t next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
         const int64_t moved = (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
         if (hystgen_along(here, kink->output) + moved <= next) {
             here->output = kink->output + hystgen_along(here, moved);
@@ -153,7 +142,7 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
         }
     }
     hystgen_move_to_input(t, here, corner, to);
-    return hystgen_next(t, here, corner, here->depth, here->k);
+    return hystgen_next_output(t, here, corner, here->depth, here->k);
 }
 
 /* The same at most where the input comes to `end`. */

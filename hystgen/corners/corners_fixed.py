@@ -11,8 +11,10 @@ from hystgen.reference import OFFSET
 
 INPUT_MOST = 2**31 - 1
 
-Place = tuple[Any, Any, int, int]
-"""`hystgen_kink_t`: input, output, plays that follow from there on, corners that hold the others."""
+Kink = tuple[Any, Any, int, int]
+"""`hystgen_kink_t`: output, input, plays that follow from there on, corners that hold the others."""
+
+FAR = 1 << 62
 
 
 def along(m: FixedMemory, x: Any) -> Any:
@@ -38,100 +40,96 @@ def turn_back(m: FixedMemory) -> None:
     m.counts[RISING] = 1 - m.counts[RISING]
 
 
-def kink(t: FixedTables, m: FixedMemory, depth: int, k: int) -> Place:
-    """The place where play k begins to follow the present move, until then held by the last of `depth` corners."""
-    c = depth - 1
-    if m.rose[c] == m.counts[RISING]:
-        return m.input[c], m.output[c], k, depth
-    return m.input[c] + along(m, t.way[k]), m.output[c] + along(m, t.reach[k]), k, depth
-
-
-def has_begun(t: FixedTables, m: FixedMemory, c: int, k: int, x: Any, by_output: int) -> bool:
-    """Whether play k, held by corner c, follows by the time that the input, or the output, is x."""
-    on = along(m, x - (m.output[c] if by_output else m.input[c]))
-    if m.rose[c] == m.counts[RISING]:
-        return bool(on >= 0)
-    return bool(on >= (t.reach[k] if by_output else t.way[k]))
-
-
-def find(t: FixedTables, m: FixedMemory, x: Any, by_output: int) -> Place:
-    """The last place before x on the present move where another play begins to follow, or the present one."""
-    place = (m.real[INPUT], m.real[OUTPUT], m.counts[K], m.counts[DEPTH])
+def find(t: FixedTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
+    """The last place on the present move where another play begins to follow before the output, or the input, is x; or
+    the present one."""
+    rising = m.counts[RISING]
+    held, whole = (m.output, t.reach) if by_output else (m.input, t.way)
+    to = along(m, x)
+    c = -1
+    low = 0
     left = m.counts[DEPTH]
     k = m.counts[K]
-    if left > 0 and has_begun(t, m, left - 1, m.top[left - 1], x, by_output):
-        left -= 1
-        low = 0
-        while low < left:
-            middle = (low + left) // 2
-            if has_begun(t, m, middle, m.top[middle], x, by_output):
-                left = middle
+    while low < left:
+        middle = (low + left) // 2
+        if to - along(m, held[middle]) >= (0 if m.rose[middle] == rising else whole[m.top[middle]]):
+            left = middle
+        else:
+            low = middle + 1
+    if left < m.counts[DEPTH]:
+        c = left
+        k = m.top[c]
+    if left > 0 and m.rose[left - 1] != rising:
+        top = left - 1
+        on = to - along(m, held[top])
+        before = k
+        last = m.top[top] - 1
+        while k < last:
+            middle = (k + last) // 2 + 1
+            if on >= whole[middle]:
+                k = middle
             else:
-                low = middle + 1
-        k = m.top[left]
-        at = kink(t, m, left + 1, k)
-        place = (at[0], at[1], k, left)
-    if left > 0:
-        last = m.top[left - 1] - 1
-        if k < last and has_begun(t, m, left - 1, k + 1, x, by_output):
-            k += 1
-            while k < last:
-                middle = (k + last) // 2
-                if has_begun(t, m, left - 1, middle + 1, x, by_output):
-                    k = middle + 1
-                else:
-                    last = middle
-            place = kink(t, m, left, k)
-    return place
-
-
-def go_on(t: FixedTables, m: FixedMemory, place: Place, to: Any) -> None:
-    """Move on from a place that the present move passes to an input at which the same plays follow."""
-    m.real[OUTPUT] = place[1] + t.slope[place[2] + 1] * (to - place[0])
-    m.real[INPUT] = to
-    m.counts[K] = place[2]
-    m.counts[DEPTH] = place[3]
+                last = middle - 1
+        c = top if k > before else c
+    if c < 0:
+        return m.real[OUTPUT], m.real[INPUT], k, left
+    if m.rose[c] == rising:
+        return m.output[c], m.input[c], k, left
+    return m.output[c] + along(m, t.reach[k]), m.input[c] + along(m, t.way[k]), k, left
 
 
 def move_to_input(t: FixedTables, m: FixedMemory, to: Any) -> None:
     """Move the plays to any input."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
-    go_on(t, m, find(t, m, to, 0), to)
+    output, begin, k, depth = find(t, m, to, False)
+    m.real[OUTPUT] = output + t.slope[k + 1] * (to - begin)
+    m.real[INPUT] = to
+    m.counts[K] = k
+    m.counts[DEPTH] = depth
 
 
-def solve(t: FixedTables, m: FixedMemory, output: Any) -> tuple[Any, Place]:
-    """The input that gives `output`, kept near the range, and the place that it was counted from; turns, but moves
+def solve(t: FixedTables, m: FixedMemory, output: Any) -> tuple[Any, Kink]:
+    """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves
     nothing."""
     if along(m, output - m.real[OUTPUT]) < 0:
         turn_back(m)
-    place = find(t, m, output, 1)
-    x = along(m, place[0]) + over_slope(t, along(m, output - place[1]), place[2] + 1)
+    kink = find(t, m, output, True)
+    x = along(m, kink[1]) + over_slope(t, along(m, output - kink[0]), kink[2] + 1)
     most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
-    return along(m, most if x > most else x), place
+    return along(m, most if x > most else x), kink
 
 
-def move_to_solution(t: FixedTables, m: FixedMemory, place: Place, to: Any) -> None:
-    """Move the plays to an input near the one that was solved for from `place`."""
-    if along(m, to - place[0]) >= 0:
-        following = to
-        if place[3] > 0:
-            following = kink(t, m, place[3], place[2] + 1)[0]
-        if along(m, following - to) >= 0:
-            go_on(t, m, place, to)
-            return
+def next_output(t: FixedTables, m: FixedMemory, depth: int, k: int) -> Any:
+    """Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left."""
+    if depth == 0:
+        return FAR
+    c = depth - 1
+    return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k + 1])
+
+
+def move_to_solution(t: FixedTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
+    at which another one begins to follow."""
+    output, begin, k, depth = kink
+    way = along(m, to - begin)
+    if way >= 0:
+        following = next_output(t, m, depth, k)
+        moved = t.slope[k + 1] * way
+        if along(m, output) + moved <= following:
+            m.real[OUTPUT] = output + along(m, moved)
+            m.real[INPUT] = to
+            m.counts[K] = k
+            m.counts[DEPTH] = depth
+            return following
     move_to_input(t, m, to)
+    return next_output(t, m, m.counts[DEPTH], m.counts[K])
 
 
-def look_ahead(t: FixedTables, m: FixedMemory, end: Any) -> Any:
-    """Output, as the present move sees it, up to which the same plays follow, or up to where the input comes to
-    `end`."""
-    k = m.counts[K]
-    output = along(m, m.real[OUTPUT]) + t.slope[k + 1] * along(m, end - m.real[INPUT])
-    if m.counts[DEPTH] > 0:
-        following = along(m, kink(t, m, m.counts[DEPTH], k + 1)[1])
-        return following if following < output else output
-    return output
+def look_ahead(t: FixedTables, m: FixedMemory, following: Any, end: Any) -> Any:
+    """The same at most where the input comes to `end`."""
+    last = along(m, m.real[OUTPUT]) + t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
+    return following if following < last else last
 
 
 def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
@@ -154,7 +152,6 @@ def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    along, leave_corner, turn_back, kink, has_begun, find, go_on, move_to_input, solve, move_to_solution,
-    look_ahead, start,
+    along, leave_corner, turn_back, find, move_to_input, solve, next_output, move_to_solution, look_ahead, start,
 ]  # fmt: skip  (callees before callers)
 INLINED: set[Callable[..., Any]] = {along}

@@ -72,12 +72,12 @@ def inverse_stay(m: FixedMemory) -> None:
     m.counts[ON] = 0
 
 
-def inverse_look_ahead(t: FixedTables, m: FixedMemory) -> None:
-    """Steps are usual while the same plays follow and nothing is limited, short of that by what rounding can add."""
+def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
+    """Steps are usual up to where another play begins to follow or something is limited, less what rounding can add."""
     rising = m.counts[RISING]
     most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
-    end = look_ahead(t, m, (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE])
-    last = (end >> t.limits[FRACTION]) - t.limits[SHY]
+    end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
+    last = (look_ahead(t, m, following, end) >> t.limits[FRACTION]) - t.limits[SHY]
     if last > m.real[NEXT]:
         m.real[NEXT] = last if last < most else most
 
@@ -88,14 +88,14 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
-        w, place = solve(t, m, level << t.limits[FRACTION])
+        w, kink = solve(t, m, level << t.limits[FRACTION])
         v = nearest(w, t.limits[FINE])
         inside = clamp_drive(t, v)
-        move_to_solution(t, m, place, inside << t.limits[FINE])
+        following = move_to_solution(t, m, kink, inside << t.limits[FINE])
         inverse_stay(m)
         m.counts[BITS] = (0 if level == u else INPUT_CLAMPED) | (0 if inside == v else OUTPUT_CLAMPED)
         if m.counts[BITS] == 0:
-            inverse_look_ahead(t, m)
+            inverse_look_ahead(t, m, following)
         m.real[REFERENCE] = u
         m.counts[REPEAT] = 1
     m.counts[STATUS] |= m.counts[BITS]

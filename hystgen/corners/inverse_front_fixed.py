@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_fixed import Place, move_to_input, move_to_solution, solve, start
+from hystgen.corners.corners_fixed import move_to_input, move_to_solution, solve, start
 from hystgen.corners.forward_fixed import code
 from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.inverse_fixed import inverse_clamp, put_undo, set_undo
@@ -49,13 +49,13 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     inverse_keep(m)
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
-        w, place = solve(t, m, level << t.limits[FRACTION])
+        w, kink = solve(t, m, level << t.limits[FRACTION])
         v, limited, _ = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
         m.counts[BITS] = (0 if level == u else INPUT_CLAMPED) | (0 if inside == v else OUTPUT_CLAMPED)
         if limited:
             m.counts[BITS] |= DOMAIN
-        move_to_solution(t, m, place, inverse_arrive(t, m, inside))
+        move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
         m.real[REFERENCE] = u
         m.real[LEVEL] = level
         m.counts[REPEAT] = 1
