@@ -153,8 +153,16 @@ def _reference(fixed_point: bool, corners: bool, front: bool, compiled: bool) ->
     from hystgen import fixed, kernels
     from hystgen import reference as plain
     from hystgen.corners import (
-        corners_fixed, corners_float, forward, forward_fixed, forward_front, inverse, inverse_fixed, inverse_front,
-        inverse_front_fixed, run,
+        corners_fixed,
+        corners_float,
+        forward,
+        forward_fixed,
+        forward_front,
+        inverse,
+        inverse_fixed,
+        inverse_front,
+        inverse_front_fixed,
+        run,
     )  # fmt: skip
     from hystgen.corners.memory import new_fixed_memory, new_memory
 

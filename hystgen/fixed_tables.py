@@ -326,7 +326,7 @@ class _Builder:
 
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = [0] * 24
+        limits = [0] * 18
         limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX] = self.drive
         limits[reference.OUTPUT_MIN], limits[reference.OUTPUT_MAX] = self.output
         limits[reference.OFFSET] = self.offset
@@ -341,7 +341,6 @@ class _Builder:
         if c.branches_differ and self.invertible:
             limits[reference.HOLD] = math.floor(2 * (self._inverse_rounding() or 0))
         limits[reference.REAL_MAX] = 2**SUM_BITS
-        limits[reference.MULTIPLE - 2 : reference.MULTIPLE + 3] = [-2, -1, 0, 1, 2]
         limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] = self.play
         limits[fixed.MARGIN], limits[fixed.FRACTION] = self.margin, self.bits
         limits[fixed.FINE], limits[fixed.CODE_MAX] = self.fine, self.code_max
@@ -360,7 +359,6 @@ class _Builder:
             threshold=whole(self.threshold),
             weight=whole(self.weight),
             slope=whole(self.slope),
-            lift=whole(self.lift),
             start_level=whole(levels),
             way=whole([2 * r for r in self.threshold]),
             reach=whole([2 * z for z in levels]),

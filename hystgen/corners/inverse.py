@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_float import forget_line, move_in_block, move_to_input, move_to_output, start, stop_in_block
+from hystgen.corners.corners_float import (
+    forget_line,
+    move_in_block,
+    move_to_input,
+    move_to_output,
+    start,
+    stop_in_block,
+)
 from hystgen.corners.memory import (
     BEFORE,
     BEGIN,
@@ -46,11 +53,12 @@ from hystgen.reference import (
     OUTPUT_MIN,
     REAL_MAX,
     ZERO,
+    PlayTables,
     Tables,
 )
 
 
-def clamp_drive(t: Tables, v: Any) -> Any:
+def clamp_drive(t: PlayTables, v: Any) -> Any:
     """v inside the range of the drive."""
     if v < t.limits[DRIVE_MIN]:
         return t.limits[DRIVE_MIN]

@@ -78,7 +78,7 @@ def inverse_hold(t: Tables, m: Memory) -> Any:
     return m.real[DRIVE]
 
 
-def inverse_fits(t: Tables, m: Memory, v: Any, ascending: int) -> bool:
+def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
     inside = clamp_drive(t, v)
     if inside == m.real[DRIVE]:
@@ -86,7 +86,7 @@ def inverse_fits(t: Tables, m: Memory, v: Any, ascending: int) -> bool:
     return bool((inside > m.real[DRIVE]) == (ascending != 0))
 
 
-def inverse_choose(t: Tables, m: Memory, level: Any, w: Any) -> tuple[Any, int, int]:
+def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> tuple[Any, int, int]:
     """The drive that gives w on the branch of its own move, whether an envelope cannot, and whether the drive moves."""
     if not t.branches:
         v, limited = front_inverse(t, w, 1)

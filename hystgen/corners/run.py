@@ -8,7 +8,7 @@ from typing import Any
 from hystgen.corners.forward import forward_init, forward_reset, forward_step, forward_visit
 from hystgen.corners.inverse import inverse_commit, inverse_init, inverse_reset, inverse_step, inverse_visit
 from hystgen.corners.memory import STATUS, Memory, Reals
-from hystgen.reference import OP_COMMIT, OP_INIT, OP_RESET, OP_STEP, ZERO, Bytes, Tables
+from hystgen.reference import OP_COMMIT, OP_INIT, OP_RESET, ZERO, Bytes, Tables
 
 
 def init(t: Tables, m: Memory, inverse: int) -> None:

@@ -169,10 +169,12 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     plays = place if fixed else layout.struct(place, *8 * [reals])
     if op == "forward":
         beside = [reals, flag, status] if front else [status]
-    elif front:
-        beside = [place, *4 * [reals], *4 * [flag], status] if fixed else [place, *5 * [reals], *5 * [flag], status, status]
+    elif fixed:
+        beside = [place, *4 * [reals], *4 * [flag]] if front else [place, (4, 4), (4, 4), reals, *3 * [flag]]
+        beside.append(status)
     else:
-        beside = [place, (4, 4), (4, 4), reals, *3 * [flag], status] if fixed else [place, reals, reals, flag, flag, status]
+        beside = [place, *5 * [reals], *5 * [flag], status] if front else [place, reals, reals, flag, flag]
+        beside.append(status)
     corners = max(n, 1) if fixed else n + 1
     return layout.struct(plays, *beside, (corners * corner, alignment))[0], corner
 
@@ -234,6 +236,6 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
     if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
         return 3, 10, 0, 2  # next 1, search 3
     # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
-    # 4 + 3, ahead 1; where samples can be fast: two edges, room 1, the range's ends 3, limited 2. The drive's corner and
-    # way, the reference's; two lines; with fast samples the edge.
+    # 4 + 3, ahead 1; where samples can be fast: two edges, room 1, the range's ends 3, limited 2. The drive's corner
+    # and way, the reference's; two lines; with fast samples the edge.
     return 6 + fast, 31 + 8 * fast, 0, 4

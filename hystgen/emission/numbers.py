@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -183,7 +182,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     corners = options.engine == "corners"
     numbers, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
     limits = numbers.limits
-    engine = _fixed_corner_fields(numbers, name, prefix, options) if corners else _fixed_loop_fields(numbers, name, prefix, options)
+    engine = (_fixed_corner_fields if corners else _fixed_loop_fields)(numbers, name, prefix, options)
     fine = int(limits[fixed.FINE])
     units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in units)
@@ -253,17 +252,19 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
     columns = (numbers.reach, numbers.way, numbers.slope[1:], numbers.reciprocal[1:], numbers.shift[1:])
     rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in zip(*columns, strict=True))
     most = (limits[fixed.MARGIN] - limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] + limits[fixed.MARGIN])
-    parts = (literal(limits[reference.OFFSET]), f"{{{literal(most[0])}, {literal(most[1])}}}", str(len(numbers.way) - 1))
+    ends = f"{{{', '.join(map(literal, most))}}}"
+    parts = f"{literal(limits[reference.OFFSET])}, {ends}, {len(numbers.way) - 1}"
     arrays = [
         f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
-        f"static const {prefix}_curve_t {name}_model_curve = {{\n    {name}_model_segment, {', '.join(parts)}\n}};\n",
+        f"static const {prefix}_curve_t {name}_model_curve = {{\n    {name}_model_segment, {parts}\n}};\n",
         table("int32_t", f"{name}_model_start", list(numbers.start)),
         table("int32_t", f"{name}_model_zero", list(numbers.zero)),
     ]
     for operator, first, wanted in (("forward", 0, options.forward), ("inverse", 2, options.inverse)):
         if wanted and numbers.fronts:
             drives = ", ".join(
-                f"{{{literal(numbers.applied[j])}, {'true' if numbers.ascending[j] else 'false'}}}" for j in (first, first + 1)
+                f"{{{literal(numbers.applied[j])}, {'true' if numbers.ascending[j] else 'false'}}}"
+                for j in (first, first + 1)
             )
             arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
     return {"arrays": arrays, "pointers": []}
