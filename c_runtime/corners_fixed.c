@@ -82,20 +82,39 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
 }
 
+/* The same for any move to an input; turns, moves nothing. */
+static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t to,
+                               hystgen_kink_t *kink)
+{
+    if (here->rising ? to < here->input : to > here->input) {
+        hystgen_turn_back(here, corner);
+    }
+    hystgen_find(t, here, corner, to, false, kink);
+}
+
+/* Moves the plays on from a kink to an input at which the same ones follow; `moved` is the output between. */
+static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to, int64_t moved)
+{
+    here->output = kink->output + hystgen_along(here, moved);
+    here->input = to;
+    here->k = kink->k;
+    here->depth = kink->depth;
+}
+
+/* Output that is gained from a kink on until the input comes to `to`, which may lie before it. */
+HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to)
+{
+    const int64_t way = hystgen_along(here, to - kink->input);
+    return way < 0 ? -1 : (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
+}
+
 /* Moves the plays to any input. */
 HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                           int32_t to)
 {
     hystgen_kink_t kink;
-    if (here->rising ? to < here->input : to > here->input) {
-        hystgen_turn_back(here, corner);
-    }
-    hystgen_find(t, here, corner, to, false, &kink);
-    const uint32_t way = (uint32_t)hystgen_along(here, to - kink.input);
-    here->output = kink.output + hystgen_along(here, (int64_t)hystgen_wide(t->segment[kink.k].slope, way));
-    here->input = to;
-    here->k = kink.k;
-    here->depth = kink.depth;
+    hystgen_find_input(t, here, corner, to, &kink);
+    hystgen_go_on(here, &kink, to, hystgen_gained(t, here, &kink, to));
 }
 
 /* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. */
@@ -127,22 +146,17 @@ static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it, at
    which another one begins to follow. */
 HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                             const hystgen_kink_t *kink, int32_t to)
+                                             hystgen_kink_t *kink, int32_t to)
 {
-    const int64_t way = hystgen_along(here, to - kink->input);
-    if (way >= 0) {
-        const int64_t next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
-        const int64_t moved = (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
-        if (hystgen_along(here, kink->output) + moved <= next) {
-            here->output = kink->output + hystgen_along(here, moved);
-            here->input = to;
-            here->k = kink->k;
-            here->depth = kink->depth;
-            return next;
-        }
+    int64_t next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
+    int64_t moved = hystgen_gained(t, here, kink, to);
+    if (moved < 0 || hystgen_along(here, kink->output) + moved > next) { /* by rounding, or it was limited */
+        hystgen_find_input(t, here, corner, to, kink);
+        next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
+        moved = hystgen_gained(t, here, kink, to);
     }
-    hystgen_move_to_input(t, here, corner, to);
-    return hystgen_next_output(t, here, corner, here->depth, here->k);
+    hystgen_go_on(here, kink, to, moved);
+    return next;
 }
 
 /* The same at most where the input comes to `end`. */
