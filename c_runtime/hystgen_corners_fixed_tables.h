@@ -18,15 +18,6 @@ typedef struct {
     uint_least16_t n;                 /* plays without play 0 */
 } hystgen_curve_t;
 
-/* A place on the present move where another play begins to follow, or where the move is now: from there on plays 0 .. k
-   do and `depth` corners hold the others. */
-typedef struct {
-    int64_t output;
-    int64_t input;
-    uint_least16_t k;
-    uint_least16_t depth;
-} hystgen_kink_t;
-
 /* The drive that a start memory stands for, within its range. */
 typedef struct {
     int32_t drive;

@@ -4,7 +4,6 @@
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
-    hystgen_place_t undo;      /* where the plays were before the last step */
     hystgen_real_t drive;      /* that the plays are at */
     hystgen_real_t undo_drive;
     hystgen_real_t reference;  /* of the last step */
@@ -14,6 +13,8 @@ typedef struct {
     bool repeat;               /* the last answer still stands for `reference` */
     uint_least8_t bits;        /* status of that answer */
     unsigned int status;
+    hystgen_place_t undo;      /* where the plays were before the last step */
+    hystgen_kink_t kink;       /* of the present step; here rather than on the stack */
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_inverse_t;
 

@@ -38,16 +38,15 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     self->usual = false;
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
-        hystgen_kink_t kink;
         const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)hystgen_solve(
-            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &kink));
+            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &self->kink));
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
                                      (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u));
         self->reference = u;
         self->repeat = true;
         hystgen_inverse_stay(self);
-        const int64_t next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink,
+        const int64_t next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink,
                                                       hystgen_front(inside));
         if (self->bits == 0) {
             hystgen_inverse_look_ahead(self, next);

@@ -28,9 +28,8 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     hystgen_inverse_keep(self);
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
-        hystgen_kink_t kink;
         const hystgen_reach_t w = (hystgen_reach_t)hystgen_solve(
-            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &kink);
+            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &self->kink);
         bool limited = false;
         bool moves = true;
         const hystgen_reach_t v = hystgen_inverse_choose(self, level, w, &limited, &moves);
@@ -38,7 +37,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
                                      (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u) |
                                      (limited ? HYSTGEN_STATUS_DOMAIN : 0u));
-        (void)hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &kink,
+        (void)hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink,
                                        hystgen_inverse_arrive(self, inside));
         self->reference = u;
         self->level = level;

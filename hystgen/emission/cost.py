@@ -75,6 +75,7 @@ def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[i
         return {
             "place_t": layout.struct(eight, four, two, two, one),
             "segment_t": layout.struct(eight, four, four, four, one),
+            "kink_t": layout.struct(eight, eight, two, two),
             "corner_t": layout.struct(eight, four, two, one),
             "curve_t": layout.struct(pointer, eight, eight, eight, two),
             "drive_t": layout.struct(four, one),
@@ -170,8 +171,8 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     if op == "forward":
         beside = [reals, flag, status] if front else [status]
     elif fixed:
-        beside = [place, *4 * [reals], *4 * [flag]] if front else [place, (4, 4), (4, 4), reals, *3 * [flag]]
-        beside.append(status)
+        beside = [*4 * [reals], *4 * [flag]] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
+        beside += [status, place, structs["kink_t"]]
     else:
         beside = [place, *5 * [reals], *5 * [flag], status] if front else [place, reals, reals, flag, flag]
         beside.append(status)

@@ -279,7 +279,7 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     roots = _corner_roots(values, options) if corners else _loop_roots(values, options)
     types = {f"hystgen_{stage['kind']}_t" for stage in values.stages}
     if corners:
-        types |= {"hystgen_segment_t", "hystgen_curve_t", "hystgen_kink_t" if values.fixed else "hystgen_start_t"}
+        types |= {"hystgen_segment_t", "hystgen_curve_t", *(() if values.fixed else ("hystgen_start_t",))}
         types |= {"hystgen_drive_t"} if values.fronts else set()
     else:
         types.add("hystgen_tables_t")
