@@ -35,7 +35,7 @@ prove: $(VENV)/ready
 	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
 
 lint: $(VENV)/ready
-	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime
+	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime docs
 	$(BIN)/mypy
 	$(BIN)/python tests/static_checks.py
 

@@ -1,10 +1,11 @@
-"""Measure what `engine: auto` chooses from: instructions of a sample with each engine, for few plays.
+"""Measure what `engine: auto` chooses from: instructions of a sample with each engine, for few plays, and code.
 
-    python benchmarks/engine_costs.py [-o hystgen/engine_costs.csv]
+    python benchmarks/engine_costs.py [-o hystgen]
 
-Mean over a decaying multisine, strict -O2 build of zig, the geometric mean of a Cortex-M0+ without and a Cortex-M4F
-with an FPU, for both operators, every arithmetic, with and without a memoryless part (a dead zone). The shipped table
-is read by `hystgen.tables.choose_engine`, so that the same parameters give the same C everywhere.
+Instructions are the mean over a decaying multisine, strict -O2 build of zig, for both operators, every arithmetic, with
+and without a memoryless part (a dead zone). Code is that of a module at -O2, of zig and gcc the larger one, for every
+kind that `hystgen.engines.kind` tells apart. Both on a Cortex-M0+ without and a Cortex-M4F with an FPU. The shipped
+tables are read by `hystgen.engines`, so that the same parameters give the same C everywhere.
 """
 
 from __future__ import annotations
@@ -20,32 +21,44 @@ from typing import Any
 import numpy as np
 import targets as bench
 
-from hystgen import reference, simulation
+from hystgen import engines, reference, simulation
 from hystgen.api import Model, emit_options
+from hystgen.emission import module
 from hystgen.params import parse_parameters
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 PLAYS = (1, 2, 3, 4, 6, 8, 16)
-CORES = ("cortex-m0plus", "cortex-m4f")
+CODE_PLAYS = 10  # code hardly depends on the number of plays
 KINDS = ("pi", "gpi")
-FRONT = "  memoryless: {kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}\n"
-SHIPPED = Path(__file__).resolve().parents[1] / "hystgen" / "engine_costs.csv"
+DEAD_ZONE = "{kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}"
+TANH = "{kind: tanh, ascending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.2}}"
+BRANCHES = TANH[:-1] + ", descending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.5}}"
+FRONTS = {
+    "pi": "",
+    "dead_zone": DEAD_ZONE,
+    "dead_zone_branches": BRANCHES,  # in fixed point, where every stage becomes a curve
+    "tanh": TANH,
+    "tanh_branches": BRANCHES,
+    "mixed": f"[{DEAD_ZONE}, {TANH}]",
+    "mixed_branches": f"[{DEAD_ZONE}, {BRANCHES}]",
+}
+SHIPPED = Path(__file__).resolve().parents[1] / "hystgen"
 
 
 @functools.cache
-def model(n: int, kind: str) -> Model:
-    """The benchmark's model, as it is or behind a dead zone."""
+def model(n: int, front: str) -> Model:
+    """The benchmark's model, as it is or behind stages."""
     p = bench.model(n).parameters.model.pi
     text = (
         f"hystgen: 1\nname: bench\ninput_range: [-{bench.RANGE}, {bench.RANGE}]\nmodel:\n  pi:\n"
         f"    thresholds: {list(p.thresholds)}\n    weights: {list(p.weights)}\n"
     )
-    return Model(parse_parameters(text + FRONT * (kind == "gpi"), "bench.yaml"))
+    return Model(parse_parameters(text + (f"  memoryless: {front}\n" if front else ""), "bench.yaml"))
 
 
-def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict[str, float]:
-    """Geometric mean over the cores of the mean instructions of a sample, for each operator."""
-    one = model(n, kind)
+def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict[str, dict[str, float]]:
+    """Mean instructions of a sample on each core, for each operator."""
+    one = model(n, DEAD_ZONE if kind == "gpi" else "")
     files = sources.write(folder, one, emit_options(one, "both", arithmetic, engine))
     numbers, real = one.tables(arithmetic, engine), comparison.REALS[arithmetic]
     ends = numbers.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1]
@@ -54,39 +67,70 @@ def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict
     call = np.full(len(drive), reference.OP_STEP, dtype=np.uint8)
     session = simulation.Session(one.cascade, "forward", arithmetic, engine)
     signals: dict[str, Any] = {"forward": drive, "inverse": session.run(drive)[0].astype(float)}
-    found = dict.fromkeys(signals, 1.0)
-    for core in CORES:
+    found: dict[str, dict[str, float]] = {op: {} for op in signals}
+    for core in engines.CORES:
         target = targets.find(core)
-        entry = f"hystgen_harness_{files.operators[0]}"
-        program = cross.find(target, "zig").image(files, folder / core, compilers.STRICT, cross.Layout(), entry)
-        image = emulator.Image.load(program)
+        image = emulator.Image.load(_program(files, folder / core, core, "zig"))
         for op, x in signals.items():
             machine = emulator.Core(target, image)
             record = comparison.expected_record(numbers, real, op == "inverse", ("signal", call, x))
             outcome = comparison.compare(functools.partial(machine.run, "bench", op), [record])
             assert not outcome.different, (n, kind, arithmetic, engine, op, outcome)
-            found[op] *= float(machine.counts.mean()) ** (1 / len(CORES))
+            found[op][core] = float(machine.counts.mean())
+    return found
+
+
+def _program(files: sources.Sources, folder: Path, core: str, compiler: str) -> Path:
+    entry = f"hystgen_harness_{files.operators[0]}"
+    return cross.find(targets.find(core), compiler).image(files, folder, compilers.STRICT, cross.Layout(), entry)
+
+
+def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -> dict[str, int]:
+    """Bytes of code of a module on each core, constant tables left out; of both compilers the larger one."""
+    one = model(CODE_PLAYS, FRONTS[kind])
+    assert engines.kind(one.cascade, arithmetic) == kind
+    options = emit_options(one, operator, arithmetic, engine)
+    files = sources.write(folder, one, options)
+    constants = module.cost_of(one.parameters, one.cascade, options).memory.tables
+    found = {}
+    for core in engines.CORES:
+        built = [_program(files, folder / f"{core}-{compiler}", core, compiler) for compiler in ("zig", "gcc")]
+        found[core] = max(emulator.Image.load(program).sections[".module"] for program in built) - constants
     return found
 
 
 def main() -> None:
-    """Measure everything and write the table."""
+    """Measure everything and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-o", "--output", type=Path, default=SHIPPED, help="the table, default the shipped one")
-    output = parser.parse_args().output
-    rows = []
+    parser.add_argument("-o", "--output", type=Path, default=SHIPPED, help="folder of the tables, default the shipped")
+    parser.add_argument("--only", choices=("costs", "sizes"), help="one of the tables")
+    arguments = parser.parse_args()
+    costs: list[tuple[Any, ...]] = []
+    sizes: list[tuple[Any, ...]] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-costs-") as place:
-        for number, (arithmetic, kind, n) in enumerate(itertools.product(comparison.REALS, KINDS, PLAYS)):
-            loop, corners = (
-                means(Path(place) / f"{number}-{engine}", n, kind, arithmetic, engine) for engine in ("loop", "corners")
-            )
-            for op in ("forward", "inverse"):
-                rows.append((op, arithmetic, kind, n, round(loop[op]), round(corners[op])))
-                print(*rows[-1], flush=True)
-    with output.open("w", newline="", encoding="ascii") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("operator", "arithmetic", "kind", "n", "loop", "corners"))
-        writer.writerows(sorted(rows))
+        for arithmetic, kind, n, engine in itertools.product(comparison.REALS, KINDS, PLAYS, engines.ENGINES):
+            if arguments.only != "sizes":
+                found = means(Path(place) / f"{len(costs)}", n, kind, arithmetic, engine)
+                costs += [(op, arithmetic, kind, n, engine, *map(round, cores.values())) for op, cores in found.items()]
+                print(*costs[-1], flush=True)
+        for arithmetic, kind in itertools.product(comparison.REALS, FRONTS):
+            told_apart = kind in ("pi", "dead_zone") or (kind == "dead_zone_branches") == (arithmetic in ("q31", "q15"))
+            if arguments.only == "costs" or not told_apart:
+                continue
+            for operator, engine in itertools.product(module.OPERATORS, engines.ENGINES):
+                found_code = code(Path(place) / f"code-{len(sizes)}", kind, operator, arithmetic, engine)
+                sizes.append((operator, arithmetic, kind, engine, *found_code.values()))
+                print(*sizes[-1], flush=True)
+    about = ("operator", "arithmetic", "kind")
+    for name, header, rows in (
+        ("engine_costs.csv", (*about, "n", "engine"), costs),
+        ("code_sizes.csv", (*about, "engine"), sizes),
+    ):
+        if rows:
+            with (arguments.output / name).open("w", newline="", encoding="ascii") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow((*header, *engines.CORES))
+                writer.writerows(sorted(rows))
 
 
 if __name__ == "__main__":

@@ -10,10 +10,20 @@ static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_rea
 #endif
 }
 
+/* Field by field: for a whole structure a compiler may call memcpy. */
+HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
+{
+    to->input = from->input;
+    to->output = from->output;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
 /* Puts the plays where there is no line to go on along: the next sample searches. */
 HYSTGEN_KERNEL void hystgen_put(hystgen_plays_t *m, const hystgen_place_t *place)
 {
-    m->here = *place;
+    hystgen_copy_place(&m->here, place);
     m->sign = (hystgen_real_t)(place->rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
@@ -23,12 +33,11 @@ HYSTGEN_KERNEL void hystgen_put(hystgen_plays_t *m, const hystgen_place_t *place
 HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner)
 {
     const hystgen_segment_t *s = &t->segment[m->here.k];
-    const hystgen_real_t input = hystgen_along(m, m->here.input);
     const hystgen_real_t room = t->limit[!m->here.rising] + hystgen_along(m, m->here.output);
     hystgen_corner_t *c = &corner[m->here.depth];
     c->output = m->here.output;
-    c->pass[m->here.rising] = input;
-    c->pass[!m->here.rising] = s->reach > room ? HYSTGEN_REAL_MAX : s->way - input;
+    c->pass[m->here.rising] = hystgen_along(m, m->here.input);
+    c->pass[!m->here.rising] = s->reach > room ? HYSTGEN_REAL_MAX : s->way - c->pass[m->here.rising];
     c->top = m->here.k;
     c->rose = m->here.rising;
     m->here.depth = (uint_least16_t)(m->here.depth + 1u);
@@ -41,13 +50,13 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hyst
         m->here.k = 0;
     }
     m->here.rising = !m->here.rising;
-    m->here.limited = false;
+    m->limited = false;
     m->sign = -m->sign;
 }
 
 /* The last of segments k .. last that begins before `way`; `step` is the way, or the reach, of segment 1. */
-HYSTGEN_APART unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
-                                                hystgen_real_t way)
+static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
+                                         hystgen_real_t way)
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
@@ -89,8 +98,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
-        const bool one_by_one = corner[middle].rose != m->here.rising;
-        const hystgen_real_t reach = one_by_one ? t->segment[corner[middle].top].reach : 0;
+        const hystgen_real_t reach = corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
         if (hystgen_along(m, output - corner[middle].output) >= reach) {
             m->here.depth = (uint_least16_t)middle;
             m->here.k = corner[middle].top;
@@ -98,7 +106,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
             kept = middle;
         }
     }
-    m->here.limited = false;
+    m->limited = false;
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
@@ -215,16 +223,18 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
                                   const hystgen_start_t *start)
 {
-    hystgen_place_t p = {start->center[0][0], start->center[0][1], 0, 1, true, false};
-    corner[0] = start->bottom;
-    for (p.k = (uint_least16_t)(start->bottom.top - 1u); p.k > 0; --p.k) {
-        const hystgen_real_t *center = start->center[start->step * p.k];
+    hystgen_place_t p = {start->center[0][0], start->center[0][1], 0, 1, true};
+    corner[0].output = start->bottom.output;
+    corner[0].pass[0] = start->bottom.pass[0];
+    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].top = start->bottom.top;
+    corner[0].rose = start->bottom.rose;
+    for (p.k = (uint_least16_t)(start->bottom.top - 1u); p.k > 0; --p.k, ++p.depth) {
         p.rising = p.k <= start->risen;
         hystgen_put(m, &p);
-        m->here.input = center[0] + hystgen_along(m, t->segment[p.k].way * HYSTGEN_HALF);
-        m->here.output = center[1] + hystgen_along(m, t->segment[p.k].reach * HYSTGEN_HALF);
+        m->here.input = start->center[start->step * p.k][0] + hystgen_along(m, t->segment[p.k].way * HYSTGEN_HALF);
+        m->here.output = start->center[start->step * p.k][1] + hystgen_along(m, t->segment[p.k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
-        p.depth = m->here.depth;
     }
     p.rising = true;
     hystgen_put(m, &p);

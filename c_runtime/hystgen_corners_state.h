@@ -8,7 +8,6 @@ typedef struct {
     uint_least16_t k;
     uint_least16_t depth;
     bool rising;             /* direction of the present move */
-    bool limited;            /* the output is a limit and the input may lie beyond what gives it */
 } hystgen_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to play `top`. */
@@ -31,6 +30,7 @@ typedef struct {
     hystgen_real_t start;
     hystgen_real_t gain;
     hystgen_real_t sign;     /* 1 for rising, -1 for falling */
+    bool limited;            /* the output is a limit and the input may lie beyond what gives it */
 } hystgen_plays_t;
 
 #endif

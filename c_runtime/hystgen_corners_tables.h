@@ -17,13 +17,12 @@ typedef struct {
     hystgen_real_t range[2];          /* of the input */
 } hystgen_curve_t;
 
-/* A start memory. `center` is the input and output of the sum while plays 0 .. k hold what play k does: one for each
-   play (step 1), or one for all where they hold the same (step 0). */
+/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does. */
 typedef struct {
-    const hystgen_real_t (*center)[2];
+    const hystgen_real_t (*center)[2]; /* one for each play (step 1), or one for all where they hold the same (0) */
     uint_least16_t step;
-    uint_least16_t risen;             /* plays up to this one are left by rising moves, the others by falling ones */
-    hystgen_corner_t bottom;          /* plays from its `top` on cannot move within the range */
+    uint_least16_t risen;              /* plays up to this one are left by rising moves, the others by falling ones */
+    hystgen_corner_t bottom;           /* plays from its `top` on cannot move within the range */
 } hystgen_start_t;
 
 /* The drive that a start memory stands for, within its range, and the input of the plays there. */

@@ -3,25 +3,24 @@
 /* Any other sample than a usual one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u)
 {
+    const hystgen_curve_t *t = &hystgen_inverse_curve;
     hystgen_plays_t *m = &self->plays;
     hystgen_real_t x = u - HYSTGEN_OFFSET;
     unsigned int bits = 0;
-    self->undo = m->here;
+    hystgen_copy_place(&self->undo, &m->here);
     if (!(u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX)) {
         bits = u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX ? HYSTGEN_STATUS_INPUT_CLAMPED : HYSTGEN_STATUS_HELD;
         x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
     }
     if (bits == HYSTGEN_STATUS_HELD) { /* no number: the last answer once more */
         if (self->stepped && self->committed) {
-            hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, self->returned);
+            hystgen_move_to_output(t, m, self->corner, self->returned);
         }
-    } else if (m->here.limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
+    } else if (m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
         bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
-    } else if ((x < m->here.input || x > m->here.input) &&
-               !hystgen_move_to_input(&hystgen_inverse_curve, m, self->corner, x)) {
-        hystgen_stop_in_block(&hystgen_inverse_curve, m, self->corner,
-                              m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
-        m->here.limited = true;
+    } else if ((x < m->here.input || x > m->here.input) && !hystgen_move_to_input(t, m, self->corner, x)) {
+        hystgen_stop_in_block(t, m, self->corner, m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
+        m->limited = true;
         bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
     self->before = m->here.input;
@@ -33,7 +32,6 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
 
 /* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive in
    its place. While `limited` is set, references beyond `input` have the same answer, a limit of the drive.
-
    stepped  committed  the memory is at      a commit replaces     a NaN answers, and leaves in memory
    no       no         the start drive       nothing               the start drive
    no       yes        the committed drive   the committed drive   the committed drive
@@ -51,7 +49,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
             return m->here.output;
         }
         if (m->here.rising ? x < m->cap : x > m->cap) {
-            self->undo = m->here;
+            hystgen_copy_place(&self->undo, &m->here);
             self->before = x;
             return hystgen_move_in_block(&hystgen_inverse_curve, m, self->corner, x);
         }
@@ -67,15 +65,13 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    if (v < applied || v > applied) {
-        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
-    }
+    self->status |= v < applied || v > applied ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
     if (self->stepped && !self->committed) {
         self->returned = m->here.output;
     }
     self->committed = true;
     if (self->before < m->here.input || self->before > m->here.input) { /* the last step went on along its line */
-        self->undo = m->here;
+        hystgen_copy_place(&self->undo, &m->here);
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
@@ -86,11 +82,11 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
 
 HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start)
 {
-    hystgen_plays_t *m = &self->plays;
-    hystgen_start(&hystgen_inverse_curve, m, self->corner, start);
-    hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, hystgen_clamp_drive(m->here.output));
-    self->undo = m->here;
-    self->before = m->here.input;
+    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
+    hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner,
+                           hystgen_clamp_drive(self->plays.here.output));
+    hystgen_copy_place(&self->undo, &self->plays.here);
+    self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;
     self->status = 0;

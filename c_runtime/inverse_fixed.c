@@ -24,10 +24,10 @@ static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
     const bool rising = self->here.rising;
     const int32_t most = hystgen_inverse_sees(self, rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
     const int32_t end = hystgen_front(rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
-    const int64_t last =
-        (hystgen_look_ahead(&hystgen_model_curve, &self->here, next, end) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
-    if (last > self->next) {
-        self->next = last < most ? (int32_t)last : most;
+    const int64_t last = hystgen_look_ahead(&hystgen_model_curve, &self->here, next, end);
+    const int64_t usual = (last >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
+    if (usual > self->next) {
+        self->next = usual < most ? (int32_t)usual : most;
     }
 }
 
@@ -38,8 +38,9 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     self->usual = false;
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
-        const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)hystgen_solve(
-            &hystgen_model_curve, &self->here, self->corner, (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION), &self->kink));
+        const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
+        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, &self->kink);
+        const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)w);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
                                      (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u));

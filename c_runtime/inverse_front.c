@@ -3,7 +3,7 @@
 /* The next step begins here. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self)
 {
-    self->undo = self->plays.here;
+    hystgen_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }

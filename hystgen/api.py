@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import arguments, tables
+from hystgen import arguments, engines, tables
 from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, Stage, TanhEnvelope
 from hystgen.params import Parameters, load_parameters
 from hystgen.problems import EffectsError, UnsupportedEffectsError
@@ -85,11 +85,17 @@ class Model:
                 "the model forward in double precision"
             )
 
-    def engine(self, engine: str | None = None, operator: str | None = None, arithmetic: str | None = None) -> str:
-        """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided."""
+    def engine(
+        self,
+        engine: str | None = None,
+        operator: str | None = None,
+        arithmetic: str | None = None,
+        optimize: str | None = None,
+    ) -> str:
+        """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
         emit = self.parameters.emit
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
-        return tables.choose_engine(engine or emit.engine, self.cascade, *about)
+        return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
 
     def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables:
         """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
@@ -245,6 +251,7 @@ def emit_options(
     arithmetic: str | None = None,
     engine: str | None = None,
     layout: str = "self-contained",
+    optimize: str | None = None,
 ) -> Options:
     """What is to be emitted: the arguments given, else the parameter file's `emit` section."""
     from hystgen.emission import module
@@ -254,9 +261,10 @@ def emit_options(
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
     check_arithmetic(arithmetic)
     arguments.choice("operator", operator, module.OPERATORS)
-    arguments.choice("engine", engine or "auto", ("auto", *tables.ENGINES))
+    arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
+    arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, module.LAYOUTS)
-    return module.Options(operator, arithmetic, model.engine(engine, operator, arithmetic), layout)
+    return module.Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout)
 
 
 def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
@@ -287,7 +295,8 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str |
     """Write the C files of a model (or parameter file), or of several, into folder `output` and return their paths.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
-    loop; `layout` self-contained, shared-runtime or single-header. What is not given comes from the parameter file.
+    loop; `optimize` auto, speed or size, for what `engine` auto chooses; `layout` self-contained, shared-runtime or
+    single-header. What is not given comes from the parameter file.
     Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
     FormatError and UnsupportedEffectsError; then nothing is written.
     """

@@ -1,19 +1,19 @@
 """How far a compiled operator can be from the exact model: rounding-error bounds, derived once for every model.
 
-Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own error,
-because a play never amplifies a difference of its input, threshold or start value (3); sums and products add their unit
-roundoffs.
+Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own
+error, because a play never amplifies a difference of its input, threshold or start value (3); sums and products add
+their unit roundoffs.
 
 Engine `corners`: an answer is computed from the corner that it hangs on, which was an answer itself, so that the
 roundings of up to n + 1 corners and of the answer add up. `CornerRoundings` counts those of one of them.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
 residual eta. That needs solving to stop where another play would follow: on the straight piece before, of slope P_k,
-rounding of eta is one of eta / P_k in w, which behind that place would count with a steeper slope. Engine `loop` stops
-there, engine `corners` goes over to the steeper piece as much earlier as rounding can carry; neither answers a move with
-one the other way, which would do the same to the plays that follow behind a turn. The exact inverse turns a reference
-error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front into that over
-its smallest slope. A clamp or commit gives both the same drive and adds nothing.
+rounding of eta is one of eta / P_k in w, which behind that place would count with a steeper slope. Engine `loop`
+stops there, engine `corners` goes over to the steeper piece as much earlier as rounding can carry; neither answers a
+move with one the other way, which would do the same to the plays that follow behind a turn. The exact inverse turns a
+reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front
+into that over its smallest slope. A clamp or commit gives both the same drive and adds nothing.
 
 With two branches two drives can give the same output, one on each, and rounding decides between them where the
 reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
@@ -76,9 +76,10 @@ def _stage_errors(
 class CornerRoundings:
     """Roundings of the corner engine, derived operation by operation from `c_runtime/corners_float.c`.
 
-    `forward`, `inverse`: what one answer adds to the difference between the sum of the plays and the exact one, for plays
-    that have seen the same inputs, in output units; `early`: how much earlier than exactly the inverse has plays follow,
-    in output units; `margin`: how far an answer along a line can lie beyond the exact one, in units of the plays' input.
+    `forward`, `inverse`: what one answer adds to the difference between the sum of the plays and the exact one, for
+    plays that have seen the same inputs, in output units; `early`: how much earlier than exactly the inverse has plays
+    follow, in output units; `margin`: how far an answer along a line can lie beyond the exact one, in units of the
+    plays' input.
 
     With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays, T its travel: no output is larger
     than C W, no change of it larger than C T. A table entry or an operation adds u times the size of its result; an

@@ -82,6 +82,9 @@ operator_option = click.option(
 )
 arithmetic_option = click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="default: the file's")
 engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
+optimize_option = click.option(
+    "--optimize", type=click.Choice(["auto", "speed", "size"]), help="what engine auto chooses for; default: the file's"
+)
 effects_option = click.option(
     "--effects", multiple=True, type=click.Path(), metavar="FILE.py", help="effects of your own (user:..); repeatable"
 )
@@ -106,6 +109,7 @@ def main() -> None:
 @operator_option
 @arithmetic_option
 @engine_option
+@optimize_option
 @layout_option
 @click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
@@ -183,6 +187,7 @@ def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[st
 @operator_option
 @arithmetic_option
 @engine_option
+@optimize_option
 @layout_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))

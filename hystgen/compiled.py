@@ -178,7 +178,7 @@ def _reference(fixed_point: bool, corners: bool, front: bool, compiled: bool) ->
             functions = list(fixed.SHARED)
             modules = (corners_fixed, forward_fixed, inverse_front_fixed if front else inverse_fixed)
         else:
-            functions = [kernels.tanh, kernels.atanh, *plain.FRONT] if front else []
+            functions = [kernels.tanh, kernels.atanh, *plain.FRONT]
             modules = (corners_float, *((forward_front, inverse_front) if front else (forward, inverse)))
         inlined = set()
         for module in modules:

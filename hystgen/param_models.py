@@ -230,6 +230,9 @@ class EmitDefaults(_Part):
         default="float32", description="number format of the C"
     )
     engine: Literal["auto", "corners", "loop"] = Field(default="auto", description="how the play sum is evaluated")
+    optimize: Literal["auto", "speed", "size"] = Field(
+        default="auto", description="what engine auto chooses for: instructions, code, or both weighed"
+    )
     drive_lsb: Positive | None = Field(default=None, description="fixed point: input units per code")
     output_lsb: Positive | None = Field(default=None, description="fixed point: output units per code")
 

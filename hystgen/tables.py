@@ -5,13 +5,10 @@ Everything a compiled operator knows comes from here, once, for the bit referenc
 
 from __future__ import annotations
 
-import csv
-import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +25,6 @@ if TYPE_CHECKING:
     from hystgen.fixed import FixedTables
 
 ARITHMETICS = ("float32", "float64", "q31", "q15")
-ENGINES = ("corners", "loop")
 FLOAT_ARITHMETICS = ("float32", "float64")
 
 
@@ -41,40 +37,6 @@ class FormatError(ValueError):
     def __init__(self, *problems: str | tuple[Path, str]) -> None:
         self.problems = [((), problem) if isinstance(problem, str) else problem for problem in problems]
         super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))
-
-
-def choose_engine(engine: str, cascade: Cascade, operator: str, arithmetic: str) -> str:
-    """The engine that `auto` stands for: what takes fewer instructions in the measured table `engine_costs.csv`.
-
-    The table's next smaller number of plays decides; for both operators the sum. Any other choice is kept, but without
-    plays nothing is listed.
-    """
-    if engine not in ("auto", *ENGINES):
-        raise ValueError(f"engine {engine!r} is none of auto, {', '.join(ENGINES)}")
-    n = cascade.pi.n
-    if n == 0:
-        return "loop"
-    if engine != "auto":
-        return engine
-    kind = "gpi" if cascade.stages else "pi"
-    operators = ("forward", "inverse") if operator == "both" else (operator,)
-    loop = corners = 0
-    for one in operators:
-        measured = _engine_costs()[one, arithmetic, kind]
-        costs = measured[max(plays for plays in measured if plays <= n)]
-        loop, corners = loop + costs[0], corners + costs[1]
-    return "corners" if corners < loop else "loop"
-
-
-@functools.cache
-def _engine_costs() -> dict[tuple[str, str, str], dict[int, tuple[int, int]]]:
-    """Instructions of a sample, loop and corners, by number of plays; for each operator, arithmetic and kind."""
-    found: dict[tuple[str, str, str], dict[int, tuple[int, int]]] = {}
-    with (FilePath(__file__).parent / "engine_costs.csv").open(encoding="ascii", newline="") as file:
-        for row in csv.DictReader(file):
-            about = (row["operator"], row["arithmetic"], row["kind"])
-            found.setdefault(about, {})[int(row["n"])] = (int(row["loop"]), int(row["corners"]))
-    return found
 
 
 def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
@@ -176,8 +138,9 @@ def build(
     """Tables of `cascade` in 'float32', 'float64', 'q31' or 'q15' for engine 'corners' or 'loop'.
 
     Without `clamp` the drive and output limits are those of the (float) arithmetic, and without `inverse` too the
-    stages are not cut to where they can be inverted; `lsb` are the physical units of a drive and an output code in fixed
-    point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises FormatError when the model does not fit the arithmetic.
+    stages are not cut to where they can be inverted; `lsb` are the physical units of a drive and an output code in
+    fixed point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises
+    FormatError when the model does not fit the arithmetic.
     """
     if arithmetic in FLOAT_ARITHMETICS:
         return build_float(cascade, arithmetic, engine, clamp, inverse, visited)
@@ -290,7 +253,10 @@ def build_float(
             tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
     for j, w in ((2, pi.start[0]), (3, 0.0)):  # plays at rest where the drive cannot be come to where it starts
         tables.begin[j] = w
-        if cascade.stages and cascade.start_is_defined and not low <= float(dtype(float(cascade.front_inverse(float(w))))) <= high:
+        if not (cascade.stages and cascade.start_is_defined):
+            continue
+        begins = float(dtype(float(cascade.front_inverse(float(w)))))
+        if not low <= begins <= high:
             tables.begin[j] = reference.front_forward(tables, tables.applied[j], int(tables.ascending[j]))
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))

@@ -577,14 +577,17 @@ def test_a_compiler_that_does_not_exist_fails_and_is_named(installed: str) -> No
     assert "no-such-cc" in result.stdout + result.stderr
 
 
-def sabotage(monkeypatch: pytest.MonkeyPatch, table: str, change: Callable[[np.float32], np.float32]) -> None:
-    """From now on the last number of a table of the plays in the emitted C is another one."""
+def sabotage(monkeypatch: pytest.MonkeyPatch, operator: str, change: Callable[[np.float32], np.float32]) -> None:
+    """From now on the gain of the last play in the emitted C is another one."""
     right = module.files
 
     def wrong(*arguments: Any) -> dict[str, str]:
         made = right(*arguments)
-        found = re.search(rf"(\{{ /\* {table} \*/[^}}]*?)([-+.e\d]+)f(\s*\}})", made["stage.c"])
-        assert found, f"no table {table}"
+        table = re.search(rf"stage_{operator}_segment\[\d+\] = \{{\n(.*\n)+?\}};", made["stage.c"])
+        assert table, "no segments"
+        last = r"(\{\S+ \S+ )(\S+)f(, \S+\},\s+\{[^{}]+\}\n\};)"  # but for the one of a play that never follows
+        found = re.search(last, table[0])
+        assert found, table[0]
         changed = found[1] + literal(change(np.float32(found[2]))) + found[3]
         return {**made, "stage.c": made["stage.c"].replace(found[0], changed)}
 
@@ -600,7 +603,7 @@ def up(x: np.float32) -> np.float32:
 def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
     installed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sabotage(monkeypatch, "reciprocal", up)
+    sabotage(monkeypatch, "inverse", up)
     result = hyst("verify", "stage.yaml", "--compiler", installed, "--json", "r.json", "--junit", "r.xml", code=1)
     rows = [row for row in report()["rows"] if row["operator"] == "inverse"]
     assert len(rows) == 2
@@ -612,7 +615,7 @@ def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
     # Where the bit reference itself first gives another answer with that number
     model = hystgen.load("stage.yaml")
     numbers, other = (tables.build(model.cascade, "float32", "corners") for _ in range(2))
-    other.inverse_slope[-1] = up(other.inverse_slope[-1])
+    other.inverse.gain[-2] = up(other.inverse.gain[-2])  # the last one is of a play that never follows
     real = np.dtype(np.float32)
     for expected, found in zip(*(run.expected_records(x, real, True, LENGTH) for x in (numbers, other)), strict=True):
         bits = (expected.answer.view(np.uint32) != found.answer.view(np.uint32)) | (expected.status != found.status)
@@ -629,7 +632,7 @@ def test_one_wrong_bit_in_a_table_fails_and_the_first_wrong_sample_is_named(
 def test_answers_that_are_no_numbers_fail_and_the_report_is_still_json(
     installed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sabotage(monkeypatch, "slope", lambda _: np.finfo(np.float32).max)
+    sabotage(monkeypatch, "forward", lambda _: np.finfo(np.float32).max)
     how = ("--compiler", installed, "--operator", "forward", "--json", "r.json", "--junit", "r.xml")
     hyst("verify", "stage.yaml", *how, code=1)
     assert not any(row["ok"] for row in report()["rows"])

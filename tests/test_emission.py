@@ -18,15 +18,16 @@ import hystgen
 from hystgen import reference
 from hystgen.api import Model, emit_options
 from hystgen.emission.text import literal
+from hystgen.engines import ENGINES, choose
 from hystgen.models import PI, Cascade, DeadZone
 from hystgen.params import parse_parameters
-from hystgen.tables import choose_engine
 from hystgen.verification import comparison, compilers, host, signals, sources
 from hystgen.verification.comparison import REALS
 
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = ("self-contained", "single-header", "shared-runtime")
 DIALECTS = (["-std=c99"], ["-std=c11"], ["-x", "c++", "-std=c++17"])
+FIXED_PLACE = ["-fno-pic", "-fno-pie"]  # as firmware is built; otherwise constant pointers lie in a data section
 OLDER = (["-std=gnu89"], ["-x", "c++", "-std=gnu++98"], ["-x", "c++", "-std=gnu++11"])
 
 
@@ -284,11 +285,12 @@ def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_pat
         (tmp_path / "all.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')
     sources = sorted(tmp_path.glob("*.c"))
     for compiler in required_compilers():
+        place = [] if compiler.name == "zig" else FIXED_PLACE
         for dialect in DIALECTS if compiler.name != "zig" else DIALECTS[:1]:
             warnings = compilers.WARNINGS if "c++" in dialect else compilers.C_WARNINGS
             for source in sources:
                 output = tmp_path / "one.o"
-                compiler.run(["-c", "-O2", *dialect, *warnings, "-o", output, source])
+                compiler.run(["-c", "-O2", *place, *dialect, *warnings, "-o", output, source])
                 alone = source.stem == name or source.stem == "all"
                 if alone and layout != "shared-runtime" and compiler.name != "zig":
                     symbols = subprocess.run(["nm", output], capture_output=True, text=True, check=True).stdout
@@ -436,23 +438,51 @@ def test_nothing_forbidden_in_the_text(name: str) -> None:
         assert includes <= {"stdint", "stdbool", "stddef", "float"}, file
 
 
+def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
+    """A table of measured costs: rows by what stands before the two cores."""
+    with (Path(hystgen.__file__).parent / name).open() as file:
+        header, *rows = csv.reader(file)
+    cores = header[-2:]
+    return {tuple(row[:-2]): dict(zip(cores, map(int, row[-2:]), strict=True)) for row in rows}
+
+
 def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
     """By operator, arithmetic and kind; between the measured numbers of plays the next smaller one decides."""
-    measured = {}
-    with (Path(hystgen.__file__).parent / "engine_costs.csv").open() as file:
-        for row in csv.DictReader(file):
-            measured[row["operator"], row["arithmetic"], row["kind"], int(row["n"])] = row
-    counts = sorted({n for *_, n in measured})
-    assert len(measured) == 2 * 4 * 2 * len(counts)
+    instructions, code = measured("engine_costs.csv"), measured("code_sizes.csv")
+    counts = sorted({int(row[3]) for row in instructions})
+    assert len(instructions) == 2 * 4 * 2 * len(counts) * 2
     assert counts[0] == 1
-    for (operator, arithmetic, kind, n), row in measured.items():
+    chosen = set()
+    for operator, arithmetic, kind, n, _ in instructions:
+        front = "dead_zone" if kind == "gpi" else "pi"
+        costs: dict[str, dict[str, float]] = {"speed": {}, "size": {}, "auto": {}}
+        for engine in ENGINES:
+            spent = instructions[operator, arithmetic, kind, n, engine]
+            taken = code[operator, arithmetic, front, engine]
+            costs["speed"][engine] = spent["cortex-m0plus"] * spent["cortex-m4f"]
+            costs["size"][engine] = taken["cortex-m0plus"] + taken["cortex-m4f"]
+            costs["auto"][engine] = taken["cortex-m0plus"] / 32768 + spent["cortex-m0plus"] / 4800
         stages = (DeadZone([-0.5, 0.0, 0.5], [0.1, 0.1, 0.1]),) if kind == "gpi" else ()
-        for plays in (n, n + 1) if n + 1 not in counts else (n,):
+        for plays in (int(n), int(n) + 1) if int(n) + 1 not in counts else (int(n),):
             pi = PI(np.linspace(0, 0.5, plays + 1).tolist(), [1.0] * (plays + 1))
-            cheaper = "corners" if int(row["corners"]) < int(row["loop"]) else "loop"
-            assert choose_engine("auto", Cascade(pi, stages, 0.0, (-1.0, 1.0)), operator, arithmetic) == cheaper
-    assert choose_engine("auto", Cascade(PI([0], [1])), "both", "q15") == "loop"
-    assert choose_engine("loop", Cascade(PI([0, 0.5], [1, 1])), "both", "q15") == "loop"
+            for optimize, cost in costs.items():
+                cheaper = "corners" if cost["corners"] < cost["loop"] else "loop"
+                assert choose("auto", optimize, Cascade(pi, stages, 0.0, (-1.0, 1.0)), operator, arithmetic) == cheaper
+                chosen.add((optimize, cheaper))
+    assert {("speed", "loop"), ("speed", "corners"), ("auto", "loop"), ("auto", "corners"), ("size", "loop")} <= chosen
+    assert choose("auto", "auto", Cascade(PI([0], [1])), "both", "q15") == "loop"
+    assert choose("loop", "speed", Cascade(PI([0, 0.5], [1, 1])), "both", "q15") == "loop"
+
+
+@pytest.mark.parametrize("optimize", ["speed", "size"])
+def test_optimize_comes_from_the_call_or_the_file(optimize: str) -> None:
+    wanted = {"speed": "corners", "size": "loop"}[optimize]
+    assert emit_options(model("plain"), optimize=optimize).engine == wanted
+    told = Model(parse_parameters(FILES["plain"] + f"emit: {{optimize: {optimize}}}\n", "plain.yaml"))
+    assert emit_options(told).engine == wanted
+    assert emit_options(told, engine="corners").engine == "corners"
+    other = {"speed": "size", "size": "speed"}[optimize]
+    assert emit_options(told, optimize=other).engine != wanted
 
 
 def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

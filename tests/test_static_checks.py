@@ -11,7 +11,8 @@ from modelfiles import FILES
 from static_checks import MODULES, Finding, problems
 
 from hystgen.emission.module import LAYOUTS
-from hystgen.tables import ARITHMETICS, ENGINES
+from hystgen.engines import ENGINES
+from hystgen.tables import ARITHMETICS
 
 # A defect of each kind in C that compiles clean
 DEFECTS = {

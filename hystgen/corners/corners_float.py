@@ -80,7 +80,7 @@ def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
 
 
 def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
-    """Stop the present move inside the top corner's block: where the sum is `output`, or at `to` if that comes first."""
+    """Stop the present move inside the top corner's block: where the sum is `output`, or before that at `to`."""
     c = m.counts[DEPTH] - 1
     rising = m.counts[RISING]
     reach = along(m, output - m.output[c])
@@ -223,7 +223,6 @@ def start(t: Curve, m: Memory, s: Start) -> None:
         leave_corner(t, m)
     m.counts[K] = 0
     m.counts[RISING] = 1
-    m.counts[LIMITED] = 0
     m.real[SIGN] = t.constant[ONE]
     m.real[INPUT] = s.center[0, 0]
     m.real[OUTPUT] = s.center[0, 1]

@@ -34,7 +34,6 @@ from hystgen.corners.memory import (
     UNDO_DEPTH,
     UNDO_INPUT,
     UNDO_K,
-    UNDO_LIMITED,
     UNDO_OUTPUT,
     UNDO_RISING,
     Curve,
@@ -74,7 +73,6 @@ def put_undo(t: Curve, m: Memory) -> None:
     m.counts[K] = m.counts[UNDO_K]
     m.counts[DEPTH] = m.counts[UNDO_DEPTH]
     m.counts[RISING] = m.counts[UNDO_RISING]
-    m.counts[LIMITED] = m.counts[UNDO_LIMITED]
     m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
     forget_line(m)
 
@@ -86,7 +84,6 @@ def set_undo(m: Memory) -> None:
     m.counts[UNDO_K] = m.counts[K]
     m.counts[UNDO_DEPTH] = m.counts[DEPTH]
     m.counts[UNDO_RISING] = m.counts[RISING]
-    m.counts[UNDO_LIMITED] = m.counts[LIMITED]
 
 
 def inverse_search(t: Tables, m: Memory, u: Any) -> Any:

@@ -77,9 +77,10 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
     rising = m.counts[RISING]
     most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
     end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
-    last = (look_ahead(t, m, following, end) >> t.limits[FRACTION]) - t.limits[SHY]
-    if last > m.real[NEXT]:
-        m.real[NEXT] = last if last < most else most
+    last = look_ahead(t, m, following, end)
+    usual = (last >> t.limits[FRACTION]) - t.limits[SHY]
+    if usual > m.real[NEXT]:
+        m.real[NEXT] = usual if usual < most else most
 
 
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:

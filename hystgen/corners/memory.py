@@ -14,8 +14,8 @@ Counts = NDArray[np.int64]
 (INPUT, OUTPUT, NEXT, CAP, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED, DRIVE,
  UNDO_DRIVE, REFERENCE, LEVEL) = range(18)  # fmt: skip  (FROM .. SIGN: in floating point)
 # and in `Memory.counts`
-(K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, UNDO_LIMITED, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
- ASCENDING, UNDO_ASCENDING, ON) = range(16)  # fmt: skip  (ON: in fixed point)
+(K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
+ ASCENDING, UNDO_ASCENDING, ON) = range(15)  # fmt: skip  (ON: in fixed point)
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
 # places in `Curve.constant`
 MOST, ZERO, HALF, ONE = range(4)
@@ -59,7 +59,7 @@ def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     return Memory(
         real=np.zeros(18, dtype),
-        counts=np.zeros(16, np.int64),
+        counts=np.zeros(15, np.int64),
         output=np.zeros(plays + 1, dtype),
         passed=np.zeros((plays + 1, 2), dtype),
         top=np.zeros(plays + 1, np.int64),
@@ -83,7 +83,7 @@ def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
     corners = max(plays, 1)
     return FixedMemory(
         real=np.zeros(18, dtype),
-        counts=np.zeros(16, np.int64),
+        counts=np.zeros(15, np.int64),
         output=np.zeros(corners, dtype),
         input=np.zeros(corners, dtype),
         top=np.zeros(corners, np.int64),

@@ -89,8 +89,8 @@ def start(
 ) -> Start:
     """The memory in which play k holds `states[k]`; `curve` is the operator's, `seen` the range of the plays' input.
 
-    A play is left at that side of its state at which it can begin to follow within the range: far beyond it, lines would
-    lose digits. Those that can at neither side are part of the bottom, and so are all with larger thresholds.
+    A play is left at that side of its state at which it can begin to follow within the range: far beyond it, lines
+    would lose digits. Those that can at neither side are part of the bottom, and so are all with larger thresholds.
     """
     s, dtype = sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hystgen import reference
+from hystgen import engines, reference
 from hystgen.fixed import FixedTables
 from hystgen.models import Cascade
 
@@ -54,12 +55,19 @@ class Memory:
 
 @dataclass(frozen=True)
 class Cost:
-    """Memory on a 32-bit target and on an 8-bit AVR, where tables lie in RAM too (None in float64, which it lacks), and
-    worst-case operations of a step in words, for each operator."""
+    """Code of the module by core (`hystgen.engines`), memory on a 32-bit target and on an 8-bit AVR, where tables lie
+    in RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each operator."""
 
+    code: Mapping[str, int]
     memory: Memory
     avr: Memory | None
     worst_case: list[tuple[str, str]]
+
+    @property
+    def code_words(self) -> str:
+        """The code in words."""
+        small, large = (self.code[core] for core in engines.CORES)
+        return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
 
 REAL_BYTES = {"float32": 4, "float64": 8, "q31": 4, "q15": 2}
@@ -82,7 +90,7 @@ def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[i
         }
     corner = layout.struct(*3 * [reals], two, one)
     return {
-        "place_t": layout.struct(reals, reals, two, two, one, one),
+        "place_t": layout.struct(reals, reals, two, two, one),
         "segment_t": layout.struct(*4 * [reals]),
         "corner_t": corner,
         "curve_t": layout.struct(pointer, *6 * [reals]),
@@ -130,7 +138,8 @@ def estimate(
         (op, _worst(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
     ]
     memory, avr = (_memory(cascade, options, fixed, text, plays, layout) for layout in (CORE_32, AVR))
-    return Cost(memory, avr if known else None, worst)
+    code = engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine)
+    return Cost(code, memory, avr if known else None, worst)
 
 
 def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
@@ -167,7 +176,7 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
     structs = _corner_structs(real, fixed, layout)
     place, (corner, alignment) = structs["place_t"], structs["corner_t"]
-    plays = place if fixed else layout.struct(place, *8 * [reals])
+    plays = place if fixed else layout.struct(place, *8 * [reals], flag)
     if op == "forward":
         beside = [reals, flag, status] if front else [status]
     elif fixed:

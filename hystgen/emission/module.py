@@ -256,7 +256,7 @@ def _corner_roots(values: SimpleNamespace, options: Options) -> set[str]:
     if options.forward or values.fronts:
         roots.add("hystgen_plays_step")
     if options.inverse:
-        roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put"}
+        roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put", "hystgen_copy_place"}
     return roots
 
 
@@ -346,7 +346,8 @@ def _details(parameters: Parameters, cascade: Cascade, options: Options, values:
         *([""] if values.precision else []),
         *values.precision,
         "",
-        "Cost, derived from the model (32-bit target):",
+        "Cost (32-bit target):",
+        f"    code at -O2       {estimate.code_words}, as measured for this kind of model",
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),

@@ -120,10 +120,17 @@ def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) ->
     return {"arrays": arrays, "pointers": []}
 
 
+def _lines(entries: Sequence[str]) -> str:
+    """Entries of a table, none of them broken, on as few lines as they take."""
+    whole = ", ".join(entry.replace(" ", "\0") for entry in entries)
+    lines = textwrap.wrap(whole, 112, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
+    return "\n".join(lines).replace("\0", " ")
+
+
 def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: str) -> list[str]:
     """Segments, curve and start memories of one operator."""
     rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
-    segments = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in rows)
+    segments = _lines([f"{{{', '.join(map(literal, row))}}}" for row in rows])
     pairs = [f"{{{literal(pair[0])}, {literal(pair[1])}}}" for pair in (curve.limit, curve.inside, curve.range)]
     found = [
         f"static const {prefix}_segment_t {own}_segment[{len(curve.way)}] = {{\n{segments}\n}};\n",
@@ -133,14 +140,14 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
     memories = []
     for start, memory in zip(starts, ("init", "reset"), strict=True):
         points = [f"{{{literal(point[0])}, {literal(point[1])}}}" for point in start.center]
-        lines = textwrap.wrap(", ".join(points), 105, initial_indent="    ", subsequent_indent="    ")
-        text = lines[0].strip() if len(points) == 1 else "\n" + "\n".join(lines) + "\n"
+        text = points[0] if len(points) == 1 else f"\n{_lines(points)}\n"
         if text not in before:  # after init and after reset plays may hold the same
             before[text] = f"{own}_{memory}_center"
             found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{{text}}};\n")
         output, falling, rising = map(literal, start.bottom)
         memories.append(
-            f"    {{{before[text]}, {start.step}, {start.risen}, {{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
+            f"    {{{before[text]}, {start.step}, {start.risen}, "
+            f"{{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
         )
     found.append(
         f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(memories) + "\n};\n"

@@ -7,6 +7,7 @@ carried, under the model's own prefix.
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -192,7 +193,27 @@ def _named(text: str, prefix: str, family: Family, name: str | None = None) -> s
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
         text = text.replace("HYSTGEN_REAL_MAX", family.real_max).replace("HYSTGEN_HALF", family.half)
         text = text.replace("#if HYSTGEN_SOFT_FLOAT", f"#if {SOFT[family.bits]}")
-    return text.replace("hystgen_", prefix + "_").replace("HYSTGEN_", (name or prefix).upper() + "_")
+    return aligned(text.replace("hystgen_", prefix + "_").replace("HYSTGEN_", (name or prefix).upper() + "_"))
+
+
+def aligned(text: str) -> str:
+    """C text whose lines inside parentheses begin below the first character in them, as before names were put in."""
+    lines = []
+    opened: list[int] = []  # columns behind the parentheses that are open
+    comment = False
+    for line in text.splitlines():
+        written = " " * opened[-1] + line.lstrip() if opened and not comment else line
+        lines.append(written)
+        for at, pair in enumerate(itertools.pairwise(written + " ")):
+            if comment:
+                comment = pair != ("*", "/")
+            elif pair == ("/", "*"):
+                comment = True
+            elif pair[0] == "(":
+                opened.append(at + 1)
+            elif pair[0] == ")":
+                opened.pop()
+    return "\n".join(lines) + "\n" if text.endswith("\n") else "\n".join(lines)
 
 
 def types(file: str, wanted: Iterable[str], prefix: str, family: Family) -> str:

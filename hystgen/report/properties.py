@@ -6,7 +6,7 @@ import decimal
 from typing import Any
 
 from hystgen import fixed_tables
-from hystgen.api import Model
+from hystgen.api import Model, emit_options
 from hystgen.bounds import error_bounds
 from hystgen.models import DeadZone
 from hystgen.tables import FormatError
@@ -61,9 +61,26 @@ def properties(model: Model) -> str:
                 f"{_most(bounds.rounding)}{drive} at most, against the exact model"
             )
         lines += _fixed(model, drive, output)
+        lines += _cost(model)
         if c.branches_differ:
             lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
     return "\n".join(lines)
+
+
+def _cost(model: Model) -> list[str]:
+    """What the C costs that `emit` would write by default, or nothing where it would refuse."""
+    from hystgen.emission import module
+
+    options = emit_options(model)
+    try:
+        cost = module.cost_of(model.parameters, model.cascade, options)
+    except FormatError:
+        return []
+    instances = (f"{op} instance {size} bytes of RAM" for op, size in cost.memory.instances)
+    return [
+        f"cost, {options.arithmetic:<7}      engine {options.engine}; code at -O2 {cost.code_words}; constant tables "
+        f"{cost.memory.tables} bytes; {', '.join(instances)}"
+    ]
 
 
 def _most(bound: float) -> str:

@@ -24,6 +24,7 @@ def verify_model(
     targets: Sequence[str] = (HOST,),
     length: int = 100_000,
     target_length: int | None = None,
+    optimize: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Report:
     """Compile what `emit` would write and compare it, bit for bit, with the Python reference of the same arithmetic.
@@ -40,7 +41,7 @@ def verify_model(
     arguments.whole("length", length, "calls", 1)
     if target_length is not None:
         arguments.whole("target_length", target_length, "calls", 1)
-    options = emit_options(model, operator, arithmetic, engine, layout)
+    options = emit_options(model, operator, arithmetic, engine, layout, optimize)
     numbers = model.tables(options.arithmetic, options.engine)
     real = REALS[options.arithmetic]
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
