@@ -167,8 +167,8 @@ HYSTGEN_API int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_p
     return next < last ? next : last;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its own, as if left by a
-   move that ended where the play begins to follow. */
+/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its own, as if left by
+   a move that ended where the play begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                   const int32_t *play, unsigned int step)
 {

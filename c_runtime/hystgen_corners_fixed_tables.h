@@ -14,7 +14,7 @@ typedef struct {
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n */
     int64_t offset;                   /* part of every output */
-    int64_t range[2];                 /* no falling [0] move, with its sign changed, or rising [1] one is asked for beyond */
+    int64_t range[2];                 /* ends of falling [0] moves, with signs changed, and of rising [1] ones */
     uint_least16_t n;                 /* plays without play 0 */
 } hystgen_curve_t;
 

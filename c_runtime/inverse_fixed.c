@@ -57,8 +57,13 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return (hystgen_real_t)hystgen_front_inverse(self->here.input);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive in
-   its place, and so does another commit. */
+/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive
+   in its place.
+
+   last call   the memory is at      a commit replaces     the same reference once more
+   init        the start memory      nothing               is solved for
+   step        the last answer       the last answer       has the same answer
+   commit      the committed drive   the committed drive   is solved for */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_place_t *here = &self->here;
@@ -91,7 +96,8 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     if (self->usual) {
         hystgen_copy_place(&self->undo, &self->here);
         self->undo.input = self->before;
-        self->undo.output -= (int64_t)hystgen_model_curve.segment[self->here.k].slope * ((int64_t)self->here.input - self->before);
+        const int64_t way = (int64_t)self->here.input - self->before;
+        self->undo.output -= way * (int64_t)hystgen_model_curve.segment[self->here.k].slope;
     }
     hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);

@@ -21,8 +21,13 @@ HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_re
     return hystgen_front(v, self->ascending);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive in
-   its place, and so does another commit. */
+/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive
+   in its place.
+
+   last call   the memory is at      a commit replaces     the same reference once more
+   init        the start memory      nothing               is solved for
+   step        the last answer       the last answer       has the same answer
+   commit      the committed drive   the committed drive   is solved for */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_inverse_keep(self);

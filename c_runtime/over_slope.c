@@ -17,8 +17,8 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
 #endif
 }
 
-/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal 2^(32 + shift) / slope;
-   of a slope of at least 16, so that `shift` is 2 .. 29. */
+/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal 2^(32 + shift) / slope.
+   A slope is at least 16, so that `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift)
 {
     const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> 32;
