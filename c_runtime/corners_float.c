@@ -20,11 +20,10 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
-/* Puts the plays where there is no line to go on along: the next sample searches. */
-HYSTGEN_KERNEL void hystgen_put(hystgen_plays_t *m, const hystgen_place_t *place)
+/* There is no line to go on along: the next sample searches. */
+HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m)
 {
-    hystgen_copy_place(&m->here, place);
-    m->sign = (hystgen_real_t)(place->rising ? 1 : -1);
+    m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
 }
@@ -84,8 +83,7 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
     m->here.input = x < hystgen_along(m, input) ? hystgen_along(m, x) : input;
     m->here.output = output;
     m->here.k = (uint_least16_t)k;
-    m->next = m->here.input;
-    m->cap = m->here.input;
+    hystgen_forget_line(m);
 }
 
 /* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
@@ -99,12 +97,10 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
         const hystgen_real_t reach = corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
-        if (hystgen_along(m, output - corner[middle].output) >= reach) {
-            m->here.depth = (uint_least16_t)middle;
-            m->here.k = corner[middle].top;
-        } else {
-            kept = middle;
-        }
+        const bool passed = hystgen_along(m, output - corner[middle].output) >= reach;
+        m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
+        m->here.k = passed ? corner[middle].top : m->here.k;
+        kept = passed ? kept : middle;
     }
     m->limited = false;
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
@@ -159,11 +155,9 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     if (hystgen_along(m, output) > t->limit[rising]) {
         return false;
     }
-    if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) { /* by rounding: no move leads back */
-        cap = x;
-    } else {
-        m->here.output = output;
-    }
+    const bool back = hystgen_along(m, output) < hystgen_along(m, m->here.output); /* by rounding: no move leads back */
+    cap = back ? x : cap;
+    m->here.output = back ? m->here.output : output;
     cap = t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = hystgen_along(m, cap);
     m->next = hystgen_along(m, next < cap ? next : cap);
@@ -221,19 +215,24 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
                                   const hystgen_start_t *start)
 {
-    hystgen_place_t p = {start->center[0][0], start->center[0][1], 0, 1, true};
+    unsigned int k;
     corner[0].output = start->bottom.output;
     corner[0].pass[0] = start->bottom.pass[0];
     corner[0].pass[1] = start->bottom.pass[1];
     corner[0].top = start->bottom.top;
     corner[0].rose = start->bottom.rose;
-    for (p.k = (uint_least16_t)(start->bottom.top - 1u); p.k > 0; --p.k, ++p.depth) {
-        p.rising = p.k <= start->risen;
-        hystgen_put(m, &p);
-        m->here.input = start->center[start->step * p.k][0] + hystgen_along(m, t->segment[p.k].way * HYSTGEN_HALF);
-        m->here.output = start->center[start->step * p.k][1] + hystgen_along(m, t->segment[p.k].reach * HYSTGEN_HALF);
+    m->here.depth = 1;
+    for (k = start->bottom.top - 1u; k > 0; --k) {
+        m->here.k = (uint_least16_t)k;
+        m->here.rising = k <= start->risen;
+        m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
+        m->here.input = start->center[start->step * k][0] + hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
+        m->here.output = start->center[start->step * k][1] + hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
     }
-    p.rising = true;
-    hystgen_put(m, &p);
+    m->here.k = 0;
+    m->here.rising = true;
+    m->here.input = start->center[0][0];
+    m->here.output = start->center[0][1];
+    hystgen_forget_line(m);
 }

@@ -2,10 +2,7 @@
 #include "hystgen_runtime.h"
 #ifdef HYSTGEN_FIXED
 #include "over_slope.c"
-#include "corner_fixed.c"
-#include "corners_absorb.c"
-#include "corners_find_fixed.c"
-#include "corners_solve_fixed.c"
+#include "corners_fixed.c"
 #include "loop_absorb.c"
 #include "loop_solve_fixed.c"
 #include "curve.c"

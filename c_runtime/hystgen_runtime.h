@@ -18,56 +18,48 @@
 typedef int32_t hystgen_play_t;
 typedef int64_t hystgen_reach_t;
 typedef int64_t hystgen_sum_t;
-#define HYSTGEN_REACH_MAX (INT64_MAX / 2)
-#define HYSTGEN_SUM_MAX (INT64_MAX / 2)
+typedef int32_t hystgen_real_t;
 #else
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 typedef double hystgen_real_t;
-#define HYSTGEN_REACH_MAX DBL_MAX
+#define HYSTGEN_REAL_MAX DBL_MAX
 #else
 typedef float hystgen_real_t;
-#define HYSTGEN_REACH_MAX FLT_MAX
+#define HYSTGEN_REAL_MAX FLT_MAX
 #endif
 typedef hystgen_real_t hystgen_play_t;
 typedef hystgen_real_t hystgen_reach_t;
 typedef hystgen_real_t hystgen_sum_t;
-#define HYSTGEN_SUM_MAX HYSTGEN_REACH_MAX
 #endif
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL
-#define HYSTGEN_NOINLINE
 #if defined(__GNUC__)
 #define HYSTGEN_APART __attribute__((noinline)) static
 #else
 #define HYSTGEN_APART static
 #endif
-#define HYSTGEN_COPIES static inline
 
 #ifdef HYSTGEN_FIXED
-#include "hystgen_state.h"
-#include "hystgen_corner_fixed.h"
+#include "hystgen_corners_fixed_state.h"
+#include "hystgen_corners_fixed_tables.h"
 #include "hystgen_tables_fixed.h"
 
 uint64_t hystgen_wide(uint32_t a, uint32_t b);
+int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift);
 int64_t hystgen_nearest(int64_t x, unsigned int bits);
 int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient, unsigned int pieces,
                       unsigned int degree, int32_t x);
 hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
                                bool *limited);
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
-void hystgen_corners_rest(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                          hystgen_play_t w);
-void hystgen_corners_start(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                           const hystgen_play_t *play);
-void hystgen_corners_absorb(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                            hystgen_play_t w);
-void hystgen_corners_foretell(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                              hystgen_play_t w);
-hystgen_sum_t hystgen_corners_output(const hystgen_tables_t *t, const hystgen_memory_t *m);
-hystgen_reach_t hystgen_corners_solve(const hystgen_tables_t *t, hystgen_memory_t *m,
-                                      hystgen_corner_t *corner, hystgen_sum_t output);
-hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t, hystgen_memory_t *m, hystgen_corner_t *corner,
-                                           hystgen_sum_t here, hystgen_sum_t output);
+void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t to);
+int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int64_t output,
+                      hystgen_kink_t *kink);
+int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                                 hystgen_kink_t *kink, int32_t to);
+int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end);
+void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, const int32_t *play,
+                   unsigned int step);
 #else
 /* Whether each operation of a number is a call of a library. */
 #ifdef HYSTGEN_REAL_IS_DOUBLE
@@ -77,7 +69,6 @@ hystgen_reach_t hystgen_corners_solve_from(const hystgen_tables_t *t, hystgen_me
 #define HYSTGEN_HALF 0.5f
 #define HYSTGEN_SOFT_FLOAT 0
 #endif
-#define HYSTGEN_REAL_MAX HYSTGEN_REACH_MAX
 #include "hystgen_corners_state.h"
 #include "hystgen_corners_tables.h"
 #include "hystgen_tables_float.h"
@@ -89,7 +80,7 @@ hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_rea
 hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z, hystgen_real_t x);
 hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y);
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
-void hystgen_put(hystgen_plays_t *m, const hystgen_place_t *place);
+void hystgen_forget_line(hystgen_plays_t *m);
 void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
                             hystgen_real_t output);
 bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner, hystgen_real_t input);

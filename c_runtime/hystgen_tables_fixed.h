@@ -2,15 +2,13 @@
 #ifndef HYSTGEN_TABLES_FIXED_H
 #define HYSTGEN_TABLES_FIXED_H
 
-/* Play operators; n + 1 thresholds and weights, n + 2 sums. */
+/* Play operators of engine loop; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {
     const hystgen_play_t *threshold;  /* r_0 = 0 .. r_n, in least steps of the input of the plays */
     const int32_t *weight;            /* p_0 .. p_n, parts of an output code per such step */
     const int32_t *slope;             /* slope[k] = p_0 + ... + p_(k-1) */
-    const hystgen_sum_t *start_level; /* output gained by the time play k starts to follow: z_0 .. z_n */
     const uint32_t *reciprocal;       /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
-    hystgen_sum_t all_lift;           /* p_0 r_0 + ... + p_n r_n */
     hystgen_reach_t least;            /* no input of the plays is asked for beyond these */
     hystgen_reach_t most;
     uint_least16_t n;                 /* plays without r_0 */

@@ -77,7 +77,8 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
-    hystgen_put(m, &self->undo);
+    hystgen_copy_place(&m->here, &self->undo);
+    hystgen_forget_line(m);
     hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, v);
     self->before = m->here.input;
 }

@@ -18,7 +18,8 @@ static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
 /* The actuator has gone to v in place of where the last step led. */
 HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v)
 {
-    hystgen_put(&self->plays, &self->undo);
+    hystgen_copy_place(&self->plays.here, &self->undo);
+    hystgen_forget_line(&self->plays);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     if (v < self->drive || v > self->drive) {
@@ -59,22 +60,15 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         const hystgen_real_t level = u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX : u;
         const hystgen_real_t w =
             hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, level - HYSTGEN_OFFSET);
-        bool limited = false;
-        bool moves = true;
-        const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &limited, &moves);
-        const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
-        if (limited) {
-            self->bits |= HYSTGEN_STATUS_DOMAIN;
-        }
-        if (inside < v || inside > v) {
-            self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
-            moves = false;
-        }
-        if (moves) {
-            hystgen_inverse_arrive(self, inside);
-        } else {
+        const hystgen_real_t v = hystgen_inverse_choose(self, level, w);
+        const hystgen_real_t inside = hystgen_clamp_drive(v);
+        const bool clamped = inside < v || inside > v;
+        if (clamped || (inside <= self->drive && inside >= self->drive)) { /* the plays are not where w is */
+            self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
             hystgen_inverse_replace(self, inside);
+        } else {
+            hystgen_inverse_arrive(self, inside);
         }
         self->reference = u;
         self->level = level;

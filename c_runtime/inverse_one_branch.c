@@ -1,11 +1,11 @@
 #include "hystgen_runtime.h"
 
-/* The drive that gives w; `limited`: an envelope cannot give w. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
-                                             bool *limited, bool *moves)
+/* The drive that gives w; DOMAIN is added to `bits` where an envelope cannot give w. */
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_choose(hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w)
 {
-    (void)self;
+    bool limited = false;
+    const hystgen_reach_t v = hystgen_front_inverse(w, true, &limited);
     (void)level;
-    (void)moves;
-    return hystgen_front_inverse(w, true, limited);
+    self->bits |= limited ? HYSTGEN_STATUS_DOMAIN : 0u;
+    return v;
 }

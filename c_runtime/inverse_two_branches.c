@@ -1,29 +1,25 @@
 #include "hystgen_runtime.h"
 
 /* Whether going to v is a move of the branch that v was computed on. */
-static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_real_t v, bool ascending)
+static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending)
 {
     const hystgen_real_t inside = hystgen_clamp_drive(v);
     return inside > self->drive ? ascending : inside < self->drive ? !ascending : self->ascending == ascending;
 }
 
-/* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one;
-   `limited`: an envelope cannot give w; `moves` is cleared where the drive holds instead. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_choose(const hystgen_inverse_t *self, hystgen_real_t level, hystgen_real_t w,
-                                             bool *limited, bool *moves)
+/* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one,
+   and where neither fits the drive holds; DOMAIN is added to `bits` where an envelope cannot give w. */
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_choose(hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
-    hystgen_real_t v = hystgen_front_inverse(w, up, limited);
-    if (hystgen_inverse_fits(self, v, up)) {
-        return v;
+    bool limited = false;
+    hystgen_reach_t v = hystgen_front_inverse(w, up, &limited);
+    bool fits = hystgen_inverse_fits(self, v, up);
+    const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_drive(v) - self->drive;
+    if (!fits && (up != self->ascending || back < -HYSTGEN_HOLD || back > HYSTGEN_HOLD)) { /* else back by rounding alone */
+        v = hystgen_front_inverse(w, !up, &limited);
+        fits = hystgen_inverse_fits(self, v, !up);
     }
-    const hystgen_real_t back = hystgen_clamp_drive(v) - self->drive;
-    if (up != self->ascending || back < -HYSTGEN_HOLD || back > HYSTGEN_HOLD) { /* else it is back by rounding alone */
-        v = hystgen_front_inverse(w, !up, limited);
-        if (hystgen_inverse_fits(self, v, !up)) {
-            return v;
-        }
-    }
-    *moves = false;
-    return self->drive;
+    self->bits |= limited ? HYSTGEN_STATUS_DOMAIN : 0u;
+    return fits ? v : self->drive;
 }

@@ -4,12 +4,6 @@
 #error "right shifts of negative numbers have to keep the sign"
 #endif
 
-/* Down to a whole number: reaches the same whole numbers that x reaches twice. */
-static hystgen_sum_t hystgen_half(hystgen_sum_t x)
-{
-    return x >> 1;
-}
-
 /* a times b. Cores without a long multiplication take half words, which is what they can do without a call. */
 HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
 {
@@ -23,22 +17,13 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
 #endif
 }
 
-/* d / slope[k] to the nearest whole number, d not negative: the upper bits of d times the reciprocal. */
-static hystgen_sum_t hystgen_over_slope(const hystgen_tables_t *t, hystgen_sum_t d, unsigned int k)
+/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal 2^(32 + shift) / slope.
+   A slope is at least 16, so that `shift` is 2 .. 29. */
+HYSTGEN_API int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift)
 {
-    const uint32_t r = t->reciprocal[k];
-    const uint64_t low = hystgen_wide((uint32_t)d, r) >> 32;
-    const uint64_t quotient = hystgen_wide((uint32_t)((uint64_t)d >> 32), r) + low;
-    return (hystgen_sum_t)(((quotient >> (t->shift[k] - 1u)) + 1u) >> 1);
-}
-
-/* The input of the plays that lies d further on in output than w, kept near the range of the plays' input. */
-static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t w, hystgen_sum_t d, unsigned int k,
-                                     bool rising)
-{
-    const hystgen_sum_t step = hystgen_over_slope(t, d, k);
-    if (rising) {
-        return step > (hystgen_sum_t)t->most - w ? t->most : (hystgen_reach_t)(w + step);
-    }
-    return step > (hystgen_sum_t)w - t->least ? t->least : (hystgen_reach_t)(w - step);
+    const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> 32;
+    const uint64_t quotient = hystgen_wide((uint32_t)((uint64_t)d >> 32), reciprocal) + low;
+    const uint32_t high = (uint32_t)(quotient >> 32);
+    const uint32_t whole = high << (32u - shift) | (uint32_t)quotient >> shift;
+    return (int64_t)(((uint64_t)(high >> shift) << 32 | whole) + ((uint32_t)quotient >> (shift - 1u) & 1u));
 }

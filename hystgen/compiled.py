@@ -144,7 +144,7 @@ def reference(t: Tables | FixedTables, compiled: bool = True) -> types.SimpleNam
     It has `new_state`, and of the functions it is made of `init`, `visit` and `run` are what a session needs.
     """
     fixed_point = type(t).__name__ == "FixedTables"
-    front = fixed_point or len(t.stage_kind) > 0  # type: ignore[union-attr]
+    front = bool(t.fronts) if fixed_point else len(t.stage_kind) > 0  # type: ignore[union-attr]
     return _reference(fixed_point, t.engine == 0, front, compiled)
 
 
@@ -152,27 +152,43 @@ def reference(t: Tables | FixedTables, compiled: bool = True) -> types.SimpleNam
 def _reference(fixed_point: bool, corners: bool, front: bool, compiled: bool) -> types.SimpleNamespace:
     from hystgen import fixed, kernels
     from hystgen import reference as plain
-    from hystgen.corners import corners_float, forward, forward_front, inverse, inverse_front, run
-    from hystgen.corners.memory import new_memory
+    from hystgen.corners import (
+        corners_fixed,
+        corners_float,
+        forward,
+        forward_fixed,
+        forward_front,
+        inverse,
+        inverse_fixed,
+        inverse_front,
+        inverse_front_fixed,
+        run,
+    )  # fmt: skip
+    from hystgen.corners.memory import new_fixed_memory, new_memory
 
     functions: list[Callable[..., Any]]
     inlined: set[Callable[..., Any]]
     new_state: Callable[..., Any] = plain.new_state
-    if fixed_point:
-        functions, inlined = fixed.COMPILED, fixed.INLINED
-    elif not corners:
-        functions, inlined = [kernels.tanh, kernels.atanh, *plain.COMPILED], plain.INLINED
+    if not corners:
+        functions = fixed.COMPILED if fixed_point else [kernels.tanh, kernels.atanh, *plain.COMPILED]
+        inlined = fixed.INLINED if fixed_point else plain.INLINED
     else:
-        operators = (forward_front, inverse_front) if front else (forward, inverse)
-        functions = [kernels.tanh, kernels.atanh, *plain.FRONT, *corners_float.COMPILED]
-        inlined = set(corners_float.INLINED)
-        for operator in operators:
-            functions += operator.COMPILED
-            inlined |= operator.INLINED
+        modules: tuple[Any, ...]
+        if fixed_point:
+            functions = list(fixed.SHARED)
+            modules = (corners_fixed, forward_fixed, inverse_front_fixed if front else inverse_fixed)
+        else:
+            functions = [kernels.tanh, kernels.atanh, *plain.FRONT]
+            modules = (corners_float, *((forward_front, inverse_front) if front else (forward, inverse)))
+        inlined = set()
+        for module in modules:
+            functions += [function for function in module.COMPILED if function not in functions]
+            inlined |= module.INLINED
         functions += run.COMPILED
+        memory = new_fixed_memory if fixed_point else new_memory
 
         def new_state(t: Any) -> Any:
-            return new_memory(len(t.threshold) - 1, t.threshold.dtype)
+            return memory(len(t.threshold) - 1, t.threshold.dtype)
 
     made = compile_together(functions, inlined) if compiled else bind_together(functions)
     made.new_state = new_state

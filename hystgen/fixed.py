@@ -1,10 +1,10 @@
 """What fixed point does otherwise: the part of the bit reference that is not common to all arithmetics.
 
-Memory, corner list, plays and the meaning of a step are those of `hystgen.reference`, run on integers: inputs of the
-plays are whole multiples of a least step, sums are whole multiples of a fraction of the output code, and both engines
-compute the same whole numbers, so that they agree in every bit. Only solving for the input of the plays (with a
-reciprocal, nothing is divided), the memoryless part (piecewise polynomials) and rounding to codes are written here;
-they have their counterparts of the same names in `c_runtime/`.
+Inputs of the plays are whole multiples of a least step, sums are whole multiples of a fraction of the output code, and
+both engines compute the same whole numbers, so that they agree in every bit. Here are rounding to codes, dividing by
+the slope with a reciprocal and the memoryless part (piecewise polynomials), which both have, and what engine loop does
+otherwise than in floating point (`hystgen.reference`); that of engine corners is in `hystgen.corners`. All have their
+counterparts of the same names in `c_runtime/`.
 """
 
 from __future__ import annotations
@@ -13,33 +13,10 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from hystgen import reference
-from hystgen.reference import (
-    CORNERS,
-    DEPTH,
-    DRIVE_MAX,
-    DRIVE_MIN,
-    NEXT_OUTPUT,
-    OFFSET,
-    OUTPUT_CLAMPED,
-    RISING,
-    STATUS,
-    K,
-    Reals,
-    State,
-    W,
-    activation,
-    corners_find,
-    corners_output,
-    entered_by,
-    hint,
-    level,
-    loop_output,
-    push_corner,
-    reached,
-)
+from hystgen.reference import DRIVE_MAX, DRIVE_MIN, OFFSET, OUTPUT_CLAMPED, STATUS, Reals, State, loop_output
 
 # more places in `limits`, after those of `hystgen.reference`
-PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED = 16, 17, 18, 19, 20, 21, 22
+PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10, 18)
 
 HALF = 1 << 30
 
@@ -53,11 +30,13 @@ class FixedTables(NamedTuple):
     threshold: Reals
     weight: Reals
     slope: Reals  # of sums per least step of the plays' input
-    lift: Reals
     start_level: Reals
+    way: Reals  # 2 threshold: input gained behind a corner by the time play k begins to follow
+    reach: Reals  # 2 start_level: the output likewise
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals
     start: Reals
+    zero: Reals  # all plays 0
     limits: Reals
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Reals  # direction before the first move, likewise
@@ -73,11 +52,6 @@ class FixedTables(NamedTuple):
     engine: int
     branches: int
     fronts: int
-
-
-def half(t: FixedTables, x: Any) -> Any:  # noqa: ARG001  the same call in every arithmetic
-    """x / 2, down to a whole number: reaches the same whole numbers that x reaches twice."""
-    return x >> 1
 
 
 def nearest(x: Any, bits: Any) -> Any:
@@ -110,43 +84,6 @@ def going(t: FixedTables, w: Any, d: Any, k: int, rising: int) -> Any:
     if step > w - least:
         return least
     return w - step
-
-
-def corners_locate(t: FixedTables, s: State, depth: int, begun: int, k: int, rising: int, output: Any) -> Any:
-    """Input that gives `output` when `begun` plays followed, the first k do and `depth` corners hold the others."""
-    left, k = corners_find(t, s, 0, depth, k, rising, output, s.output, t.start_level)
-    hint(t, s, left, k, rising)
-    if k > begun:  # the last place known to be passed, and the output there
-        owner = entered_by(s, left, depth, k)
-        w = activation(t, s, owner, t.threshold[k - 1], rising)
-        here = level(t, s, owner, k - 1, rising)
-    else:
-        w = s.real[W]
-        here = corners_output(t, s)
-    if rising:
-        return going(t, w, output - here, k, rising)
-    return going(t, w, here - output, k, rising)
-
-
-def corners_solve(t: FixedTables, s: State, output: Any) -> Any:
-    """Input of the plays that gives `output`; moves nothing."""
-    k = s.counts[K]
-    rising = s.counts[RISING]
-    depth = s.counts[DEPTH]
-    w = s.real[W]
-    here = corners_output(t, s)
-    if output == here:
-        return w
-    if (rising and output > here) or (not rising and output < here):
-        if reached(output, s.real[NEXT_OUTPUT], rising):
-            return corners_locate(t, s, depth, k, k + 1, rising, output)
-        if rising:
-            return going(t, w, output - here, k, rising)
-        return going(t, w, here - output, k, rising)
-    if k > 1:
-        push_corner(t, s, depth)
-        depth = depth + 1
-    return corners_locate(t, s, depth, 1, 1, 1 - rising, output)
 
 
 def loop_solve(t: FixedTables, s: State, output: Any) -> Any:
@@ -211,8 +148,7 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
 
 def output(t: FixedTables, s: State) -> Any:
     """Output code for the memory as it is, limited to the type."""
-    total = corners_output(t, s) if t.engine == CORNERS else loop_output(t, s)
-    code = nearest(total + t.limits[OFFSET], t.limits[FRACTION])
+    code = nearest(loop_output(t, s) + t.limits[OFFSET], t.limits[FRACTION])
     if code > t.limits[SATURATED] or code < -t.limits[SATURATED]:
         s.counts[STATUS] |= OUTPUT_CLAMPED
     if code > t.limits[CODE_MAX]:
@@ -224,10 +160,7 @@ def output(t: FixedTables, s: State) -> Any:
 
 def solve(t: FixedTables, s: State, u: Any) -> Any:
     """Input of the plays that gives output code u."""
-    total = (u << t.limits[FRACTION]) - t.limits[OFFSET]
-    if t.engine == CORNERS:
-        return corners_solve(t, s, total)
-    return loop_solve(t, s, total)
+    return loop_solve(t, s, (u << t.limits[FRACTION]) - t.limits[OFFSET])
 
 
 def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
@@ -235,31 +168,18 @@ def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
     return True
 
 
-def tells_limit(t: FixedTables, s: State, v: Any, inside: Any) -> bool:  # noqa: ARG001  as above
-    """Where the limit leads is looked up when it is taken to memory."""
-    return False
+SHARED: list[Callable[..., Any]] = [nearest, over_slope, curve, front_forward, front_inverse]
+"""What both engines have."""
 
-
-_OWN: list[Callable[..., Any]] = [
-    half, nearest, over_slope, going, corners_locate, corners_solve, loop_solve, curve, front_forward,
-    front_inverse, output, solve, finite, tells_limit,
-]  # fmt: skip
-_NAMES = {function.__name__ for function in _OWN} | {
-    "envelope_forward", "envelope_inverse", "dead_zone",
-}  # fmt: skip
-_COMMON = [function for function in reference.COMPILED if function.__name__ not in _NAMES]
-_LOWER = {
-    "multiple", "activation", "level", "past", "all_follow", "reached", "corners_settle", "hint", "way",
-    "not_reached", "opposite", "corners_left", "corners_find", "entered_by", "foretold", "corners_rest",
-    "corners_start", "push_corner", "turns", "corners_absorb", "corners_foretell", "corners_output", "loop_rest",
-    "loop_start", "loop_absorb", "loop_output",
-}  # fmt: skip
+_OWN: list[Callable[..., Any]] = [*SHARED, going, loop_solve, output, solve, finite]
+_REPLACED = {function.__name__ for function in (*_OWN, *reference.FRONT)}
+_COMMON = [function for function in reference.COMPILED if function.__name__ not in _REPLACED]
+_PLAYS = {"loop_rest", "loop_start", "loop_absorb", "loop_output"}
 
 # Callees before callers: the memory, then what is written here, then what a step means
 COMPILED: list[Callable[..., Any]] = [
-    half,
-    *(function for function in _COMMON if function.__name__ in _LOWER),
-    *_OWN[1:],
-    *(function for function in _COMMON if function.__name__ not in _LOWER),
+    *(function for function in _COMMON if function.__name__ in _PLAYS),
+    *_OWN,
+    *(function for function in _COMMON if function.__name__ not in _PLAYS),
 ]
 INLINED: set[Callable[..., Any]] = {function for function in COMPILED if function in reference.INLINED}

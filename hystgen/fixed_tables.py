@@ -326,7 +326,7 @@ class _Builder:
 
     def _tables(self) -> FixedTables:
         c = self.cascade
-        limits = [0] * 23
+        limits = [0] * 18
         limits[reference.DRIVE_MIN], limits[reference.DRIVE_MAX] = self.drive
         limits[reference.OUTPUT_MIN], limits[reference.OUTPUT_MAX] = self.output
         limits[reference.OFFSET] = self.offset
@@ -341,13 +341,16 @@ class _Builder:
         if c.branches_differ and self.invertible:
             limits[reference.HOLD] = math.floor(2 * (self._inverse_rounding() or 0))
         limits[reference.REAL_MAX] = 2**SUM_BITS
-        limits[reference.MULTIPLE - 2 : reference.MULTIPLE + 3] = [-2, -1, 0, 1, 2]
         limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] = self.play
         limits[fixed.MARGIN], limits[fixed.FRACTION] = self.margin, self.bits
         limits[fixed.FINE], limits[fixed.CODE_MAX] = self.fine, self.code_max
         limits[fixed.SATURATED] = self._saturated()
+        # output codes of half a drive code and of what the reciprocal can be off, on the steepest piece
+        limits[fixed.SHY] = (max(self.slope) * ((2**self.fine + 1) // 2 + 8) >> self.bits) + 2
         curves = self.front
         pieces = [piece for curve in curves for piece in curve.pieces]
+
+        levels = [t * k - q for t, k, q in zip(self.threshold, self.slope, self.lift, strict=False)]
 
         def whole(values: Sequence[int]) -> Any:
             return np.array(values, dtype=np.int64)
@@ -356,11 +359,13 @@ class _Builder:
             threshold=whole(self.threshold),
             weight=whole(self.weight),
             slope=whole(self.slope),
-            lift=whole(self.lift),
-            start_level=whole([t * k - q for t, k, q in zip(self.threshold, self.slope, self.lift, strict=False)]),
+            start_level=whole(levels),
+            way=whole([2 * r for r in self.threshold]),
+            reach=whole([2 * z for z in levels]),
             reciprocal=whole(self.reciprocal),
             shift=whole(self.shift),
             start=whole(self.start if len(set(self.start)) > 1 else self.start[:1]),
+            zero=whole([0]),
             limits=whole(limits),
             applied=whole(applied),
             ascending=whole(ascending),

@@ -194,9 +194,7 @@ def build_float(
         sizes.append(size)
         numbers += data
 
-    limits = [0.0] * 16
-    limits[reference.HALF] = 0.5
-    limits[reference.MULTIPLE - 2 : reference.MULTIPLE + 3] = [-2.0, -1.0, 0.0, 1.0, 2.0]
+    limits = [0.0] * 10
     if bounded:
         drive = inward(*cascade.input_range, dtype)
         outputs = inward(*cascade.output_range, dtype)

@@ -19,6 +19,7 @@ import hystgen
 from hystgen import compiled, fixed, fixed_tables, reference
 from hystgen.api import Model, cascade_of
 from hystgen.cli import main
+from hystgen.corners import memory
 from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
 from hystgen.params import parse_parameters
 from hystgen.simulation import Session
@@ -149,7 +150,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     for code in codes:
         answer = ours.run([code])[0][0]
         errors.append(abs(answer - exact.run([code * float(form.output_lsb)])[0][0] / float(form.drive_lsb)))
-        assert ours.state.counts[reference.ASCENDING] == exact.state.counts[reference.ASCENDING]
+        assert ours.state.counts[memory.ASCENDING] == exact.state.counts[memory.ASCENDING]
     assert 0 < max(errors) <= form.inverse_rounding
 
 
@@ -164,20 +165,23 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     whole = tables._replace(
         **{
             field: getattr(tables, field).astype(object)
-            for field in ("threshold", "weight", "slope", "lift", "start_level", "reciprocal", "shift", "start",
-                          "limits", "applied", "knot", "coefficient", "scale", "domain", "edge", "argument", "below")
+            for field in ("threshold", "weight", "slope", "start_level", "way", "reach", "reciprocal", "shift", "start",
+                          "zero", "limits", "applied", "knot", "coefficient", "scale", "domain", "edge", "argument",
+                          "below")
         }
     )  # fmt: skip
     for inverse in (0, 1):
-        state = reference.new_state(whole)
+        state = plain.new_state(whole)
         plain.init(whole, state, inverse)
         first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
-        for code in records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7].tolist():
-            (plain.inverse_step if inverse else plain.forward_step)(whole, state, code)
-            sums = [abs(state.real[reference.ANCHOR_OUTPUT]), *map(abs, state.output)]
-            assert max(sums) <= form.largest_sum
-            assert abs(state.real[reference.W]) < 2**31
-            assert abs(plain.corners_output(whole, state)) <= form.largest_sum
+        codes = records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7]
+        answers = []
+        for code in codes.tolist():
+            answers.append((plain.inverse_step if inverse else plain.forward_step)(whole, state, code))
+            assert max(map(abs, [state.real[memory.OUTPUT], *state.output])) <= form.largest_sum
+            assert max(map(abs, [state.real[memory.INPUT], *state.input])) < 2**31
+        steps = np.full(len(codes), reference.OP_STEP)
+        assert answers == compiled.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
 
 
 @given(

@@ -132,11 +132,11 @@ def alarms(source: Path, machine: str) -> list[str]:
     plays = int(re.search(r"_N_PLAYS (\d+)", source.with_suffix(".h").read_text())[1])  # type: ignore[index]
     apart = {  # how many states are kept apart: play by play, coefficient by coefficient, not all in one
         "loop_rest": 2 * plays + 20, "loop_start": 2 * plays + 20, "loop_solve": 2 * plays + 20,
-        "corners_start": 300, "find_by_input": 1000, "find_by_output": 1000, "curve": 300,
+        "start": 300, "find": 1000, "curve": 300,
     }  # fmt: skip
     visits = [f"{name}_{what}:{states}" for what, states in apart.items() if f"{name}_{what}(" in text]
-    # half words are put together, curves measure arguments, drives may lie behind a line
-    wraps = machine == "32 bits" or f"{name}_curve(" in text or f"{name}_inverse_enter_fast" in text
+    # half words are put together, curves measure arguments, the corner engine measures ways
+    wraps = machine == "32 bits" or f"{name}_curve(" in text or f"{name}_find(" in text
     done = subprocess.run(
         [
             frama_c(), *MACHINES[machine], "-warn-signed-downcast", *(["-warn-unsigned-overflow"] if not wraps else []),
@@ -169,7 +169,7 @@ def test_no_sequence_of_calls_can_fault(name: str, arithmetic: str, engine: str,
 
 
 # Faults put into the emitted two_branches in q31, and the alarm that has to follow: table entries, limits, a loop, a
-# start; a list of corners that is too short for them
+# start; a search that goes too far
 FAULTS = [
     ("loop", ".c", r"(u \* \(\(two_branches_sum_t\)1 << )\d+", r"\g<1>40", "signed overflow"),
     ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
@@ -179,8 +179,8 @@ FAULTS = [
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
     ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
     ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
-    ("corners", ".c", r"(_start_level\[7\] = \{\s*0, )\d+", r"\g<1>9223372036854775807", "signed overflow"),
-    ("corners", ".h", r"corner\[6\];(.*_forward_t;)", r"corner[5];\1", "out of bounds"),
+    ("corners", ".c", r"(_segment\[7\] = \{\s*\{[^}]*\},\s*\{)\d+", r"\g<1>9223372036854775807", "signed overflow"),
+    ("corners", ".c", r"(middle = \(low \+ left\)) / 2;", r"\1 / 2 + 1u;", "out of bounds"),
 ]
 
 

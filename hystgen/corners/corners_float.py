@@ -37,8 +37,9 @@ def along(m: Memory, x: Any) -> Any:
     return m.real[SIGN] * x
 
 
-def forget_line(m: Memory) -> None:
+def forget_line(t: Curve, m: Memory) -> None:
     """There is no line to go on along: the next sample searches."""
+    m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
     m.real[NEXT] = m.real[INPUT]
     m.real[CAP] = m.real[INPUT]
 
@@ -94,7 +95,7 @@ def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
     m.real[INPUT] = along(m, x) if x < along(m, to) else to
     m.real[OUTPUT] = output
     m.counts[K] = k
-    forget_line(m)
+    forget_line(t, m)
 
 
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
@@ -222,10 +223,9 @@ def start(t: Curve, m: Memory, s: Start) -> None:
         leave_corner(t, m)
     m.counts[K] = 0
     m.counts[RISING] = 1
-    m.real[SIGN] = t.constant[ONE]
     m.real[INPUT] = s.center[0, 0]
     m.real[OUTPUT] = s.center[0, 1]
-    forget_line(m)
+    forget_line(t, m)
 
 
 COMPILED: list[Callable[..., Any]] = [

@@ -23,11 +23,9 @@ from hystgen.corners.memory import (
     INPUT,
     LIMITED,
     NEXT,
-    ONE,
     OUTPUT,
     RETURNED,
     RISING,
-    SIGN,
     START,
     STATUS,
     STEPPED,
@@ -52,11 +50,12 @@ from hystgen.reference import (
     OUTPUT_MIN,
     REAL_MAX,
     ZERO,
+    PlayTables,
     Tables,
 )
 
 
-def clamp_drive(t: Tables, v: Any) -> Any:
+def clamp_drive(t: PlayTables, v: Any) -> Any:
     """v inside the range of the drive."""
     if v < t.limits[DRIVE_MIN]:
         return t.limits[DRIVE_MIN]
@@ -72,8 +71,7 @@ def put_undo(t: Curve, m: Memory) -> None:
     m.counts[K] = m.counts[UNDO_K]
     m.counts[DEPTH] = m.counts[UNDO_DEPTH]
     m.counts[RISING] = m.counts[UNDO_RISING]
-    m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
-    forget_line(m)
+    forget_line(t, m)
 
 
 def set_undo(m: Memory) -> None:

@@ -78,7 +78,7 @@ def inverse_hold(t: Tables, m: Memory) -> Any:
     return m.real[DRIVE]
 
 
-def inverse_fits(t: Tables, m: Memory, v: Any, ascending: int) -> bool:
+def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
     inside = clamp_drive(t, v)
     if inside == m.real[DRIVE]:
@@ -86,25 +86,27 @@ def inverse_fits(t: Tables, m: Memory, v: Any, ascending: int) -> bool:
     return bool((inside > m.real[DRIVE]) == (ascending != 0))
 
 
-def inverse_choose(t: Tables, m: Memory, level: Any, w: Any) -> tuple[Any, int, int]:
-    """The drive that gives w on the branch of its own move, whether an envelope cannot, and whether the drive moves."""
-    if not t.branches:
-        v, limited = front_inverse(t, w, 1)
-        return v, limited, 1
-    up = m.counts[ASCENDING]
-    if level > m.real[LEVEL]:
-        up = 1
-    elif level < m.real[LEVEL]:
-        up = 0
+def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> Any:
+    """The drive that gives w on the branch of its own move; DOMAIN is added to BITS where an envelope cannot give w."""
+    up = 1
+    if t.branches:
+        up = m.counts[ASCENDING]
+        if level > m.real[LEVEL]:
+            up = 1
+        elif level < m.real[LEVEL]:
+            up = 0
     v, limited = front_inverse(t, w, up)
-    if inverse_fits(t, m, v, up):
-        return v, limited, 1
-    back = clamp_drive(t, v) - m.real[DRIVE]
-    if up != m.counts[ASCENDING] or back < -t.limits[HOLD] or back > t.limits[HOLD]:
-        v, limited = front_inverse(t, w, 1 - up)
-        if inverse_fits(t, m, v, 1 - up):
-            return v, limited, 1
-    return m.real[DRIVE], limited, 0
+    if t.branches:
+        fits = inverse_fits(t, m, v, up)
+        back = clamp_drive(t, v) - m.real[DRIVE]
+        if not fits and (up != m.counts[ASCENDING] or back < -t.limits[HOLD] or back > t.limits[HOLD]):
+            v, limited = front_inverse(t, w, 1 - up)
+            fits = inverse_fits(t, m, v, 1 - up)
+        if not fits:
+            v = m.real[DRIVE]
+    if limited:
+        m.counts[BITS] |= DOMAIN
+    return v
 
 
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
@@ -119,18 +121,14 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
         elif u > t.limits[OUTPUT_MAX]:
             level = t.limits[OUTPUT_MAX]
         w = plays_step(t.inverse, m, level - t.limits[OFFSET])
-        v, limited, moves = inverse_choose(t, m, level, w)
-        inside = clamp_drive(t, v)
         m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
-        if limited:
-            m.counts[BITS] |= DOMAIN
-        if inside != v:
-            m.counts[BITS] |= OUTPUT_CLAMPED
-            moves = 0
-        if moves:
-            inverse_arrive(m, inside)
-        else:
+        v = inverse_choose(t, m, level, w)
+        inside = clamp_drive(t, v)
+        if inside != v or inside == m.real[DRIVE]:
+            m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
             inverse_replace(t, m, inside)
+        else:
+            inverse_arrive(m, inside)
         m.real[REFERENCE] = u
         m.real[LEVEL] = level
         m.counts[REPEAT] = 1

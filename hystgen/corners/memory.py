@@ -1,4 +1,4 @@
-"""What the corner engine computes with in floating point: constants of an operator, and the memory of an instance."""
+"""What the corner engine computes with: constants of an operator in floating point, and the memory of an instance."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Counts = NDArray[np.int64]
 
 # places in `Memory.real`: the plays, then what an operator keeps beside them
 (INPUT, OUTPUT, NEXT, CAP, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED, DRIVE,
- UNDO_DRIVE, REFERENCE, LEVEL) = range(18)  # fmt: skip
+ UNDO_DRIVE, REFERENCE, LEVEL) = range(18)  # fmt: skip  (FROM .. SIGN: in floating point)
 # and in `Memory.counts`
 (K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
- ASCENDING, UNDO_ASCENDING) = range(14)  # fmt: skip
+ ASCENDING, UNDO_ASCENDING, ON) = range(15)  # fmt: skip  (ON: in fixed point)
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
 # places in `Curve.constant`
 MOST, ZERO, HALF, ONE = range(4)
@@ -59,9 +59,33 @@ def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     return Memory(
         real=np.zeros(18, dtype),
-        counts=np.zeros(14, np.int64),
+        counts=np.zeros(15, np.int64),
         output=np.zeros(plays + 1, dtype),
         passed=np.zeros((plays + 1, 2), dtype),
         top=np.zeros(plays + 1, np.int64),
         rose=np.zeros(plays + 1, np.int64),
+    )
+
+
+class FixedMemory(NamedTuple):
+    """One instance in fixed point: plain arrays of int64, however narrow they are in C."""
+
+    real: Reals
+    counts: Counts
+    output: Reals  # (n): of each corner, as the three that follow
+    input: Reals
+    top: Counts
+    rose: Counts
+
+
+def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
+    """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
+    corners = max(plays, 1)
+    return FixedMemory(
+        real=np.zeros(18, dtype),
+        counts=np.zeros(15, np.int64),
+        output=np.zeros(corners, dtype),
+        input=np.zeros(corners, dtype),
+        top=np.zeros(corners, np.int64),
+        rose=np.zeros(corners, np.int64),
     )

@@ -75,17 +75,27 @@ _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "ui
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
 
 
-def _corner_structs(real: int, layout: Layout) -> dict[str, tuple[int, int]]:
-    """Sizes and alignments of the structures of the corner engine in floating point."""
-    reals = (real, real)
-    pointer = (layout.pointer, layout.pointer)
-    corner = layout.struct(*3 * [reals], (2, 2), (1, 1))
+def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[int, int]]:
+    """Sizes and alignments of the structures of the corner engine."""
+    reals, pointer = (real, real), (layout.pointer, layout.pointer)
+    eight, four, two, one = (8, 8), (4, 4), (2, 2), (1, 1)
+    if fixed:
+        return {
+            "place_t": layout.struct(eight, four, two, two, one),
+            "segment_t": layout.struct(eight, four, four, four, one),
+            "kink_t": layout.struct(eight, eight, two, two),
+            "corner_t": layout.struct(eight, four, two, one),
+            "curve_t": layout.struct(pointer, eight, eight, eight, two),
+            "drive_t": layout.struct(four, one),
+        }
+    corner = layout.struct(*3 * [reals], two, one)
     return {
+        "place_t": layout.struct(reals, reals, two, two, one),
         "segment_t": layout.struct(*4 * [reals]),
         "corner_t": corner,
         "curve_t": layout.struct(pointer, *6 * [reals]),
-        "start_t": layout.struct(pointer, (2, 2), (2, 2), corner),
-        "drive_t": layout.struct(reals, reals, (1, 1)),
+        "start_t": layout.struct(pointer, two, two, corner),
+        "drive_t": layout.struct(reals, reals, one),
     }
 
 
@@ -98,10 +108,9 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, each: bool = F
         "dead_zone_t": layout.struct(*pointers, count),
         "envelope_t": layout.struct(*(7 * [reach])),
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
-        "tables_t": layout.struct(*pointers[: 6 if fixed else 4], *([(8, 8), reach, reach] if fixed else []), count),
+        "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
+        **_corner_structs(real, fixed, layout),
     }
-    if not fixed:
-        structs |= _corner_structs(real, layout)
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
     for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
@@ -143,62 +152,49 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 def _memory(cascade: Cascade, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
     n = cascade.pi.n
     real = REAL_BYTES[options.arithmetic]
-    play, reach, sums = (4, 8 if options.arithmetic == "q31" else 4, 8) if fixed else (real, real, real)
-    corners = options.engine == "corners"
+    play, reach = (4, 8 if options.arithmetic == "q31" else 4) if fixed else (real, real)
     branches = cascade.branches_differ
     sizes = []
     a_play = play
-    integer = layout.integer
     for op in ("forward", "inverse"):
         if not getattr(options, op):
             continue
-        if corners and not fixed:
-            size, a_play = _corner_instance(n, op, real, bool(cascade.stages), layout)
-            sizes.append((op, size))
-            continue
-        fields = [real] * (1 + branches) + [1] * branches + [integer]
-        if op == "inverse":
-            fast = corners and not cascade.stages
-            fields = [real] * (4 + branches) + [1] * (3 + 2 * fast + branches) + [integer, integer]
-            if fast:  # what stands before them
-                fields = [8, 4, 4, play, play, 4, 4, 1, *fields]
-        scalars = [(size, size) for size in fields]
-        if corners:
-            place = layout.struct(*((size, size) for size in (sums, sums, reach, reach, 2, 2, 1)))
-            memory = layout.struct(place, place, (play, play), (2, 2), (1, 1))
-            a_play, alignment = layout.struct(*((size, size) for size in (sums, play, 2, 1)))
-            order = [*scalars, memory] if op == "inverse" else [memory, *scalars]
-            whole = layout.struct(*order, (max(n, 1) * a_play, alignment))
+        if options.engine == "corners":
+            size, a_play = _corner_instance(n, op, real, bool(cascade.stages), fixed, layout)
         else:
-            whole = layout.struct(*scalars, ((n + 1) * play, play))
-        sizes.append((op, whole[0]))
-    width = reach if fixed else real
-    more = _constants(plays, width, fixed, layout, each=True) + a_play * len(sizes)
-    return Memory(_constants(text, width, fixed, layout), sizes, more)
+            fields = [real] * (1 + branches) + [1] * branches + [layout.integer]
+            if op == "inverse":
+                fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
+            size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
+        sizes.append((op, size))
+    more = _constants(plays, reach, fixed, layout, each=True) + a_play * len(sizes)
+    return Memory(_constants(text, reach, fixed, layout), sizes, more)
 
 
-def _corner_instance(n: int, op: str, real: int, front: bool, layout: Layout) -> tuple[int, int]:
-    """Bytes of an instance of the corner engine in floating point, and of one corner."""
+def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layout: Layout) -> tuple[int, int]:
+    """Bytes of an instance of the corner engine, and of one corner."""
     reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
-    place = layout.struct(reals, reals, (2, 2), (2, 2), flag)
-    plays = layout.struct(place, *8 * [reals], flag)
-    corner, alignment = _corner_structs(real, layout)["corner_t"]
+    structs = _corner_structs(real, fixed, layout)
+    place, (corner, alignment) = structs["place_t"], structs["corner_t"]
+    plays = place if fixed else layout.struct(place, *8 * [reals], flag)
     if op == "forward":
         beside = [reals, flag, status] if front else [status]
-    elif front:
-        beside = [place, *5 * [reals], *5 * [flag], status, status]
+    elif fixed:
+        beside = [*4 * [reals], *3 * [flag], status] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
+        beside += [status, place, structs["kink_t"]]
     else:
-        beside = [place, reals, reals, flag, flag, status]
-    return layout.struct(plays, *beside, ((n + 1) * corner, alignment))[0], corner
+        beside = [place, *5 * [reals], *5 * [flag], status] if front else [place, reals, reals, flag, flag]
+        beside.append(status)
+    corners = max(n, 1) if fixed else n + 1
+    return layout.struct(plays, *beside, (corners * corner, alignment))[0], corner
 
 
 def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:
     """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside.
 
-    A search through the corner list bisects it, in fixed point after a look at the last corner; that through a block
-    bisects it too, in fixed point after one or two looks: at most 3 + 2 b comparisons in all, b the bits of n. Corners
-    of a start list are bisected apart, but own a play each, so that no block is searched then. A drive that is limited
-    or committed is searched for too, then or when it is taken to memory, the answer once more.
+    A search through the corner list bisects it, and that through a block bisects it too: at most 3 + 2 b comparisons in
+    all, b the bits of n. A drive that is limited or committed is searched for too, then or when it is taken to memory,
+    the answer once more.
     """
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
@@ -240,11 +236,16 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
     """Multiplications, comparisons, and of these more a play, more a bit of n; of plays, checks and limits."""
     if not corners:
         return (1, 6, 2, 0) if op == "forward" else (3 if fixed else 2, 13, 3, 0)
+    if fixed:  # a search looks at a corner, then at a play, and bisects both: 2 + 2 b
+        # clamped 3, turned 1, search, code 4; the output
+        if op == "forward":
+            return 1, 10, 0, 2
+        # Usual 3, repeated 1, clamped 6, turned 1, search, kept near the range 1, the same plays 2, else turned 1 and
+        # another search; ahead 3. Over a slope, output, ahead
+        return 3 + fast, 19 + 3 * fast, 0, 4
     if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
-        return 4 if fixed else 3, 10, 0, 2  # next 1, search 3. In fixed point a sum takes two multiplications.
+        return 3, 10, 0, 2  # next 1, search 3
     # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
-    # 4 + 3, in floating point ahead 1; where samples can be fast: two edges, and in fixed point one more play 5, edges
-    # anew 4, in floating point room 1, the range's ends 3, limited 2. The drive's corner and way, the reference's; two
-    # lines; with fast samples the edge, and in fixed point the next play's line and way.
-    compares = 30 + 11 * fast if fixed else 31 + 8 * fast
-    return (10 + 4 * fast if fixed else 6 + fast), compares, 0, 4
+    # 4 + 3, ahead 1; where samples can be fast: two edges, room 1, the range's ends 3, limited 2. The drive's corner
+    # and way, the reference's; two lines; with fast samples the edge.
+    return 6 + fast, 31 + 8 * fast, 0, 4

@@ -98,11 +98,10 @@ def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[st
 
 def _implementation(values: SimpleNamespace) -> str:
     """The operators with all that they need of the run time, but what a shared one has."""
-    if values.fixed:
-        return render("step.c.j2", values, tables=render("tables_fixed.c.j2", values))
+    kind = "fixed" if values.fixed else "float"
     if values.engine == "loop":
-        return render("step.c.j2", values, tables=render("tables.c.j2", values))
-    return render("corners.c.j2", values, tables=render("tables_corners.c.j2", values))
+        return render("step.c.j2", values, tables=render(f"tables_{kind}.c.j2", values))
+    return render("corners.c.j2", values, tables=render(f"tables_corners_{kind}.c.j2", values))
 
 
 def _tidy(text: str) -> str:
@@ -198,10 +197,11 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
     if corners and not shared:
         headers = values.family.states
         values.state_types = "\n".join(runtime.types(header, (), prefix, values.family) for header in headers)
-    if corners and not values.fixed:
+    if corners:
         states, sources = _operator_files(values, options)
-        values.operator_types = runtime.operators(states, name, n + 1, prefix, values.family)
-        values.operators = runtime.operators(sources, name, n + 1, prefix, values.family)
+        most = max(n, 1) if values.fixed else n + 1
+        values.operator_types = runtime.operators(states, name, most, prefix, values.family)
+        values.operators = runtime.operators(sources, name, most, prefix, values.family)
     kernels = _kernels(values, options)
     values.kernels = "" if shared else kernels
     values.cost = _cost(cascade, options, values, kernels)
@@ -226,74 +226,78 @@ def _units(parameters: Parameters) -> SimpleNamespace:
 def _operator_files(values: SimpleNamespace, options: Options) -> tuple[list[str], list[str]]:
     """The files of the run time that have the operators of the corner engine: their types, and their functions."""
     front = "_front" if values.fronts else ""
-    states, sources = [], []
+    kind = "_fixed" if values.fixed else ""
+    states, sources = [], ["clamp_fixed.c"] if values.fixed else []
     if options.forward:
-        states.append(f"hystgen_forward{front}_state.h")
-        sources.append(f"forward{front}.c")
+        states.append(f"hystgen_forward{front}{kind}_state.h")
+        sources.append(f"forward{front}{kind}.c")
     if options.inverse:
-        states.append(f"hystgen_inverse{front}_state.h")
-        sources.append("clamp_drive.c")
+        states.append(f"hystgen_inverse{front}{kind}_state.h")
+        if not values.fixed:
+            sources.append("clamp_drive.c")
         if values.fronts:
             sources.append("inverse_two_branches.c" if values.branches else "inverse_one_branch.c")
-        sources.append(f"inverse{front}.c")
+        elif values.fixed:
+            sources.append("inverse_finer.c" if values.fine else "inverse_whole.c")
+        sources.append(f"inverse{front}{kind}.c")
     return states, sources
 
 
-def _corner_kernels(values: SimpleNamespace, options: Options) -> str:
-    """The same for the corner engine in floating point."""
-    family: runtime.Family = values.family
+def _corner_roots(values: SimpleNamespace, options: Options) -> set[str]:
+    """The functions of the run time that the operators of the corner engine call, but those of the front."""
     roots = {"hystgen_start"}
+    if values.fixed:
+        roots.add("hystgen_move_to_input")
+        if options.inverse:
+            roots |= {"hystgen_copy_place", "hystgen_solve", "hystgen_move_to_solution"}
+            if not values.fronts:
+                roots |= {"hystgen_wide", "hystgen_over_slope", "hystgen_look_ahead"}
+        return roots
     if options.forward or values.fronts:
         roots.add("hystgen_plays_step")
     if options.inverse:
-        roots |= {"hystgen_move_to_output", "hystgen_move_in_block", "hystgen_put", "hystgen_copy_place"}
-    types = {f"hystgen_{stage['kind']}_t" for stage in values.stages}
-    if values.fronts:
-        types.add("hystgen_drive_t")
-    for stage in values.stages:
-        roots |= {f"hystgen_{stage['kind']}_{way}" for way in ("forward", *(["inverse"] if options.inverse else []))}
-    wanted = {"hystgen_segment_t", "hystgen_curve_t", "hystgen_start_t", *types}
-    pieces = runtime.needed(runtime.kernel_pieces(family), sorted(roots))
-    headers = "\n".join(runtime.types(header, wanted, values.rt, family) for header in family.tables)
-    return headers + "\n" + runtime.render(pieces, values.rt, family, static=True)
+        kernels = ("move_to_output", "move_to_input", "move_in_block", "forget_line", "copy_place")
+        roots |= {f"hystgen_{kernel}" for kernel in kernels}
+    return roots
+
+
+def _loop_roots(values: SimpleNamespace, options: Options) -> set[str]:
+    """The same of engine loop."""
+    roots = {"hystgen_loop_rest", "hystgen_loop_absorb"}
+    if values.start_list:
+        roots.add("hystgen_loop_start")
+    if options.forward or values.branches:
+        roots.add("hystgen_loop_output")
+    if options.inverse:
+        roots.add("hystgen_loop_solve")
+    return roots
 
 
 def _kernels(values: SimpleNamespace, options: Options) -> str:
     """What the model needs of the run time, for a file of its own."""
     family: runtime.Family = values.family
-    engine = options.engine
-    if engine == "corners" and not family.fixed:
-        return _corner_kernels(values, options)
-    roots = {f"hystgen_{engine}_rest", f"hystgen_{engine}_absorb"}
-    if values.start_list:
-        roots.add(f"hystgen_{engine}_start")
-    known = values.fast and family.fixed  # the output that a step begins at
-    if options.forward or values.branches or known:
-        roots.add(f"hystgen_{engine}_output")
-    if options.inverse:
-        roots.add(f"hystgen_{engine}_solve" + ("_from" if known else ""))
-    if options.inverse and engine == "corners":
-        roots.add("hystgen_corners_foretell")
-    if values.fast:
-        roots.add("hystgen_copy_place")
-        roots.add("hystgen_wide")
-    types = {"hystgen_tables_t"} | {f"hystgen_{stage['kind']}_t" for stage in values.stages}
+    corners = options.engine == "corners"
+    roots = _corner_roots(values, options) if corners else _loop_roots(values, options)
+    types = {f"hystgen_{stage['kind']}_t" for stage in values.stages}
+    if corners:
+        types |= {"hystgen_segment_t", "hystgen_curve_t", *(() if values.fixed else ("hystgen_start_t",))}
+        types |= {"hystgen_drive_t"} if values.fronts else set()
+    else:
+        types.add("hystgen_tables_t")
     for stage in values.stages:
-        roots.add(f"hystgen_{stage['kind']}_forward")
-        if options.inverse:
-            roots.add(f"hystgen_{stage['kind']}_inverse")
-    if family.fixed:
-        if options.forward or values.branches or (options.inverse and values.fine):
+        roots |= {f"hystgen_{stage['kind']}_{way}" for way in ("forward", *(["inverse"] if options.inverse else []))}
+    if values.fixed:
+        if options.forward or values.branches or (corners and values.fronts):
             roots.add("hystgen_nearest")
         if values.fronts:
             roots |= {"hystgen_nearest", "hystgen_curve", "hystgen_beyond"} if options.inverse else {"hystgen_curve"}
             types |= {"hystgen_ends_t"} if options.inverse else set()
     pieces = runtime.needed(runtime.kernel_pieces(family), sorted(roots))
-    return (
-        runtime.types(family.tables[-1], types, values.rt, family)
-        + "\n"
-        + runtime.render(pieces, values.rt, family, static=True)
-    )
+    headers = family.tables if corners else family.tables[-1:]
+    if corners and values.fixed and not types & {"hystgen_ends_t"}:
+        headers = headers[:1]
+    text = "\n".join(runtime.types(header, types, values.rt, family) for header in headers)
+    return text + "\n" + runtime.render(pieces, values.rt, family, static=True)
 
 
 def cost_of(parameters: Parameters, cascade: Cascade, options: Options) -> cost.Cost:

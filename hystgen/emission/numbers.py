@@ -57,18 +57,6 @@ def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
     }
 
 
-def _arrays(
-    numbers: FixedTables, name: str, columns: Sequence[tuple[str, str, str, bool]]
-) -> tuple[list[str], list[str]]:
-    """Tables as text, and the pointers to them: NULL for those that nothing reads."""
-    arrays, pointers = [], []
-    for field, own, kind, used in columns:
-        if used:
-            arrays.append(table(kind, f"{name}_{own}", list(getattr(numbers, field))))
-        pointers.append(f"{name}_{own}" if used else "NULL")
-    return arrays, pointers
-
-
 def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
     name, real_t = parameters.name, f"{prefix}_real_t"
     corners = options.engine == "corners"
@@ -82,12 +70,10 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         **engine,
         "stages": stages,
         "fronts": bool(stages),
-        "front": bool(stages),
         "envelopes": any(stage["kind"] == "envelope" for stage in stages),
         "forward_max_error": operand(tables.upward(bounds.forward, dtype)),
         "inverse_max_error": operand(tables.upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(tables.upward(bounds.rounding, dtype)) if options.inverse else "",
-        "fast": False,
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
         "saturates": False,
@@ -202,27 +188,9 @@ def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) ->
 def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
     name, emit = parameters.name, parameters.emit
     corners = options.engine == "corners"
-    numbers, form = fixed_tables.build(
-        cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb
-    )
+    numbers, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
     limits = numbers.limits
-    arrays, pointers = _arrays(
-        numbers,
-        name,
-        [
-            ("threshold", "threshold", f"{prefix}_play_t", True),
-            ("weight", "weight", "int32_t", not corners),
-            ("slope", "slope", "int32_t", corners or options.inverse),
-            ("start_level", "start_level", f"{prefix}_sum_t", corners),
-            ("reciprocal", "reciprocal", "uint32_t", options.inverse),
-            ("shift", "shift", "uint8_t", options.inverse),
-        ],
-    )
-    if len(numbers.start) > 1:
-        arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
-    margin = limits[fixed.MARGIN]
-    ends = (limits[fixed.PLAY_MIN] - margin, limits[fixed.PLAY_MAX] + margin)
-    pointers += [literal(number) for number in (numbers.lift[-1], *ends)]
+    engine = (_fixed_corner_fields if corners else _fixed_loop_fields)(numbers, name, prefix, options)
     fine = int(limits[fixed.FINE])
     units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in units)
@@ -246,11 +214,9 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     ]
     return {
         **_limits(numbers),
-        "arrays": arrays,
-        "pointers": pointers,
+        **engine,
         "stages": [],
         "fronts": bool(numbers.fronts),
-        "front": bool(numbers.fronts) or fine > 0,
         "fine": fine,
         "fine_factor": 2**fine,
         "fraction": int(limits[fixed.FRACTION]),
@@ -262,17 +228,54 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "forward_max_error": _decimal(form.forward_error),
         "inverse_max_error": _decimal(form.inverse_error) if options.inverse and form.inverse_error else "",
         "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
-        "fast": options.inverse and corners and not numbers.fronts,
-        # output codes of half a drive code and of what the reciprocal can be off, on the steepest piece
-        "shy": (int(max(numbers.slope)) * ((2**fine + 1) // 2 + 8) >> int(limits[fixed.FRACTION])) + 1,
-        # so far on that w goes on by less than 2^30 least steps
-        "most_on": f"{int(min(numbers.slope[1:])) << 30}ULL",
-        "narrow_shift": all(1 <= shift - 1 <= 31 for shift in numbers.shift[1:]),
+        "shy": int(limits[fixed.SHY]),
         "half_code": 2**fine // 2,
         "wide_t": f"{prefix}_reach_t",
         "play_t": f"{prefix}_play_t",
         "precision": precision,
     }
+
+
+def _fixed_loop_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> dict[str, Any]:
+    """The tables of engine loop, pointers to them (NULL to those that nothing reads), and the start memory."""
+    columns = [
+        ("threshold", f"{prefix}_play_t", True),
+        ("weight", "int32_t", True),
+        ("slope", "int32_t", options.inverse),
+        ("reciprocal", "uint32_t", options.inverse),
+        ("shift", "uint8_t", options.inverse),
+    ]
+    arrays = [table(kind, f"{name}_{field}", list(getattr(numbers, field))) for field, kind, used in columns if used]
+    if len(numbers.start) > 1:
+        arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
+    margin = numbers.limits[fixed.MARGIN]
+    ends = (numbers.limits[fixed.PLAY_MIN] - margin, numbers.limits[fixed.PLAY_MAX] + margin)
+    pointers = [f"{name}_{field}" if used else "NULL" for field, _, used in columns]
+    return {"arrays": arrays, "pointers": [*pointers, *map(literal, ends)]}
+
+
+def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> dict[str, Any]:
+    """The tables of engine corners: one curve for both operators, and what a start memory is made of."""
+    limits = numbers.limits
+    columns = (numbers.reach, numbers.way, numbers.slope[1:], numbers.reciprocal[1:], numbers.shift[1:])
+    rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in zip(*columns, strict=True))
+    most = (limits[fixed.MARGIN] - limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] + limits[fixed.MARGIN])
+    ends = f"{{{', '.join(map(literal, most))}}}"
+    parts = f"{literal(limits[reference.OFFSET])}, {ends}, {len(numbers.way) - 1}"
+    arrays = [
+        f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
+        f"static const {prefix}_curve_t {name}_model_curve = {{\n    {name}_model_segment, {parts}\n}};\n",
+        table("int32_t", f"{name}_model_start", list(numbers.start)),
+        table("int32_t", f"{name}_model_zero", list(numbers.zero)),
+    ]
+    for operator, first, wanted in (("forward", 0, options.forward), ("inverse", 2, options.inverse)):
+        if wanted and numbers.fronts:
+            drives = ", ".join(
+                f"{{{literal(numbers.applied[j])}, {'true' if numbers.ascending[j] else 'false'}}}"
+                for j in (first, first + 1)
+            )
+            arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
+    return {"arrays": arrays, "pointers": []}
 
 
 def _physical(x: Any) -> str:

@@ -28,10 +28,7 @@ FLOAT_KERNELS = (
 )
 FIXED_KERNELS = (
     "over_slope.c",
-    "corner_fixed.c",
-    "corners_absorb.c",
-    "corners_find_fixed.c",
-    "corners_solve_fixed.c",
+    "corners_fixed.c",
     "loop_absorb.c",
     "loop_solve_fixed.c",
     "curve.c",
@@ -42,19 +39,14 @@ FIXED_KERNELS = (
 class Family:
     """How an arithmetic appears in C: `bits` names it, `real` is the type of inputs and answers.
 
-    In floating point every number has that type; in fixed point `reach` and `sum` are those of where plays start to
-    follow and of outputs before they are rounded, `reach_max` and `sum_max` are beyond any of them.
+    In floating point every number has that type, and `real_max` is its largest; in fixed point `reach` is that of where
+    plays start to follow.
     """
 
     bits: str
     real: str
-    reach_max: str
+    real_max: str = ""
     reach: str = ""
-
-    @property
-    def sum_max(self) -> str:
-        """Beyond any output before it is rounded."""
-        return _FAR_64 if self.fixed else self.reach_max
 
     @property
     def fixed(self) -> bool:
@@ -69,27 +61,24 @@ class Family:
     @property
     def tables(self) -> tuple[str, ...]:
         """The headers of the run time that have the types of its tables."""
-        return ("hystgen_tables_fixed.h",) if self.fixed else ("hystgen_corners_tables.h", "hystgen_tables_float.h")
+        if self.fixed:
+            return ("hystgen_corners_fixed_tables.h", "hystgen_tables_fixed.h")
+        return ("hystgen_corners_tables.h", "hystgen_tables_float.h")
 
     @property
     def states(self) -> tuple[str, ...]:
         """The headers of the run time that have the types of its memory."""
-        return ("hystgen_corner_fixed.h", "hystgen_state.h") if self.fixed else ("hystgen_corners_state.h",)
+        return ("hystgen_corners_fixed_state.h",) if self.fixed else ("hystgen_corners_state.h",)
 
-
-# C++98 has the limits of <stdint.h> only where __STDC_LIMIT_MACROS was defined before its first include
-_FAR_64, _FAR_32 = "(((int64_t)1 << 62) - 1)", "2147483647"
 
 FAMILIES = {
     "float32": Family("f32", "float", "FLT_MAX"),
     "float64": Family("f64", "double", "DBL_MAX"),
-    "q31": Family("q31", "int32_t", _FAR_64, "int64_t"),
-    "q15": Family("q15", "int16_t", _FAR_32, "int32_t"),
+    "q31": Family("q31", "int32_t", reach="int64_t"),
+    "q15": Family("q15", "int16_t", reach="int32_t"),
 }
 
 
-NOINLINE = "#if defined(__GNUC__)\n__attribute__((noinline))\n#endif\n"
-INLINE = "#if defined(__GNUC__)\n__attribute__((always_inline))\n#endif\nstatic inline "
 SOFT = {
     "f32": "(defined(__arm__) && !defined(__ARM_FP))"
     " || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)",
@@ -182,16 +171,12 @@ def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
-    text = text.replace("HYSTGEN_NOINLINE ", NOINLINE)
-    if family.fixed:
-        text = text.replace("HYSTGEN_COPIES ", INLINE)
-    text = text.replace("HYSTGEN_API ", "static " if static else "").replace("HYSTGEN_REACH_MAX", family.reach_max)
+    text = text.replace("HYSTGEN_API ", "static " if static else "")
     text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
-    text = text.replace("HYSTGEN_SUM_MAX", family.sum_max)
     return _named(text, prefix, family)
 
 
-OPERATOR = re.compile(r"\bhystgen_((?:inverse|forward|front|clamp_drive)\w*)")
+OPERATOR = re.compile(r"\bhystgen_((?:inverse|forward|front|clamp_drive|code|model)\w*)")
 """What belongs to a model and not to a run time that models may share."""
 
 
@@ -206,7 +191,7 @@ def _named(text: str, prefix: str, family: Family, name: str | None = None) -> s
     if not family.fixed:  # one type for everything
         text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
-        text = text.replace("HYSTGEN_REAL_MAX", family.reach_max).replace("HYSTGEN_HALF", family.half)
+        text = text.replace("HYSTGEN_REAL_MAX", family.real_max).replace("HYSTGEN_HALF", family.half)
         text = text.replace("#if HYSTGEN_SOFT_FLOAT", f"#if {SOFT[family.bits]}")
     return aligned(text.replace("hystgen_", prefix + "_").replace("HYSTGEN_", (name or prefix).upper() + "_"))
 

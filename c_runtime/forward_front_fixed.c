@@ -1,0 +1,41 @@
+#include "hystgen_runtime.h"
+
+/* One sample. */
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
+{
+    const hystgen_real_t inside = hystgen_clamp_drive(v);
+    if (inside != v) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    self->ascending = inside > self->drive ? true : inside < self->drive ? false : self->ascending;
+    self->drive = inside;
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_front(inside, self->ascending));
+    return hystgen_code(self->here.output, &self->status);
+}
+
+static void hystgen_forward_begin(hystgen_forward_t *self, const int32_t *play, unsigned int step,
+                                  const hystgen_drive_t *first)
+{
+    hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
+    self->drive = (hystgen_real_t)first->drive;
+    self->ascending = first->ascending;
+    self->status = 0;
+}
+
+void hystgen_forward_init(hystgen_forward_t *self)
+{
+    hystgen_forward_begin(self, hystgen_model_start, HYSTGEN_START_STEP, &hystgen_forward_drive[0]);
+}
+
+void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
+{
+    hystgen_forward_begin(self, hystgen_model_zero, 0, &hystgen_forward_drive[1]);
+    (void)hystgen_forward_step(self, v);
+}
+
+unsigned int hystgen_forward_status(hystgen_forward_t *self)
+{
+    const unsigned int status = self->status;
+    self->status = 0;
+    return status;
+}

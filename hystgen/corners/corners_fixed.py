@@ -1,0 +1,157 @@
+"""The plays of the corner engine in fixed point: `c_runtime/corners_fixed.c`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hystgen.corners.memory import DEPTH, INPUT, OUTPUT, RISING, FixedMemory, K, Reals
+from hystgen.fixed import MARGIN, PLAY_MAX, PLAY_MIN, FixedTables, over_slope
+from hystgen.reference import OFFSET
+
+INPUT_MOST = 2**31 - 1
+
+Kink = tuple[Any, Any, int, int]
+"""`hystgen_kink_t`: output, input, plays that follow from there on, corners that hold the others."""
+
+FAR = 1 << 62
+
+
+def along(m: FixedMemory, x: Any) -> Any:
+    """x as the present move sees it: a falling move is a rising one with all signs changed."""
+    return x if m.counts[RISING] else -x
+
+
+def leave_corner(m: FixedMemory) -> None:
+    """Leave a corner here."""
+    c = m.counts[DEPTH]
+    m.output[c] = m.real[OUTPUT]
+    m.input[c] = m.real[INPUT]
+    m.top[c] = m.counts[K]
+    m.rose[c] = m.counts[RISING]
+    m.counts[DEPTH] += 1
+
+
+def turn_back(m: FixedMemory) -> None:
+    """Turn; a corner stays where plays have followed."""
+    if m.counts[K] > 0:
+        leave_corner(m)
+        m.counts[K] = 0
+    m.counts[RISING] = 1 - m.counts[RISING]
+
+
+def find(t: FixedTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
+    """The last place on the present move where another play begins to follow before the output, or the input, is x; or
+    the present one."""
+    rising = m.counts[RISING]
+    held, whole = (m.output, t.reach) if by_output else (m.input, t.way)
+    to = along(m, x)
+    c = -1
+    low = 0
+    left = m.counts[DEPTH]
+    k = m.counts[K]
+    while low < left:
+        middle = (low + left) // 2
+        if to - along(m, held[middle]) >= (0 if m.rose[middle] == rising else whole[m.top[middle]]):
+            left = middle
+        else:
+            low = middle + 1
+    if left < m.counts[DEPTH]:
+        c = left
+        k = m.top[c]
+    if left > 0 and m.rose[left - 1] != rising:
+        top = left - 1
+        on = to - along(m, held[top])
+        before = k
+        last = m.top[top] - 1
+        while k < last:
+            middle = (k + last) // 2 + 1
+            if on >= whole[middle]:
+                k = middle
+            else:
+                last = middle - 1
+        c = top if k > before else c
+    if c < 0:
+        return m.real[OUTPUT], m.real[INPUT], k, left
+    if m.rose[c] == rising:
+        return m.output[c], m.input[c], k, left
+    return m.output[c] + along(m, t.reach[k]), m.input[c] + along(m, t.way[k]), k, left
+
+
+def move_to_input(t: FixedTables, m: FixedMemory, to: Any) -> None:
+    """Move the plays to any input."""
+    if along(m, to - m.real[INPUT]) < 0:
+        turn_back(m)
+    output, begin, k, depth = find(t, m, to, False)
+    m.real[OUTPUT] = output + t.slope[k + 1] * (to - begin)
+    m.real[INPUT] = to
+    m.counts[K] = k
+    m.counts[DEPTH] = depth
+
+
+def solve(t: FixedTables, m: FixedMemory, output: Any) -> tuple[Any, Kink]:
+    """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves
+    nothing."""
+    if along(m, output - m.real[OUTPUT]) < 0:
+        turn_back(m)
+    kink = find(t, m, output, True)
+    x = along(m, kink[1]) + over_slope(t, along(m, output - kink[0]), kink[2] + 1)
+    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
+    return along(m, most if x > most else x), kink
+
+
+def next_output(t: FixedTables, m: FixedMemory, depth: int, k: int) -> Any:
+    """Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left."""
+    if depth == 0:
+        return FAR
+    c = depth - 1
+    return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k + 1])
+
+
+def move_to_solution(t: FixedTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
+    at which another one begins to follow."""
+    output, begin, k, depth = kink
+    way = along(m, to - begin)
+    if way >= 0:
+        following = next_output(t, m, depth, k)
+        moved = t.slope[k + 1] * way
+        if along(m, output) + moved <= following:
+            m.real[OUTPUT] = output + along(m, moved)
+            m.real[INPUT] = to
+            m.counts[K] = k
+            m.counts[DEPTH] = depth
+            return following
+    move_to_input(t, m, to)
+    return next_output(t, m, m.counts[DEPTH], m.counts[K])
+
+
+def look_ahead(t: FixedTables, m: FixedMemory, following: Any, end: Any) -> Any:
+    """The same at most where the input comes to `end`."""
+    last = along(m, m.real[OUTPUT]) + t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
+    return following if following < last else last
+
+
+def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
+    """Start memory: what each play holds, or all of them. Each is a block of its own, as if left by a move that ended
+    where the play begins to follow."""
+    aside = t.limits[OFFSET]
+    m.counts[DEPTH] = 0
+    for k in range(len(t.threshold) - 1, 0, -1):
+        w = play[k if len(play) > 1 else 0]
+        m.counts[K] = k
+        m.counts[RISING] = 1 if w + t.threshold[k] <= INPUT_MOST else 0
+        m.real[INPUT] = w + along(m, t.threshold[k])
+        m.real[OUTPUT] = aside + w * t.slope[k + 1] + along(m, t.start_level[k])
+        leave_corner(m)
+        aside = aside + w * (t.slope[k + 1] - t.slope[k])
+    m.counts[K] = 0
+    m.counts[RISING] = 1
+    m.real[INPUT] = play[0]
+    m.real[OUTPUT] = aside + play[0] * t.slope[1]
+
+
+COMPILED: list[Callable[..., Any]] = [
+    along, leave_corner, turn_back, find, move_to_input, solve, next_output, move_to_solution, look_ahead, start,
+]  # fmt: skip  (callees before callers)
+INLINED: set[Callable[..., Any]] = {along}
