@@ -117,6 +117,37 @@ HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plac
     hystgen_go_on(here, &kink, to, hystgen_gained(t, here, &kink, to));
 }
 
+/* Input at which another play begins to follow the present move, or the last one there is. */
+static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner)
+{
+    int64_t x = 2147483647;
+    if (here->depth > 0) {
+        const hystgen_corner_t *c = &corner[here->depth - 1u];
+        const int64_t begins = hystgen_along(here, c->input) + (c->rose == here->rising ? 0 : t->segment[here->k + 1u].way);
+        x = begins < x ? begins : x;
+    }
+    return (int32_t)hystgen_along(here, x);
+}
+
+/* The sum of the plays for the next input; `next` is where another one begins to follow. */
+HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                                       int32_t *next, int32_t to)
+{
+    if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) { /* the same plays follow */
+        const uint32_t slope = t->segment[here->k].slope;
+        if (here->rising) {
+            here->output += (int64_t)hystgen_wide(slope, (uint32_t)to - (uint32_t)here->input);
+        } else {
+            here->output -= (int64_t)hystgen_wide(slope, (uint32_t)here->input - (uint32_t)to);
+        }
+        here->input = to;
+    } else if (to != here->input) {
+        hystgen_move_to_input(t, here, corner, to);
+        *next = hystgen_next_input(t, here, corner);
+    }
+    return here->output;
+}
+
 /* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                   int64_t output, hystgen_kink_t *kink)

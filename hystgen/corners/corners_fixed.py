@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.memory import DEPTH, INPUT, OUTPUT, RISING, FixedMemory, K, Reals
+from hystgen.corners.memory import DEPTH, INPUT, NEXT, OUTPUT, RISING, FixedMemory, K, Reals
 from hystgen.fixed import MARGIN, PLAY_MAX, PLAY_MIN, FixedTables, over_slope
 from hystgen.reference import OFFSET
 
@@ -89,6 +89,28 @@ def move_to_input(t: FixedTables, m: FixedMemory, to: Any) -> None:
     m.counts[DEPTH] = depth
 
 
+def next_input(t: FixedTables, m: FixedMemory) -> Any:
+    """Input at which another play begins to follow the present move, or the last one there is."""
+    x = INPUT_MOST
+    c = m.counts[DEPTH] - 1
+    if c >= 0:
+        begins = along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[m.counts[K] + 1])
+        x = begins if begins < x else x
+    return along(m, x)
+
+
+def plays_step(t: FixedTables, m: FixedMemory, to: Any) -> Any:
+    """The sum of the plays for the next input."""
+    at = m.real[INPUT]
+    if at < to < m.real[NEXT] if m.counts[RISING] else m.real[NEXT] < to < at:
+        m.real[OUTPUT] += t.slope[m.counts[K] + 1] * (to - at)
+        m.real[INPUT] = to
+    elif to != at:
+        move_to_input(t, m, to)
+        m.real[NEXT] = next_input(t, m)
+    return m.real[OUTPUT]
+
+
 def solve(t: FixedTables, m: FixedMemory, output: Any) -> tuple[Any, Kink]:
     """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves
     nothing."""
@@ -152,6 +174,7 @@ def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    along, leave_corner, turn_back, find, move_to_input, solve, next_output, move_to_solution, look_ahead, start,
+    along, leave_corner, turn_back, find, move_to_input, next_input, plays_step, solve, next_output, move_to_solution,
+    look_ahead, start,
 ]  # fmt: skip  (callees before callers)
-INLINED: set[Callable[..., Any]] = {along}
+INLINED: set[Callable[..., Any]] = {along, plays_step}
