@@ -148,14 +148,22 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. */
+/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. Short
+   of `next`, an output as the present move sees it, the same plays are known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                  int64_t output, hystgen_kink_t *kink)
+                                  int64_t output, int64_t next, hystgen_kink_t *kink)
 {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
+        hystgen_find(t, here, corner, output, true, kink);
+    } else if (hystgen_along(here, output) < next) {
+        kink->output = here->output;
+        kink->input = here->input;
+        kink->k = here->k;
+        kink->depth = here->depth;
+    } else {
+        hystgen_find(t, here, corner, output, true, kink);
     }
-    hystgen_find(t, here, corner, output, true, kink);
     const hystgen_segment_t *s = &t->segment[kink->k];
     const int64_t on = hystgen_along(here, output - kink->output);
     const int64_t x = hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);

@@ -56,7 +56,7 @@ void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hyst
 int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t *next,
                            int32_t to);
 int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int64_t output,
-                      hystgen_kink_t *kink);
+                      int64_t next, hystgen_kink_t *kink);
 int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                  hystgen_kink_t *kink, int32_t to);
 int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end);

@@ -39,7 +39,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
-        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, &self->kink);
+        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, -((int64_t)1 << 62), &self->kink);
         const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)w);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |

@@ -34,7 +34,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
-        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, &self->kink);
+        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, self->next, &self->kink);
         bool limited = false;
         bool moves = true;
         const hystgen_reach_t v = hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &limited, &moves);
@@ -43,7 +43,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
                                      (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u) |
                                      (limited ? HYSTGEN_STATUS_DOMAIN : 0u));
         const int32_t to = hystgen_inverse_arrive(self, inside);
-        (void)hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink, to);
+        self->next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink, to);
         self->reference = u;
         self->level = level;
         self->repeat = true;
@@ -62,6 +62,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     self->repeat = false;
+    self->next = -((int64_t)1 << 62);
     hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_inverse_arrive(self, v));
 }
 
@@ -76,6 +77,7 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, 
     self->reference = 0;
     self->level = hystgen_code(self->here.output, &status);
     self->repeat = false;
+    self->next = -((int64_t)1 << 62);
     self->bits = 0;
     self->status = 0;
 }

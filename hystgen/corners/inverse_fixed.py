@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_fixed import along, look_ahead, move_to_input, move_to_solution, solve, start
+from hystgen.corners.corners_fixed import FAR, along, look_ahead, move_to_input, move_to_solution, solve, start
 from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.memory import (
     BEFORE,
@@ -89,7 +89,7 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
-        w, kink = solve(t, m, level << t.limits[FRACTION])
+        w, kink = solve(t, m, level << t.limits[FRACTION], -FAR)
         v = nearest(w, t.limits[FINE])
         inside = clamp_drive(t, v)
         following = move_to_solution(t, m, kink, inside << t.limits[FINE])

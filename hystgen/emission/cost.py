@@ -180,7 +180,7 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     if op == "forward":
         beside = [*([(4, 4)] if fixed else []), *([reals, flag] if front else []), status]
     elif fixed:
-        beside = [*4 * [reals], *4 * [flag]] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
+        beside = [(8, 8), *4 * [reals], *4 * [flag]] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
         beside += [status, place, structs["kink_t"]]
     else:
         beside = [place, *5 * [reals], *5 * [flag], status] if front else [place, reals, reals, flag, flag]
