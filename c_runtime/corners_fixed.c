@@ -46,6 +46,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
+    kink->input = here->input;
+    kink->output = here->output;
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const hystgen_segment_t *s = &t->segment[corner[middle].top];
@@ -74,11 +76,13 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
-    kink->input = c ? c->input : here->input;
-    kink->output = c ? c->output : here->output;
-    if (c && c->rose != here->rising) {
-        kink->input += hystgen_along(here, t->segment[k].way);
-        kink->output += hystgen_along(here, t->segment[k].reach);
+    if (c) {
+        kink->input = c->input;
+        kink->output = c->output;
+        if (c->rose != here->rising) {
+            kink->input += hystgen_along(here, t->segment[k].way);
+            kink->output += hystgen_along(here, t->segment[k].reach);
+        }
     }
 }
 
@@ -196,14 +200,6 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
     }
     hystgen_go_on(here, kink, to, moved);
     return next;
-}
-
-/* The same at most where the input comes to `end`. */
-HYSTGEN_API int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end)
-{
-    const uint32_t room = (uint32_t)hystgen_along(here, (int64_t)end - here->input);
-    const int64_t last = hystgen_along(here, here->output) + (int64_t)hystgen_wide(t->segment[here->k].slope, room);
-    return next < last ? next : last;
 }
 
 /* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its own, as if left by

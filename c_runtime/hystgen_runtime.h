@@ -59,7 +59,6 @@ int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_c
                       int64_t next, hystgen_kink_t *kink);
 int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                  hystgen_kink_t *kink, int32_t to);
-int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end);
 void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, const int32_t *play,
                    unsigned int step);
 #else

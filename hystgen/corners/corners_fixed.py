@@ -163,12 +163,6 @@ def move_to_solution(t: FixedTables, m: FixedMemory, kink: Kink, to: Any) -> Any
     return following
 
 
-def look_ahead(t: FixedTables, m: FixedMemory, following: Any, end: Any) -> Any:
-    """The same at most where the input comes to `end`."""
-    last = along(m, m.real[OUTPUT]) + t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
-    return following if following < last else last
-
-
 def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     """Start memory: what each play holds, or all of them. Each is a block of its own, as if left by a move that ended
     where the play begins to follow."""
@@ -190,6 +184,6 @@ def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 COMPILED: list[Callable[..., Any]] = [
     along, leave_corner, turn_back, find, find_input, go_on, gained, move_to_input, next_input, plays_step, solve,
-    next_output, move_to_solution, look_ahead, start,
+    next_output, move_to_solution, start,
 ]  # fmt: skip  (callees before callers)
 INLINED: set[Callable[..., Any]] = {along, plays_step}

@@ -252,7 +252,7 @@ def _corner_roots(values: SimpleNamespace, options: Options) -> set[str]:
         if options.inverse:
             roots |= {"hystgen_copy_place", "hystgen_move_to_input", "hystgen_solve", "hystgen_move_to_solution"}
             if not values.fronts:
-                roots |= {"hystgen_wide", "hystgen_over_slope", "hystgen_look_ahead"}
+                roots |= {"hystgen_wide", "hystgen_over_slope"}
         return roots
     if options.forward or values.fronts:
         roots.add("hystgen_plays_step")
