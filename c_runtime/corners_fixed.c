@@ -46,6 +46,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
+    kink->input = here->input;
+    kink->output = here->output;
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const hystgen_segment_t *s = &t->segment[corner[middle].top];
@@ -74,11 +76,13 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
-    kink->input = c ? c->input : here->input;
-    kink->output = c ? c->output : here->output;
-    if (c && c->rose != here->rising) {
-        kink->input += hystgen_along(here, t->segment[k].way);
-        kink->output += hystgen_along(here, t->segment[k].reach);
+    if (c) {
+        kink->input = c->input;
+        kink->output = c->output;
+        if (c->rose != here->rising) {
+            kink->input += hystgen_along(here, t->segment[k].way);
+            kink->output += hystgen_along(here, t->segment[k].reach);
+        }
     }
 }
 
@@ -117,14 +121,53 @@ HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plac
     hystgen_go_on(here, &kink, to, hystgen_gained(t, here, &kink, to));
 }
 
-/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. */
+/* Input at which another play begins to follow the present move, or the last one there is. */
+static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner)
+{
+    int64_t x = 2147483647;
+    if (here->depth > 0) {
+        const hystgen_corner_t *c = &corner[here->depth - 1u];
+        const int64_t begins = hystgen_along(here, c->input) + (c->rose == here->rising ? 0 : t->segment[here->k + 1u].way);
+        x = begins < x ? begins : x;
+    }
+    return (int32_t)hystgen_along(here, x);
+}
+
+/* The sum of the plays for the next input; `next` is where another one begins to follow. */
+HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                                       int32_t *next, int32_t to)
+{
+    if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) { /* the same plays follow */
+        const uint32_t slope = t->segment[here->k].slope;
+        if (here->rising) {
+            here->output += (int64_t)hystgen_wide(slope, (uint32_t)to - (uint32_t)here->input);
+        } else {
+            here->output -= (int64_t)hystgen_wide(slope, (uint32_t)here->input - (uint32_t)to);
+        }
+        here->input = to;
+    } else if (to != here->input) {
+        hystgen_move_to_input(t, here, corner, to);
+        *next = hystgen_next_input(t, here, corner);
+    }
+    return here->output;
+}
+
+/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. Short
+   of `next`, an output as the present move sees it, the same plays are known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                  int64_t output, hystgen_kink_t *kink)
+                                  int64_t output, int64_t next, hystgen_kink_t *kink)
 {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
+        hystgen_find(t, here, corner, output, true, kink);
+    } else if (hystgen_along(here, output) < next) {
+        kink->output = here->output;
+        kink->input = here->input;
+        kink->k = here->k;
+        kink->depth = here->depth;
+    } else {
+        hystgen_find(t, here, corner, output, true, kink);
     }
-    hystgen_find(t, here, corner, output, true, kink);
     const hystgen_segment_t *s = &t->segment[kink->k];
     const int64_t on = hystgen_along(here, output - kink->output);
     const int64_t x = hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
@@ -157,14 +200,6 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
     }
     hystgen_go_on(here, kink, to, moved);
     return next;
-}
-
-/* The same at most where the input comes to `end`. */
-HYSTGEN_API int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end)
-{
-    const uint32_t room = (uint32_t)hystgen_along(here, (int64_t)end - here->input);
-    const int64_t last = hystgen_along(here, here->output) + (int64_t)hystgen_wide(t->segment[here->k].slope, room);
-    return next < last ? next : last;
 }
 
 /* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its own, as if left by

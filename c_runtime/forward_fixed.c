@@ -7,13 +7,14 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
     if (inside != v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_front(inside));
-    return hystgen_code(self->here.output, &self->status);
+    const int32_t to = hystgen_front(inside);
+    return hystgen_code(hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner, &self->next, to), &self->status);
 }
 
 static void hystgen_forward_begin(hystgen_forward_t *self, const int32_t *play, unsigned int step)
 {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
+    self->next = self->here.input;
     self->status = 0;
 }
 

@@ -9,14 +9,15 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
     }
     self->ascending = inside > self->drive ? true : inside < self->drive ? false : self->ascending;
     self->drive = inside;
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_front(inside, self->ascending));
-    return hystgen_code(self->here.output, &self->status);
+    const int32_t to = hystgen_front(inside, self->ascending);
+    return hystgen_code(hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner, &self->next, to), &self->status);
 }
 
 static void hystgen_forward_begin(hystgen_forward_t *self, const int32_t *play, unsigned int step,
                                   const hystgen_drive_t *first)
 {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
+    self->next = self->here.input;
     self->drive = (hystgen_real_t)first->drive;
     self->ascending = first->ascending;
     self->status = 0;

@@ -12,7 +12,7 @@ typedef struct {
 
 /* The plays of one model. */
 typedef struct {
-    const hystgen_segment_t *segment; /* plays 0 .. n */
+    const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
     int64_t range[2];                 /* ends of falling [0] moves, with signs changed, and of rising [1] ones */
     uint_least16_t n;                 /* plays without play 0 */

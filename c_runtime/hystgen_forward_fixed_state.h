@@ -4,6 +4,7 @@
 /* One forward operator: drive in, output out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
+    int32_t next;            /* input of the plays at which another one begins to follow */
     unsigned int status;
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_forward_t;

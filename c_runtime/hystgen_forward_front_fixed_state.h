@@ -4,6 +4,7 @@
 /* One forward operator: drive in, output out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
+    int32_t next;            /* input of the plays at which another one begins to follow */
     hystgen_real_t drive;    /* of the last step */
     bool ascending;          /* direction of the drive's last move */
     unsigned int status;

@@ -4,6 +4,7 @@
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
+    int64_t next;              /* output at which another play begins to follow, as the present move sees it */
     hystgen_real_t drive;      /* that the plays are at */
     hystgen_real_t undo_drive;
     hystgen_real_t reference;  /* of the last step */

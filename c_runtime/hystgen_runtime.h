@@ -53,11 +53,12 @@ hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32
                                bool *limited);
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
 void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t to);
+int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t *next,
+                           int32_t to);
 int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int64_t output,
-                      hystgen_kink_t *kink);
+                      int64_t next, hystgen_kink_t *kink);
 int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
                                  hystgen_kink_t *kink, int32_t to);
-int64_t hystgen_look_ahead(const hystgen_curve_t *t, const hystgen_place_t *here, int64_t next, int32_t end);
 void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, const int32_t *play,
                    unsigned int step);
 #else

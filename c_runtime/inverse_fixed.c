@@ -21,11 +21,13 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
 /* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. */
 static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
-    const bool rising = self->here.rising;
-    const int32_t most = hystgen_inverse_sees(self, rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
-    const int32_t end = hystgen_front(rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
-    const int64_t last = hystgen_look_ahead(&hystgen_model_curve, &self->here, next, end);
-    const int64_t usual = (last >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
+    const hystgen_place_t *here = &self->here;
+    const int32_t most = hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
+    const int32_t end = hystgen_front(here->rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
+    const uint32_t room = here->rising ? (uint32_t)end - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)end;
+    const int64_t more = (int64_t)hystgen_wide(hystgen_model_curve.segment[here->k].slope, room);
+    const int64_t last = here->rising ? here->output + more : more - here->output;
+    const int64_t usual = ((next < last ? next : last) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
     if (usual > self->next) {
         self->next = usual < most ? (int32_t)usual : most;
     }
@@ -39,13 +41,16 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
-        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, &self->kink);
-        const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)w);
-        const hystgen_real_t inside = hystgen_clamp_drive(v);
-        self->bits = (uint_least8_t)((level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u) |
-                                     (inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u));
         self->reference = u;
         self->repeat = true;
+        self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
+        const int64_t w =
+            hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, -((int64_t)1 << 62), &self->kink);
+        const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)w);
+        const hystgen_real_t inside = hystgen_clamp_drive(v);
+        if (inside != v) {
+            self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+        }
         hystgen_inverse_stay(self);
         const int64_t next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink,
                                                       hystgen_front(inside));

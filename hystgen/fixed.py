@@ -31,7 +31,7 @@ class FixedTables(NamedTuple):
     weight: Reals
     slope: Reals  # of sums per least step of the plays' input
     start_level: Reals
-    way: Reals  # 2 threshold: input gained behind a corner by the time play k begins to follow
+    way: Reals  # 2 threshold: input gained behind a corner by the time play k begins to follow; one never does
     reach: Reals  # 2 start_level: the output likewise
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals

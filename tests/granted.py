@@ -1,8 +1,7 @@
 """What the proof of the `corners` engine takes for granted of a corner list, written into the emitted C.
 
 Two facts are relations between numbers of the whole list, which Eva's sets of values cannot hold: the last plays of the
-blocks fall strictly from corner to corner, so that there are no more corners than plays and a block ends beyond the
-play that it begins with; and a sum of products, or a way, is one of plays that can be so far apart, so that it stays
+blocks fall strictly from corner to corner, so that there are no more corners than plays; and a sum of products, or a way, is one of plays that can be so far apart, so that it stays
 below the bound that the format was chosen by. Here they become checks at the places where they are needed: Eva takes
 each for true, a run stops where one is not.
 """
@@ -29,18 +28,14 @@ PLACES = [
     # bisection is looked at for each number of corners on its own
     (r"(    unsigned int left = here->depth;\n    unsigned int k = here->k;\n)", 1, r"\1    /*@ split left; */\n"),
     # sums and ways
-    (r"(        kink->output \+= .*;\n    \}\n)", 1, r"\1    WITHIN(kink->output, SUM);\n"),
+    (r"(            kink->output \+= .*;\n)", 1, r"\1            WITHIN(kink->output, SUM);\n"),
     (
         r"(    const int64_t way = NAME_along\(here, to - kink->input\);\n)",
         1,
         r"\1    GRANTED(way <= WAY);\n",
     ),
     (r"(    here->output = kink->output \+ .*;\n)", 1, r"\1    WITHIN(here->output, SUM);\n"),
-]
-
-# Of the inverse alone
-INVERSE_PLACES = [
-    (r"(    const NAME_corner_t \*c = &corner\[depth - 1u\];\n)", 1, r"    GRANTED(k < PLAYS);\n\1"),
+    (r"(            here->output [+-]= .*;\n)", 2, r"\1            WITHIN(here->output, SUM);\n"),
 ]
 
 # Of modules without a memoryless part, whose usual sample does not look at the list
@@ -80,7 +75,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
         "PLAYS": model.cascade.pi.n,
     }  # fmt: skip
     usual = USUAL_PLACES if f"{name}_inverse_look_ahead(" in text else []
-    places = [*PLACES, *INVERSE_PLACES, *usual]
+    places = [*PLACES, *usual]
     for pattern, count, replacement in places:
         filled = re.sub(
             r"\b(" + "|".join(numbers) + r")\b",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.memory import DEPTH, INPUT, OUTPUT, RISING, FixedMemory, K, Reals
+from hystgen.corners.memory import DEPTH, INPUT, NEXT, OUTPUT, RISING, FixedMemory, K, Reals
 from hystgen.fixed import MARGIN, PLAY_MAX, PLAY_MIN, FixedTables, over_slope
 from hystgen.reference import OFFSET
 
@@ -78,23 +78,65 @@ def find(t: FixedTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
     return m.output[c] + along(m, t.reach[k]), m.input[c] + along(m, t.way[k]), k, left
 
 
-def move_to_input(t: FixedTables, m: FixedMemory, to: Any) -> None:
-    """Move the plays to any input."""
+def find_input(t: FixedTables, m: FixedMemory, to: Any) -> Kink:
+    """The same for any move to an input; turns, moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
-    output, begin, k, depth = find(t, m, to, False)
-    m.real[OUTPUT] = output + t.slope[k + 1] * (to - begin)
+    return find(t, m, to, False)
+
+
+def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
+    """Move the plays on from a kink to an input at which the same ones follow; `moved` is the output between."""
+    m.real[OUTPUT] = kink[0] + along(m, moved)
     m.real[INPUT] = to
-    m.counts[K] = k
-    m.counts[DEPTH] = depth
+    m.counts[K] = kink[2]
+    m.counts[DEPTH] = kink[3]
 
 
-def solve(t: FixedTables, m: FixedMemory, output: Any) -> tuple[Any, Kink]:
-    """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves
-    nothing."""
+def gained(t: FixedTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """Output that is gained from a kink on until the input comes to `to`, which may lie before it."""
+    way = along(m, to - kink[1])
+    return -1 if way < 0 else t.slope[kink[2] + 1] * way
+
+
+def move_to_input(t: FixedTables, m: FixedMemory, to: Any) -> None:
+    """Move the plays to any input."""
+    kink = find_input(t, m, to)
+    go_on(m, kink, to, gained(t, m, kink, to))
+
+
+def next_input(t: FixedTables, m: FixedMemory) -> Any:
+    """Input at which another play begins to follow the present move, or the last one there is."""
+    x = INPUT_MOST
+    c = m.counts[DEPTH] - 1
+    if c >= 0:
+        begins = along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[m.counts[K] + 1])
+        x = begins if begins < x else x
+    return along(m, x)
+
+
+def plays_step(t: FixedTables, m: FixedMemory, to: Any) -> Any:
+    """The sum of the plays for the next input."""
+    at = m.real[INPUT]
+    if at < to < m.real[NEXT] if m.counts[RISING] else m.real[NEXT] < to < at:
+        m.real[OUTPUT] += t.slope[m.counts[K] + 1] * (to - at)
+        m.real[INPUT] = to
+    elif to != at:
+        move_to_input(t, m, to)
+        m.real[NEXT] = next_input(t, m)
+    return m.real[OUTPUT]
+
+
+def solve(t: FixedTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
+    """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing.
+    Short of `following`, an output as the present move sees it, the same plays are known to follow."""
     if along(m, output - m.real[OUTPUT]) < 0:
         turn_back(m)
-    kink = find(t, m, output, True)
+        kink = find(t, m, output, True)
+    elif along(m, output) < following:
+        kink = (m.real[OUTPUT], m.real[INPUT], m.counts[K], m.counts[DEPTH])
+    else:
+        kink = find(t, m, output, True)
     x = along(m, kink[1]) + over_slope(t, along(m, output - kink[0]), kink[2] + 1)
     most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
     return along(m, most if x > most else x), kink
@@ -111,25 +153,14 @@ def next_output(t: FixedTables, m: FixedMemory, depth: int, k: int) -> Any:
 def move_to_solution(t: FixedTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
     at which another one begins to follow."""
-    output, begin, k, depth = kink
-    way = along(m, to - begin)
-    if way >= 0:
-        following = next_output(t, m, depth, k)
-        moved = t.slope[k + 1] * way
-        if along(m, output) + moved <= following:
-            m.real[OUTPUT] = output + along(m, moved)
-            m.real[INPUT] = to
-            m.counts[K] = k
-            m.counts[DEPTH] = depth
-            return following
-    move_to_input(t, m, to)
-    return next_output(t, m, m.counts[DEPTH], m.counts[K])
-
-
-def look_ahead(t: FixedTables, m: FixedMemory, following: Any, end: Any) -> Any:
-    """The same at most where the input comes to `end`."""
-    last = along(m, m.real[OUTPUT]) + t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
-    return following if following < last else last
+    following = next_output(t, m, kink[3], kink[2])
+    moved = gained(t, m, kink, to)
+    if moved < 0 or along(m, kink[0]) + moved > following:  # by rounding, or it was limited
+        kink = find_input(t, m, to)
+        following = next_output(t, m, kink[3], kink[2])
+        moved = gained(t, m, kink, to)
+    go_on(m, kink, to, moved)
+    return following
 
 
 def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
@@ -152,6 +183,7 @@ def start(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    along, leave_corner, turn_back, find, move_to_input, solve, next_output, move_to_solution, look_ahead, start,
+    along, leave_corner, turn_back, find, find_input, go_on, gained, move_to_input, next_input, plays_step, solve,
+    next_output, move_to_solution, start,
 ]  # fmt: skip  (callees before callers)
-INLINED: set[Callable[..., Any]] = {along}
+INLINED: set[Callable[..., Any]] = {along, plays_step}

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_fixed import move_to_input, start
+from hystgen.corners.corners_fixed import plays_step, start
 from hystgen.corners.inverse import clamp_drive
-from hystgen.corners.memory import ASCENDING, DRIVE, OUTPUT, STATUS, FixedMemory, Reals
+from hystgen.corners.memory import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS, FixedMemory, Reals
 from hystgen.fixed import CODE_MAX, FRACTION, SATURATED, FixedTables, front_forward, nearest
 from hystgen.reference import INPUT_CLAMPED, OUTPUT_CLAMPED
 
@@ -31,7 +31,7 @@ def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
     elif v < m.real[DRIVE]:
         m.counts[ASCENDING] = 0
     m.real[DRIVE] = v
-    move_to_input(t, m, front_forward(t, v, m.counts[ASCENDING]))
+    plays_step(t, m, front_forward(t, v, m.counts[ASCENDING]))
 
 
 def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
@@ -46,6 +46,7 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
 def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
     """What init and reset have in common; `first` as in `FixedTables.applied`."""
     start(t, m, play)
+    m.real[NEXT] = m.real[INPUT]
     m.real[DRIVE] = t.applied[first]
     m.counts[ASCENDING] = t.ascending[first]
     m.counts[STATUS] = 0

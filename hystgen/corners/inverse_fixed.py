@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_fixed import along, look_ahead, move_to_input, move_to_solution, solve, start
+from hystgen.corners.corners_fixed import FAR, along, move_to_input, move_to_solution, solve, start
 from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.memory import (
     BEFORE,
@@ -77,8 +77,9 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
     rising = m.counts[RISING]
     most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
     end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
-    last = look_ahead(t, m, following, end)
-    usual = (last >> t.limits[FRACTION]) - t.limits[SHY]
+    more = t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
+    last = along(m, m.real[OUTPUT]) + more
+    usual = ((following if following < last else last) >> t.limits[FRACTION]) - t.limits[SHY]
     if usual > m.real[NEXT]:
         m.real[NEXT] = usual if usual < most else most
 
@@ -89,7 +90,7 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
-        w, kink = solve(t, m, level << t.limits[FRACTION])
+        w, kink = solve(t, m, level << t.limits[FRACTION], -FAR)
         v = nearest(w, t.limits[FINE])
         inside = clamp_drive(t, v)
         following = move_to_solution(t, m, kink, inside << t.limits[FINE])

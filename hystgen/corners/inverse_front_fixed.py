@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_fixed import move_to_input, move_to_solution, solve, start
+from hystgen.corners.corners_fixed import FAR, move_to_input, move_to_solution, solve, start
 from hystgen.corners.forward_fixed import code
 from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.inverse_fixed import inverse_clamp, put_undo, set_undo
@@ -15,6 +15,7 @@ from hystgen.corners.memory import (
     BITS,
     DRIVE,
     LEVEL,
+    NEXT,
     REFERENCE,
     REPEAT,
     STATUS,
@@ -49,12 +50,12 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     inverse_keep(m)
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
-        w, kink = solve(t, m, level << t.limits[FRACTION])
+        w, kink = solve(t, m, level << t.limits[FRACTION], m.real[NEXT])
         m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
         v = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
         m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
-        move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
+        m.real[NEXT] = move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
         m.real[REFERENCE] = u
         m.real[LEVEL] = level
         m.counts[REPEAT] = 1
@@ -71,6 +72,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     m.real[DRIVE] = m.real[UNDO_DRIVE]
     m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
     m.counts[REPEAT] = 0
+    m.real[NEXT] = -FAR
     move_to_input(t, m, inverse_arrive(t, m, v))
 
 
@@ -83,6 +85,7 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
     m.real[REFERENCE] = 0
     m.real[LEVEL] = code(t, m)
     m.counts[REPEAT] = 0
+    m.real[NEXT] = -FAR
     m.counts[BITS] = 0
     m.counts[STATUS] = 0
 

@@ -178,9 +178,9 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     place, (corner, alignment) = structs["place_t"], structs["corner_t"]
     plays = place if fixed else layout.struct(place, *8 * [reals], flag)
     if op == "forward":
-        beside = [reals, flag, status] if front else [status]
+        beside = [*([(4, 4)] if fixed else []), *([reals, flag] if front else []), status]
     elif fixed:
-        beside = [*4 * [reals], *3 * [flag], status] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
+        beside = [(8, 8), *4 * [reals], *3 * [flag], status] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
         beside += [status, place, structs["kink_t"]]
     else:
         beside = [place, *5 * [reals], *5 * [flag], status] if front else [place, reals, reals, flag, flag]
@@ -237,9 +237,9 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
     if not corners:
         return (1, 6, 2, 0) if op == "forward" else (3 if fixed else 2, 13, 3, 0)
     if fixed:  # a search looks at a corner, then at a play, and bisects both: 2 + 2 b
-        # clamped 3, turned 1, search, code 4; the output
+        # clamped 3, the same plays 3, turned 1, search, next 1, code 4; the output
         if op == "forward":
-            return 1, 10, 0, 2
+            return 1, 14, 0, 2
         # Usual 3, repeated 1, clamped 6, turned 1, search, kept near the range 1, the same plays 2, else turned 1 and
         # another search; ahead 3. Over a slope, output, ahead
         return 3 + fast, 19 + 3 * fast, 0, 4

@@ -247,11 +247,12 @@ def _corner_roots(values: SimpleNamespace, options: Options) -> set[str]:
     """The functions of the run time that the operators of the corner engine call, but those of the front."""
     roots = {"hystgen_start"}
     if values.fixed:
-        roots.add("hystgen_move_to_input")
+        if options.forward:
+            roots.add("hystgen_plays_step")
         if options.inverse:
-            roots |= {"hystgen_copy_place", "hystgen_solve", "hystgen_move_to_solution"}
+            roots |= {"hystgen_copy_place", "hystgen_move_to_input", "hystgen_solve", "hystgen_move_to_solution"}
             if not values.fronts:
-                roots |= {"hystgen_wide", "hystgen_over_slope", "hystgen_look_ahead"}
+                roots |= {"hystgen_wide", "hystgen_over_slope"}
         return roots
     if options.forward or values.fronts:
         roots.add("hystgen_plays_step")

@@ -257,11 +257,12 @@ def _fixed_loop_fields(numbers: FixedTables, name: str, prefix: str, options: Op
 def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> dict[str, Any]:
     """The tables of engine corners: one curve for both operators, and what a start memory is made of."""
     limits = numbers.limits
-    columns = (numbers.reach, numbers.way, numbers.slope[1:], numbers.reciprocal[1:], numbers.shift[1:])
-    rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in zip(*columns, strict=True))
+    never = (numbers.reach[-1], numbers.way[-1], 0, 0, 1)
+    plays = (numbers.reach[:-1], numbers.way[:-1], numbers.slope[1:], numbers.reciprocal[1:], numbers.shift[1:])
+    rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in [*zip(*plays, strict=True), never])
     most = (limits[fixed.MARGIN] - limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] + limits[fixed.MARGIN])
     ends = f"{{{', '.join(map(literal, most))}}}"
-    parts = f"{literal(limits[reference.OFFSET])}, {ends}, {len(numbers.way) - 1}"
+    parts = f"{literal(limits[reference.OFFSET])}, {ends}, {len(numbers.threshold) - 1}"
     arrays = [
         f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
         f"static const {prefix}_curve_t {name}_model_curve = {{\n    {name}_model_segment, {parts}\n}};\n",
