@@ -18,7 +18,8 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
     self->usual = false;
 }
 
-/* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. */
+/* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. None is
+   while the output lies, by rounding, before the least reference of the move: one ahead could be limited as well. */
 static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const hystgen_place_t *here = &self->here;
@@ -28,7 +29,8 @@ static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
     const int64_t more = (int64_t)hystgen_wide(hystgen_model_curve.segment[here->k].slope, room);
     const int64_t last = here->rising ? here->output + more : more - here->output;
     const int64_t usual = ((next < last ? next : last) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
-    if (usual > self->next) {
+    const int64_t least = (int64_t)(here->rising ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) * ((int64_t)1 << HYSTGEN_FRACTION);
+    if (usual > self->next && hystgen_along(here, here->output - least) >= 0) {
         self->next = usual < most ? (int32_t)usual : most;
     }
 }

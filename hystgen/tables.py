@@ -251,13 +251,8 @@ def build_float(
     for kind, first in zip(kinds, firsts, strict=True):
         if kind == reference.TANH:
             tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
-    for j, w in ((2, pi.start[0]), (3, 0.0)):  # plays at rest where the drive cannot be come to where it starts
-        tables.begin[j] = w
-        if not (cascade.stages and cascade.start_is_defined):
-            continue
-        begins = float(dtype(float(cascade.front_inverse(float(w)))))
-        if not low <= begins <= high:
-            tables.begin[j] = reference.front_forward(tables, tables.applied[j], int(tables.ascending[j]))
+    for j, w in ((2, pi.start[0]), (3, 0.0)):  # a move from farther out passes the end of the range first
+        tables.begin[j] = min(max(w, seen[0]), seen[1])
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))
         output = w * sum(abs(p) for p in pi.weights) + abs(lift[-1]) + abs(cascade.output_offset)

@@ -80,7 +80,8 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
     more = t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
     last = along(m, m.real[OUTPUT]) + more
     usual = ((following if following < last else last) >> t.limits[FRACTION]) - t.limits[SHY]
-    if usual > m.real[NEXT]:
+    least = (t.limits[OUTPUT_MIN] if rising else t.limits[OUTPUT_MAX]) << t.limits[FRACTION]
+    if usual > m.real[NEXT] and along(m, m.real[OUTPUT] - least) >= 0:
         m.real[NEXT] = usual if usual < most else most
 
 
