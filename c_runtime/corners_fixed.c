@@ -138,12 +138,9 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
                                        int32_t *next, int32_t to)
 {
     if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) { /* the same plays follow */
-        const uint32_t slope = t->segment[here->k].slope;
-        if (here->rising) {
-            here->output += (int64_t)hystgen_wide(slope, (uint32_t)to - (uint32_t)here->input);
-        } else {
-            here->output -= (int64_t)hystgen_wide(slope, (uint32_t)here->input - (uint32_t)to);
-        }
+        const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)to;
+        const int64_t moved = (int64_t)hystgen_wide(t->segment[here->k].slope, way);
+        here->output = here->rising ? here->output + moved : here->output - moved;
         here->input = to;
     } else if (to != here->input) {
         hystgen_move_to_input(t, here, corner, to);

@@ -35,7 +35,8 @@ PLACES = [
         r"\1    GRANTED(way <= WAY);\n",
     ),
     (r"(    here->output = kink->output \+ .*;\n)", 1, r"\1    WITHIN(here->output, SUM);\n"),
-    (r"(            here->output [+-]= .*;\n)", 2, r"\1            WITHIN(here->output, SUM);\n"),
+    (r"(        const int64_t moved = \(int64_t\)NAME_wide\(.*;\n)", 1, r"        GRANTED(way <= WAY);\n\1"),
+    (r"(        here->output = here->rising \? here->output .*;\n)", 1, r"\1        WITHIN(here->output, SUM);\n"),
 ]
 
 # Of modules without a memoryless part, whose usual sample does not look at the list
@@ -51,7 +52,7 @@ USUAL_PLACES = [
         1,
         r"        GRANTED(way <= WAY);\n\1",
     ),
-    (r"(        here->output = here->rising \? .*;\n)", 1, r"\1        WITHIN(here->output, SUM);\n"),
+    (r"(        here->output = here->rising \? output .*;\n)", 1, r"\1        WITHIN(here->output, SUM);\n"),
     (
         r"(        const int64_t way = \(int64_t\)self->here\.input - self->before;\n)",
         1,
