@@ -22,9 +22,10 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
     hystgen_forget_line(&self->plays);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
-    if (v < self->drive || v > self->drive) {
-        hystgen_inverse_arrive(self, v);
-        hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, hystgen_front(v, self->ascending));
+    hystgen_inverse_arrive(self, v);
+    const hystgen_real_t w = hystgen_front(v, self->ascending);
+    if (w < self->plays.here.output || w > self->plays.here.output) {
+        hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, w);
     }
 }
 

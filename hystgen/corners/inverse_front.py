@@ -14,6 +14,7 @@ from hystgen.corners.memory import (
     DRIVE,
     INPUT,
     LEVEL,
+    OUTPUT,
     REFERENCE,
     REPEAT,
     RETURNED,
@@ -62,9 +63,10 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
     put_undo(t.inverse, m)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
     m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
-    if v != m.real[DRIVE]:
-        inverse_arrive(m, v)
-        move_to_output(t.inverse, m, front_forward(t, v, m.counts[ASCENDING]))
+    inverse_arrive(m, v)
+    w = front_forward(t, v, m.counts[ASCENDING])
+    if w != m.real[OUTPUT]:
+        move_to_output(t.inverse, m, w)
 
 
 def inverse_hold(t: Tables, m: Memory) -> Any:
