@@ -33,9 +33,7 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
 static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self)
 {
     hystgen_inverse_keep(self);
-    if (self->stepped && self->committed) {
-        hystgen_inverse_replace(self, self->returned);
-    }
+    hystgen_inverse_replace(self, self->stepped && self->committed ? self->returned : self->drive);
     self->stepped = true;
     self->committed = false;
     self->status |= HYSTGEN_STATUS_HELD;

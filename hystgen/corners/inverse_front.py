@@ -72,8 +72,7 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
 def inverse_hold(t: Tables, m: Memory) -> Any:
     """A sample that is no number: the last answer once more."""
     inverse_keep(m)
-    if m.counts[STEPPED] and m.counts[COMMITTED]:
-        inverse_replace(t, m, m.real[RETURNED])
+    inverse_replace(t, m, m.real[RETURNED] if m.counts[STEPPED] and m.counts[COMMITTED] else m.real[DRIVE])
     m.counts[STEPPED] = 1
     m.counts[COMMITTED] = 0
     m.counts[STATUS] |= HELD
