@@ -107,7 +107,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);
     self->repeat = false;
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_front(v));
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink, hystgen_front(v));
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step)

@@ -63,7 +63,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->ascending = self->undo_ascending;
     self->repeat = false;
     self->next = -((int64_t)1 << 62);
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_inverse_arrive(self, v));
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink, hystgen_inverse_arrive(self, v));
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step,
