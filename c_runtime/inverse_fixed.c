@@ -19,7 +19,7 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
 }
 
 /* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. */
-static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
+HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const hystgen_place_t *here = &self->here;
     const int32_t most = hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
