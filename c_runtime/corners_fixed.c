@@ -114,11 +114,10 @@ HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_pla
 
 /* Moves the plays to any input. */
 HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                          int32_t to)
+                                          hystgen_kink_t *kink, int32_t to)
 {
-    hystgen_kink_t kink;
-    hystgen_find_input(t, here, corner, to, &kink);
-    hystgen_go_on(here, &kink, to, hystgen_gained(t, here, &kink, to));
+    hystgen_find_input(t, here, corner, to, kink);
+    hystgen_go_on(here, kink, to, hystgen_gained(t, here, kink, to));
 }
 
 /* Input at which another play begins to follow the present move, or the last one there is. */
@@ -135,7 +134,7 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
 
 /* The sum of the plays for the next input; `next` is where another one begins to follow. */
 HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                       int32_t *next, int32_t to)
+                                       hystgen_kink_t *kink, int32_t *next, int32_t to)
 {
     if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) { /* the same plays follow */
         const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)to;
@@ -143,7 +142,7 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
         here->output = here->rising ? here->output + moved : here->output - moved;
         here->input = to;
     } else if (to != here->input) {
-        hystgen_move_to_input(t, here, corner, to);
+        hystgen_move_to_input(t, here, corner, kink, to);
         *next = hystgen_next_input(t, here, corner);
     }
     return here->output;

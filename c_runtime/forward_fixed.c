@@ -8,7 +8,9 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     const int32_t to = hystgen_front(inside);
-    return hystgen_code(hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner, &self->next, to), &self->status);
+    const int64_t sum =
+        hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner, &self->kink, &self->next, to);
+    return hystgen_code(sum, &self->status);
 }
 
 static void hystgen_forward_begin(hystgen_forward_t *self, const int32_t *play, unsigned int step)

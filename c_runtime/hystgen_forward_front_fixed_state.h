@@ -8,6 +8,7 @@ typedef struct {
     hystgen_real_t drive;    /* of the last step */
     bool ascending;          /* direction of the drive's last move */
     unsigned int status;
+    hystgen_kink_t kink;     /* of the present step; here rather than on the stack */
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_forward_t;
 

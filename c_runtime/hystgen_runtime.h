@@ -38,6 +38,11 @@ typedef hystgen_real_t hystgen_sum_t;
 #else
 #define HYSTGEN_APART static
 #endif
+#ifdef HYSTGEN_FIXED /* where less is on the stack once it is part of the step */
+#define HYSTGEN_APART_IN_FLOAT static
+#else
+#define HYSTGEN_APART_IN_FLOAT HYSTGEN_APART
+#endif
 
 #ifdef HYSTGEN_FIXED
 #include "hystgen_corners_fixed_state.h"
@@ -52,9 +57,10 @@ int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *
 hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min, int32_t drive_max,
                                bool *limited);
 void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
-void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t to);
-int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t *next,
-                           int32_t to);
+void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                           hystgen_kink_t *kink, int32_t to);
+int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
+                           hystgen_kink_t *kink, int32_t *next, int32_t to);
 int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int64_t output,
                       int64_t next, hystgen_kink_t *kink);
 int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,

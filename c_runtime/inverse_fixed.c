@@ -20,7 +20,7 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
 
 /* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. None is
    while the output lies, by rounding, before the least reference of the move: one ahead could be limited as well. */
-static void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
+HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const hystgen_place_t *here = &self->here;
     const int32_t most = hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
@@ -109,7 +109,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);
     self->repeat = false;
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_front(v));
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink, hystgen_front(v));
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step)

@@ -34,17 +34,19 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
+        self->reference = u;
+        self->repeat = true;
+        self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w =
             hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, self->next, &self->kink);
-        self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         const hystgen_reach_t v = hystgen_inverse_choose(self, level, (hystgen_reach_t)w);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
-        self->bits |= inside != v ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
+        self->level = level;
+        if (inside != v) {
+            self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+        }
         const int32_t to = hystgen_inverse_arrive(self, inside);
         self->next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink, to);
-        self->reference = u;
-        self->level = level;
-        self->repeat = true;
     }
     self->status |= self->bits;
     return self->drive;
@@ -61,7 +63,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->ascending = self->undo_ascending;
     self->repeat = false;
     self->next = -((int64_t)1 << 62);
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, hystgen_inverse_arrive(self, v));
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink, hystgen_inverse_arrive(self, v));
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step,

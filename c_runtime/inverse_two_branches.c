@@ -9,7 +9,7 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
 
 /* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one,
    and where neither fits the drive holds; DOMAIN is added to `bits` where an envelope cannot give w. */
-HYSTGEN_APART hystgen_reach_t hystgen_inverse_choose(hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w)
+HYSTGEN_APART_IN_FLOAT hystgen_reach_t hystgen_inverse_choose(hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
     bool limited = false;

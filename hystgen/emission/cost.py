@@ -178,7 +178,8 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     place, (corner, alignment) = structs["place_t"], structs["corner_t"]
     plays = place if fixed else layout.struct(place, *8 * [reals], flag)
     if op == "forward":
-        beside = [*([(4, 4)] if fixed else []), *([reals, flag] if front else []), status]
+        own = [(4, 4), *([reals, flag] if front else []), status, structs["kink_t"]] if fixed else []
+        beside = own or ([reals, flag, status] if front else [status])
     elif fixed:
         beside = [(8, 8), *4 * [reals], *3 * [flag], status] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
         beside += [status, place, structs["kink_t"]]

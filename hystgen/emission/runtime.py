@@ -184,6 +184,7 @@ def operators(files: Sequence[str], name: str, corners: int, prefix: str, family
     """Operators of files of the run time as C text of the model `name`; their kernels are named after `prefix`."""
     pieces = [piece for file in files for piece in split_pieces(_read(file))]
     text = OPERATOR.sub(rf"{name}_\1", "\n".join(piece.text for piece in pieces))
+    text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
 
 
