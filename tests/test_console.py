@@ -64,6 +64,7 @@ COMMANDS = (
 )
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_full_disk_behind_standard_output_is_one_message(words: Sequence[str], unbuffered: str) -> None:
@@ -92,9 +93,10 @@ def test_talk_that_cannot_be_written_changes_no_result(words: Sequence[str], cod
     assert Path("new.yaml").exists() == (code == 0)
 
 
-PAGES = ("cp932", "cp1252", "cp437", "ascii", "koi8-r", "utf-8")
+PAGES = ("cp932", "koi8-r", "cp437", "cp1252", "ascii", "utf-8")  # two of a kind: without µ, with it, of UTF-8
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("page", PAGES)
 def test_any_code_page_takes_every_result(page: str) -> None:
     plain = process("show", "stage.yaml", env={"PYTHONIOENCODING": "utf-8"}).stdout.decode()
@@ -110,6 +112,7 @@ def test_any_code_page_takes_every_result(page: str) -> None:
     assert Path("fit.svg").exists()
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("page", PAGES)
 def test_data_on_standard_output_are_utf_8_in_any_code_page(page: str) -> None:
     process("simulate", "stage.yaml", "record.csv", "-o", "out.csv")

@@ -165,6 +165,7 @@ class TestOneWrongSample:
 
 
 class TestNoneInCleanRecords:
+    @pytest.mark.slow(one_in=3)
     @pytest.mark.parametrize("noise", [0.0, 0.003, 0.1])
     @pytest.mark.parametrize("grain", [0.0, 0.08, 0.3])
     def test_of_all_kinds(self, noise: float, grain: float) -> None:

@@ -154,6 +154,7 @@ model:
 }
 
 
+@pytest.mark.slow(one_in=2)
 @EACH
 @pytest.mark.parametrize("name", ONCE_WRONG)
 def test_models_that_were_once_wrong(name: str, arithmetic: str, engine: str, tmp_path: Path) -> None:

@@ -114,6 +114,7 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
                 assert 0 <= (row.stack or 0) < 400
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("operator", ["both", "inverse"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
@@ -134,6 +135,7 @@ def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(
     assert max(used) <= 128, report.table()
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("plays", [8, 9])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "two_branches"])
@@ -190,6 +192,7 @@ def needs_avr() -> None:
         pytest.skip("no AVR here")
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "bent", "curved", "two_branches"])
@@ -209,6 +212,7 @@ AVR_DIALECTS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("layout", module.LAYOUTS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize(("name", "engine"), [("mixed", "corners"), ("listed", "loop")])
@@ -242,6 +246,7 @@ def test_the_self_test_passes_on_the_avr_as_cpp(arithmetic: str, tmp_path: Path)
     assert avr.run(targets.AVR, avr.link(targets.AVR, written, objects, tmp_path)) == 0
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "listed", "bent", "curved", "mixed"])

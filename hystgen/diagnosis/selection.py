@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -197,16 +197,18 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     if step.merit is not None:
         left = [each for each in left if each.name != step.best.name]
     names = {each.name for each in step.tried}
-    pairs = []
-    for first in decisions.simplest_first(left, records):
-        merit = decisions.merit_of(latest.now, first, records)
-        then = _step(first.fitted, gap, records, lambda option: option.name in names) if merit is not None else None
-        if then is not None and then.merit is not None:
-            pairs.append((replace(latest, best=first, merit=merit), then))
+
+    def pairs() -> Iterator[tuple[_Step, _Step]]:
+        for first in decisions.simplest_first(left, records):
+            merit = decisions.merit_of(latest.now, first, records)
+            then = _step(first.fitted, gap, records, lambda option: option.name in names) if merit is not None else None
+            if then is not None and then.merit is not None:
+                yield replace(latest, best=first, merit=merit), then
+
     if step.merit is None:
         enough = (1.0 - EXCHANGE) * records.left(step.now)
-        return next((pair for pair in pairs if pair[1].best.held_out <= enough), None)
-    every = [*pairs, (latest, step)]
+        return next((pair for pair in pairs() if pair[1].best.held_out <= enough), None)
+    every = [*pairs(), (latest, step)]
     enough = (1.0 + decisions.SIMPLER) * min(then.best.held_out for _, then in every)
     good = [pair for pair in every if pair[1].best.held_out <= enough]
     chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))

@@ -124,7 +124,8 @@ def search(
     """The best shape near that of `now`, and the damping with which the search goes on from there.
 
     `linear` gives the system that is linear about a shape and weights. `little`: the search ends with a step that
-    lowers the error by less than this share, too. Steps that fail are damped more, and counted.
+    lowers the error by less than this share, too. Steps that fail are damped more, and counted. It ends before a step
+    of which the linear system promises less than `ENOUGH`.
     """
     shape = now.shape
     low, high = limits.bounds
@@ -141,9 +142,14 @@ def search(
         moved = np.clip(now.shape + change, low, high)
         if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
             break
+        least = 0.5 * ENOUGH / now.samples
+        left = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
+        promised = root_mean_square(float(left @ left), now.samples)
+        if now.rms - promised < least * now.rms:  # most of these steps fail, and each costs as much as any other
+            break
         trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
-            done = now.rms - trial.rms < max(0.5 * ENOUGH / now.samples, little) * now.rms
+            done = now.rms - trial.rms < max(least, little) * now.rms
             now, damping = trial, damping * 0.2
             if done:
                 break
