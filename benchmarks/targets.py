@@ -744,7 +744,7 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
     mpl.rcParams["svg.hashsalt"] = "hystgen"  # the same file from the same figures
     import matplotlib.pyplot as plt
 
-    names = list(dict.fromkeys(f.target for f in figures))
+    names, plays = list(dict.fromkeys(f.target for f in figures)), sorted({f.n for f in figures})
     high, wide = -(-len(names) // 3), min(3, len(names))
     panels, axes = plt.subplots(high, wide, figsize=(1 + 3.3 * wide, 3.6 * high), squeeze=False, layout="constrained")
     lines = (
@@ -765,7 +765,7 @@ def plot(figures: Sequence[Figures], path: Path) -> None:
             if points:
                 ax.loglog(*zip(*points, strict=True), style, color=colour, marker="o", markersize=3, label=label)
         ax.set_title(name)
-        ax.set_xticks(PLAYS, [str(n) for n in PLAYS], minor=False)
+        ax.set_xticks(plays, [str(n) for n in plays], minor=False)
         ax.minorticks_off()
         ax.set_xlabel("plays n")
         ax.grid(alpha=0.3)
