@@ -12,6 +12,8 @@ typedef struct {
     bool ascending;            /* direction of the drive's last move */
     bool undo_ascending;
     bool repeat;               /* the last answer still stands for `reference` */
+    bool limited;              /* an envelope cannot give what was asked for in the last step */
+    bool moves;                /* the drive could follow there; both here rather than on the stack */
     uint_least8_t bits;        /* status of that answer */
     unsigned int status;
     hystgen_place_t undo;      /* where the plays were before the last step */

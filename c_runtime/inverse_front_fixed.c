@@ -34,17 +34,17 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
-        bool limited = false;
-        bool moves = true;
+        self->limited = false;
+        self->moves = true;
         self->reference = u;
         self->repeat = true;
         self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w =
             hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, self->next, &self->kink);
-        const hystgen_reach_t v = hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &limited, &moves);
+        const hystgen_reach_t v = hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &self->limited, &self->moves);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->level = level;
-        if (limited) {
+        if (self->limited) {
             self->bits |= HYSTGEN_STATUS_DOMAIN;
         }
         if (inside != v) {
@@ -83,6 +83,8 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, 
     self->level = hystgen_code(self->here.output, &status);
     self->repeat = false;
     self->next = -((int64_t)1 << 62);
+    self->limited = false;
+    self->moves = false;
     self->bits = 0;
     self->status = 0;
 }
