@@ -12,7 +12,8 @@ typedef struct {
     bool ascending;            /* direction of the drive's last move */
     bool undo_ascending;
     bool repeat;               /* the last answer still stands for `reference` */
-    unsigned int bits;         /* status of that answer */
+    bool limited;              /* an envelope could not give it; here rather than on the stack */
+    uint_least8_t bits;        /* status of that answer */
     unsigned int status;
     hystgen_place_t undo;      /* where the plays were before the last step */
     hystgen_kink_t kink;       /* of the present step; here rather than on the stack */

@@ -15,6 +15,7 @@ typedef struct {
     bool stepped;              /* a step has answered */
     bool committed;            /* a drive was committed since */
     bool repeat;               /* the last answer still stands for `reference` */
+    bool limited;              /* an envelope could not give it; here rather than on the stack */
     unsigned int bits;         /* status of that answer */
     unsigned int status;
     hystgen_corner_t corner[HYSTGEN_CORNERS];

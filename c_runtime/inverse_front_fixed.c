@@ -42,6 +42,9 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         const hystgen_reach_t v = hystgen_inverse_choose(self, level, (hystgen_reach_t)w);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->level = level;
+        if (self->limited) {
+            self->bits |= HYSTGEN_STATUS_DOMAIN;
+        }
         if (inside != v) {
             self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
         }

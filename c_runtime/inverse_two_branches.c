@@ -8,18 +8,19 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
 }
 
 /* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one,
-   and where neither fits the drive holds; DOMAIN is added to `bits` where an envelope cannot give w. */
+   and where neither fits the drive holds; `limited` is set where an envelope cannot give w. */
 HYSTGEN_APART_IN_FLOAT hystgen_reach_t hystgen_inverse_choose(hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
-    bool limited = false;
-    hystgen_reach_t v = hystgen_front_inverse(w, up, &limited);
-    bool fits = hystgen_inverse_fits(self, v, up);
-    const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_drive(v) - self->drive;
-    if (!fits && (up != self->ascending || back < -HYSTGEN_HOLD || back > HYSTGEN_HOLD)) { /* else back by rounding alone */
-        v = hystgen_front_inverse(w, !up, &limited);
-        fits = hystgen_inverse_fits(self, v, !up);
+    hystgen_reach_t v = hystgen_front_inverse(w, up, &self->limited);
+    if (!hystgen_inverse_fits(self, v, up)) {
+        const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_drive(v) - self->drive;
+        if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) { /* back by rounding alone */
+            v = self->drive;
+        } else {
+            v = hystgen_front_inverse(w, !up, &self->limited);
+            v = hystgen_inverse_fits(self, v, !up) ? v : self->drive;
+        }
     }
-    self->bits |= limited ? HYSTGEN_STATUS_DOMAIN : 0u;
-    return fits ? v : self->drive;
+    return v;
 }

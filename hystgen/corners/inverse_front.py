@@ -87,8 +87,8 @@ def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
     return bool((inside > m.real[DRIVE]) == (ascending != 0))
 
 
-def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> Any:
-    """The drive that gives w on the branch of its own move; DOMAIN is added to BITS where an envelope cannot give w."""
+def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> tuple[Any, int]:
+    """The drive that gives w on the branch of its own move, and whether an envelope cannot give w."""
     up = 1
     if t.branches:
         up = m.counts[ASCENDING]
@@ -105,9 +105,7 @@ def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> Any:
             fits = inverse_fits(t, m, v, 1 - up)
         if not fits:
             v = m.real[DRIVE]
-    if limited:
-        m.counts[BITS] |= DOMAIN
-    return v
+    return v, limited
 
 
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
@@ -122,9 +120,10 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
         elif u > t.limits[OUTPUT_MAX]:
             level = t.limits[OUTPUT_MAX]
         w = plays_step(t.inverse, m, level - t.limits[OFFSET])
-        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
-        v = inverse_choose(t, m, level, w)
+        v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
+        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
+        m.counts[BITS] |= DOMAIN if limited else 0
         if inside != v or inside == m.real[DRIVE]:
             m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
             inverse_replace(t, m, inside)

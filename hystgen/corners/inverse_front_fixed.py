@@ -25,7 +25,7 @@ from hystgen.corners.memory import (
     Reals,
 )
 from hystgen.fixed import FRACTION, FixedTables, front_forward
-from hystgen.reference import INPUT_CLAMPED, OUTPUT_CLAMPED
+from hystgen.reference import DOMAIN, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 
 def inverse_keep(m: FixedMemory) -> None:
@@ -51,9 +51,10 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
         w, kink = solve(t, m, level << t.limits[FRACTION], m.real[NEXT])
-        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
-        v = inverse_choose(t, m, level, w)
+        v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
+        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
+        m.counts[BITS] |= DOMAIN if limited else 0
         m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
         m.real[NEXT] = move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
         m.real[REFERENCE] = u

@@ -181,10 +181,10 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
         own = [(4, 4), *([reals, flag] if front else []), status, structs["kink_t"]] if fixed else []
         beside = own or ([reals, flag, status] if front else [status])
     elif fixed:
-        beside = [(8, 8), *4 * [reals], *3 * [flag], status] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
+        beside = [(8, 8), *4 * [reals], *5 * [flag]] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
         beside += [status, place, structs["kink_t"]]
     else:
-        beside = [place, *5 * [reals], *5 * [flag], status] if front else [place, reals, reals, flag, flag]
+        beside = [place, *5 * [reals], *6 * [flag], status] if front else [place, reals, reals, flag, flag]
         beside.append(status)
     corners = max(n, 1) if fixed else n + 1
     return layout.struct(plays, *beside, (corners * corner, alignment))[0], corner
