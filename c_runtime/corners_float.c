@@ -171,16 +171,16 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 {
     const hystgen_real_t way = hystgen_along(m, input - m->from);
     unsigned int k = m->here.k;
-    const unsigned int far = k + 8u; /* from there on bisection is faster */
+    const unsigned int many = k + 8u; /* from there on bisection is faster */
     do {
         ++k;
-    } while (k < far && way > t->segment[k + 1u].way);
+    } while (k < many && way > t->segment[k + 1u].way);
     const hystgen_segment_t *s = &t->segment[k];
     m->begin = m->from + hystgen_along(m, s->way);
     m->start = m->base + hystgen_along(m, s->reach);
     m->gain = s->gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
-    if (k == far || hystgen_along(m, output - m->here.output) < 0) {
+    if (k == many || hystgen_along(m, output - m->here.output) < 0) {
         return false;
     }
     const hystgen_real_t next = m->from + hystgen_along(m, s[1].way);

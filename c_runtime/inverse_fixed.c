@@ -30,7 +30,7 @@ HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t n
     const int64_t last = here->rising ? here->output + more : more - here->output;
     const int64_t usual = ((next < last ? next : last) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
     const int64_t least = (int64_t)(here->rising ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) * ((int64_t)1 << HYSTGEN_FRACTION);
-    if (usual > self->next && hystgen_along(here, here->output - least) >= 0) {
+    if (usual > self->next && (here->rising ? here->output >= least : here->output <= least)) {
         self->next = usual < most ? (int32_t)usual : most;
     }
 }

@@ -1,9 +1,9 @@
 """What the proof of the `corners` engine takes for granted of a corner list, written into the emitted C.
 
 Two facts are relations between numbers of the whole list, which Eva's sets of values cannot hold: the last plays of the
-blocks fall strictly from corner to corner, so that there are no more corners than plays; and a sum of products, or a way, is one of plays that can be so far apart, so that it stays
-below the bound that the format was chosen by. Here they become checks at the places where they are needed: Eva takes
-each for true, a run stops where one is not.
+blocks fall strictly from corner to corner, so that there are no more corners than plays; and a sum of products, or a
+way, is one of plays that can be so far apart, so that it stays below the bound that the format was chosen by. Here they
+become checks at the places where they are needed: Eva takes each for true, a run stops where one is not.
 """
 
 from __future__ import annotations

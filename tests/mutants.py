@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from modelfiles import FILES, PLAYS, head
 
 STEP = "templates/step.c.j2"
-FAST = "templates/step_fast.c.j2"
-FIND = "c_runtime/corners_find_float.c"
-HALF = "c_runtime/over_slope.c"
+CODES = "templates/front_fixed.c.j2"
+CORNERS = "c_runtime/corners_fixed.c"
+USUAL = "c_runtime/inverse_fixed.c"
+FRONT = "c_runtime/inverse_front_fixed.c"
 CURVE = "c_runtime/curve.c"
 
 ROUND = """
@@ -61,74 +62,43 @@ class Mutant:
     count: int = 1
 
 
-KEPT_AT_LIMIT = (
-    "        self->memory.there.k = 0; /* where the limit leads does not depend on what is asked for beyond it */\n",
-    "",
-)
-
 KILLED = (
+    Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),
     Mutant(
-        "the place that solving found is kept where the drive was limited", STEP,
-        *KEPT_AT_LIMIT, "bent", "float32",
+        "a kink inside a block is not counted from", CORNERS, "c = k > before ? top : c;", "c = k > before ? c : c;",
+        "plain", "q31",
     ),
     Mutant(
-        "the place at a limit is kept for another drive", STEP,
-        "        self->memory.there.k = 0; /* where a limit leads, or no move, says nothing of another drive */\n",
-        "        ;\n", "reset_low", "float32",
-    ),
-    Mutant("no shy, rising", STEP, "{{ fraction }}) - {{ shy }};", "{{ fraction }});", "coarse", "q15"),
-    Mutant("no shy, falling", STEP, "{{ fraction }}) + 1 + {{ shy }};", "{{ fraction }}) + 1;", "coarse", "q15"),
-    Mutant(
-        "no shy at the edge of a limit", FAST,
-        "    edge = self->falling ? edge - 2 * {{ shy }} : edge + 2 * {{ shy }};\n", "", "outside", "float32",
+        "a corner of the same direction is passed too late", CORNERS, "here->rising ? 0 : whole);",
+        "here->rising ? whole : whole);", "plain", "q31",
     ),
     Mutant(
-        "no shy at the edge of a move", FAST,
-        "self->edge[rising] = rising ? edge - {{ shy }} : edge + {{ shy }};", "self->edge[rising] = edge;",
-        "listed", "float32",
+        "a committed drive answers the same reference", USUAL, "if (!self->repeat || u != self->reference)",
+        "if (u != self->reference)", "plain", "q31",
     ),
     Mutant(
-        "find end, corners that are left", FIND, "        *k = corner[left].end;\n        *end = *k;\n",
-        "        *k = corner[left].end;\n        *end = *k + 1u;\n", "plain", "float32",
+        "the same behind a memoryless part", FRONT, "if (!self->repeat || u != self->reference)",
+        "if (u != self->reference)", "curved", "q15",
     ),
     Mutant(
-        "find end, the lowest corner of the start", FIND, "                left = 0;\n                *end = *k;\n",
-        "                left = 0;\n                *end = *k + 1u;\n", "listed", "float32",
+        "a usual step is not taken back", USUAL, "    if (self->usual) {", "    if (self->usual && v > 0) {",
+        "plain", "q15",
+    ),
+    Mutant("a limit keeps no status", USUAL, "if (self->bits == 0) {", "if (self->bits < 8u) {", "plain", "q31"),
+    Mutant(
+        "where plays follow is kept behind a commit", FRONT, "    self->next = -((int64_t)1 << 62);\n    hystgen_move",
+        "    hystgen_move", "two_branches", "q31",
     ),
     Mutant(
-        "find end, two above the start within a limit", FIND,
-        "        *k = corner[start + 1u].end;\n        *end = *k;\n",
-        "        *k = corner[start + 1u].end;\n        *end = *k + 1u;\n", "outside", "float32",
-    ),
-    Mutant(
-        "find end, one above the start within a limit", FIND,
-        "        *k = c->end;\n        *end = *k;\n    }\n    return",
-        "        *k = c->end;\n        *end = *k + 1u;\n    }\n    return", "outside", "float32",
-    ),
-    Mutant(
-        "find end, corners of the start within a limit", FIND,
-        "            *k = c->end;\n            *end = *k;\n",
-        "            *k = c->end;\n            *end = *k + 1u;\n", "edge", "float32",
-    ),
-    Mutant(
-        "find end, the lowest of them", FIND, "        *end = *k;\n        return 0;\n",
-        "        *end = *k + 1u;\n        return 0;\n", "reset_low", "float32",
-    ),
-    Mutant("half, up", HALF, "return x >> 1;", "return (x + 1) >> 1;", "coarse_listed", "q31"),
-    Mutant(
-        "the low saturation code", STEP, "code < -{{ code_max }} ? -{{ code_max }} : code",
+        "the low saturation code", CODES, "code < -{{ code_max }} ? -{{ code_max }} : code",
         "code < -{{ code_max }} ? -{{ code_max }} - 1 : code", "far_low", "q15",
     ),
     Mutant(
-        "no saturation below", STEP, "code < -{{ code_max }} ? -{{ code_max }} : code", "code", "far_low", "q15",
+        "no saturation below", CODES, "code < -{{ code_max }} ? -{{ code_max }} : code", "code", "far_low", "q15",
     ),
     Mutant(
         "no number before the first step", STEP, "self->stepped ? self->answer : self->applied", "self->answer",
         "plain", "float32", "loop",
-    ),
-    Mutant(
-        "no number before the first step, fast", FAST, "        self->answer = self->applied;\n", "", "plain",
-        "float32",
     ),
     Mutant(
         "an envelope limits nothing above", CURVE, "*limited = w > e->most && w > e->envelope_most;",
@@ -156,35 +126,22 @@ KILLED = (
     ),
 )  # fmt: skip
 
-NOTHING_NEW = ("            self->memory.there.k = 0; /* it found nothing new */\n", "            ;\n")
-DOWN = ("return x >> 1;", "return x / 2;")
-
 # No record can find these, for the reasons given; a difference would show that a reason is wrong.
 EQUIVALENT = (
-    # In fixed point `there` is taken for a drive only where `hystgen_foretold` finds that it holds for that drive: the
-    # same direction, plays up to k-1 reached, play k not passed. Such a place gives the plays the values that the
-    # search would; at the very activation of play k the two may count it differently, and its state is the same. Sums
-    # of whole numbers do not depend on which of the places stands for a memory, as `loop`, which has none, shows. Of
-    # floating point this is not so: there the place's line begins where rounding has put the answer (KILLED).
+    # Where the same plays are known to follow, a search finds that they do.
     *(
-        Mutant("the place that solving found is kept where the drive was limited", STEP, *KEPT_AT_LIMIT, name, bits)
-        for name, bits in (
-            ("outside", "q15"), ("edge", "q31"), ("bent", "q31"), ("two_branches", "q15"), ("behind", "q31"),
+        Mutant(
+            "no step is known to have the same plays", CORNERS, "} else if (hystgen_along(here, output) < next) {",
+            "} else if (hystgen_along(here, output) < next && next < 0 && next > 0) {", name, bits,
         )
+        for name, bits in (("two_branches", "q31"), ("bent", "q15"))
     ),
-    # A fast move that began with the plays that followed already: `there` is a copy of `here`. If it holds for the
-    # drive committed, it is taken, and is `here`; if not, or if it was cleared, the search begins at a copy of `here`.
+    # That a drive is where solving has put it saves a search, which would find the same place.
     *(
-        Mutant("a place that is known already is kept", STEP, *NOTHING_NEW, name, bits)
-        for name, bits in (
-            ("plain", "q15"), ("coarse_listed", "q31"), ("plain", "float32"), ("edge", "float32"),
-            ("outside", "float64"),
+        Mutant(
+            "every drive is searched for", CORNERS, "if (moved < 0 || hystgen_along(",
+            "if (moved < 0 || moved >= 0 || hystgen_along(", name, bits,
         )
-    ),
-    # `half` is taken of ways from what a corner holds to where a move ends. A corner that is left or entered lies on
-    # the way, behind the end or at it, so that no way is negative, and of others both roundings are the same.
-    *(
-        Mutant("half, towards zero", HALF, *DOWN, name, bits)
-        for name, bits in (("coarse_listed", "q31"), ("bent", "q31"), ("listed", "q31"), ("plain", "q15"))
+        for name, bits in (("outside", "q15"), ("listed", "q31"), ("two_branches", "q15"))
     ),
 )  # fmt: skip

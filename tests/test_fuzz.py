@@ -58,7 +58,7 @@ def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path
 
 def changed_entry(text: str) -> str:
     """One threshold by one unit in the last place."""
-    start = text.index("plain_play = {")
+    start = text.index("plain_forward_segment[")
     number = re.compile(r"0\.9f").search(text, start)
     assert number
     other = np.nextafter(np.float32(0.9), np.float32(1))
@@ -74,14 +74,14 @@ def loose_clamp(text: str) -> str:
 
 def beyond_the_range(text: str) -> str:
     """A drive goes out that is more than what was solved and clamped."""
-    found = text.replace("    return v;\n}", "    return 1.01f * v;\n}")
+    found = text.replace("return plain_inverse_search(", "return 1.01f * plain_inverse_search(")
     assert found != text
     return found
 
 
 def out_of_bounds(text: str) -> str:
     """Corners are written behind the end of the list."""
-    slot = "plain_write_corner(t, &corner[depth"
+    slot = "&corner[m->here.depth"
     found = text.replace(f"{slot}]", f"{slot} + PLAIN_N_PLAYS + 1u]")
     assert found != text
     return found
@@ -119,12 +119,13 @@ def test_a_crash_before_the_first_call_is_told(tmp_path: Path) -> None:
 
 @needs_clang
 def test_engines_that_differ_are_found(tmp_path: Path) -> None:
-    """In q31 a threshold that is off by one unit of 2^31 suffices."""
+    """In q31 a threshold that is off by half a unit of 2^31 suffices."""
 
     def change(text: str) -> str:
-        first = re.compile(r"(?<=    0, )\d+").search(text, text.index("plain_threshold["))
-        assert first
-        return text[: first.start()] + str(int(first[0]) + 1) + text[first.end() :]
+        table = text.index("plain_model_segment[")
+        way = re.compile(r"(?<=LL, )\d+").search(text, table)
+        assert way
+        return text[: way.start()] + str(int(way[0]) + 1) + text[way.end() :]
 
     with pytest.raises(FuzzError, match="the engines give different answers"):
         fuzz(tmp_path, 5, "plain", "q31", "corners", change=change)

@@ -173,14 +173,14 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
     """Move on to an input short of CAP: more plays of the same block follow. False where a search is faster."""
     way = along(m, to - m.real[FROM])
     k = m.counts[K] + 1
-    far = m.counts[K] + 8
-    while k < far and way > t.way[k + 1]:
+    many = m.counts[K] + 8
+    while k < many and way > t.way[k + 1]:
         k += 1
     m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
     m.real[START] = m.real[BASE] + along(m, t.reach[k])
     m.real[GAIN] = t.gain[k]
     output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
-    if k == far or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
+    if k == many or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
         return False
     after = m.real[FROM] + along(m, t.way[k + 1])
     m.real[NEXT] = after if along(m, after - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
