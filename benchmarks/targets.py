@@ -106,6 +106,11 @@ class Case:
     middle: float = 0.0  # of the range of the drive
 
     @property
+    def in_software(self) -> bool:
+        """Whether floating point is computed by calls, whose cost depends on the numbers."""
+        return self.arithmetic in REALS and not (self.target.fpu and self.arithmetic == "float32")
+
+    @property
     def model(self) -> Model:
         """What is built."""
         return model(self.n, self.middle)
@@ -556,8 +561,7 @@ class Bench:
     @staticmethod
     def _most(case: Case) -> int:
         """Samples of a round of the search: fewer where floating point is computed in software."""
-        in_software = case.arithmetic in REALS and not (case.target.fpu and case.arithmetic == "float32")
-        return SEARCHED // (8 if in_software else 1)
+        return SEARCHED // (8 if case.in_software else 1)
 
     def _better(
         self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False

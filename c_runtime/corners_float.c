@@ -54,8 +54,8 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hyst
 }
 
 /* The last of segments k .. last that begins before `way`; `step` is the way, or the reach, of segment 1. */
-HYSTGEN_APART unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
-                                                hystgen_real_t way)
+static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
+                                         hystgen_real_t way)
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;

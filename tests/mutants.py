@@ -84,7 +84,6 @@ KILLED = (
         "a usual step is not taken back", USUAL, "    if (self->usual) {", "    if (self->usual && v > 0) {",
         "plain", "q15",
     ),
-    Mutant("a limit keeps no status", USUAL, "if (self->bits == 0) {", "if (self->bits < 8u) {", "plain", "q31"),
     Mutant(
         "where plays follow is kept behind a commit", FRONT, "    self->next = -((int64_t)1 << 62);\n    hystgen_move",
         "    hystgen_move", "two_branches", "q31",

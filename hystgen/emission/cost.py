@@ -99,8 +99,9 @@ def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[i
     }
 
 
-def _constants(text: str, real: int, fixed: bool, layout: Layout, each: bool = False) -> int:
-    """Bytes of the constants that the C text defines, alignment between them left out; `each`: of one entry of each."""
+def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1) -> int:
+    """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
+    of `plays` the bytes of one."""
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
@@ -120,7 +121,7 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, each: bool = F
         if own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
-        total += own * (1 if each else math.prod(map(int, re.findall(r"\d+", sizes))))
+        total += own * (math.prod(map(int, re.findall(r"\d+", sizes))) // plays)
     return total
 
 
@@ -167,7 +168,7 @@ def _memory(cascade: Cascade, options: Options, fixed: bool, text: str, plays: s
                 fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
             size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
         sizes.append((op, size))
-    more = _constants(plays, reach, fixed, layout, each=True) + a_play * len(sizes)
+    more = _constants(plays, reach, fixed, layout, n + 1) + a_play * len(sizes)
     return Memory(_constants(text, reach, fixed, layout), sizes, more)
 
 
