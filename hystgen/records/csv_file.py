@@ -9,7 +9,7 @@ import io
 import os
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import IO
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.problems import printable
-from hystgen.records import layout
+from hystgen.records import layout, lvm, pi_gcs, tektronix
 from hystgen.records.cells import BLANKS, COMMENT, MISSING, Dialect, is_comment
 from hystgen.records.clock import Clock
 from hystgen.records.columns import LISTED, Column, column
@@ -29,6 +29,11 @@ from hystgen.words import counted
 
 SAMPLE = 1 << 16
 """Characters at the start of a file, in whole lines, that show its layout."""
+
+INSTRUMENTS: tuple[Callable[[Reading, Sequence[str]], Layout | None], ...] = (
+    lvm.layout, pi_gcs.layout, tektronix.layout,
+)  # fmt: skip
+"""Formats whose first lines say themselves what is where."""
 
 SPARE = 1.05
 """Rows are set aside for a file of so many times the rows that its first block makes expect."""
@@ -62,23 +67,22 @@ def _layout(reading: Reading, sample: str) -> Layout:
     """The layout that the first lines show, and what is said of it."""
     start = sample[: sample.find("\n", SAMPLE) + 1] if len(sample) > SAMPLE else ""
     lines = (start or sample).split("\n")
-    found = layout.find(reading, lines)
+    known = (each(reading, lines) for each in INSTRUMENTS)
+    found = next((each for each in known if each is not None), None) or layout.find(reading, lines)
     if found.kind:
         reading.understood(found.kind)
     dialect = found.dialect
-    if dialect != Dialect() and (reading.delimiter is None or dialect.decimal != "."):
+    if not found.kind and dialect != Dialect() and (reading.delimiter is None or dialect.decimal != "."):
         decimals = " and decimal commas" if dialect.decimal == "," else ""
         between = layout.DELIMITERS.get(dialect.delimiter, f'"{printable(dialect.delimiter)}"')
         reading.understood(f"{between} between cells{decimals}")
     if found.header is None and not found.kind:
         reading.understood("no header")
-    elif found.header is not None and _is_below_text(lines, found.header):
+    elif found.header is not None and not found.kind and _is_below_text(lines, found.header):
         reading.understood(f"header in line {found.header}")
     if any(found.units) and not found.kind:
         named = [f"{name} [{unit}]" for name, unit in zip(found.names, found.units, strict=True) if unit]
         reading.understood(f"units {', '.join(map(printable, named[:LISTED]))}")
-    for said in found.said:
-        reading.understood(said)
     return found
 
 
@@ -142,6 +146,12 @@ class _Body:
 
     def take(self, text: str) -> None:
         """Rows of one block of whole lines."""
+        another = text.find(self.layout.another) if self.layout.another else -1
+        if another >= 0:
+            raise self.reading.refuse(
+                f"has a second table in it ({self.layout.kind}); one file is one experiment, export each by itself",
+                self.line + 1 + text.count("\n", 0, another),
+            )
         lines = text.count("\n") + (not text.endswith("\n") and bool(text))
         if lines:
             cells = self._fast(text, lines)

@@ -36,8 +36,8 @@ class Layout:
 
     `also`: second names of columns; `header`: line of the names, None where there is none; `first`: line from which on
     there are rows; `steps`: what the lines above say of the sample rate; `kind`: the instrument's format, empty for
-    text in general; `clocks`: columns of times of day; `rows`: number of rows the file says it has; `said`: what else a
-    user should know was understood.
+    text in general; `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text
+    that would begin another table.
     """
 
     dialect: Dialect
@@ -50,7 +50,7 @@ class Layout:
     kind: str = ""
     clocks: frozenset[int] = frozenset()
     rows: int | None = None
-    said: list[str] = field(default_factory=list)
+    another: str = ""
 
 
 @dataclass(frozen=True)
