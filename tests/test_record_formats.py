@@ -542,6 +542,100 @@ def test_the_libraries_are_imported_late() -> None:
     assert not {"h5py", "pyarrow", "scipy", "rich"} & set(loaded)
 
 
+# Sample rates beside the columns ---------------------------------------------------------------------------
+
+
+def beside_npz(path: Path, columns: Columns, name: str, value: float) -> None:
+    np.savez(path, **columns, **{name: np.float64(value)})
+
+
+def beside_mat(path: Path, columns: Columns, name: str, value: float) -> None:
+    scipy.io.savemat(path, {**columns, name: value})
+
+
+def beside_struct(path: Path, columns: Columns, name: str, value: float) -> None:
+    scipy.io.savemat(path, {"data": {**columns, name: value}, "fs": 7.0 if name != "fs" else value})
+
+
+def beside_h5(path: Path, columns: Columns, name: str, value: float) -> None:
+    with h5py.File(path, "w") as file:
+        for key, x in columns.items():
+            file[f"run1/{key}"] = x
+        file[f"run1/{name}"] = value
+        file["run2/drive"], file[f"run2/{name}"] = V[:-1], 77.0
+
+
+def beside_mat_73(path: Path, columns: Columns, name: str, value: float) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for key, x in columns.items():
+            matlab(file, key, x.reshape(1, -1))
+        matlab(file, name, np.full((1, 1), value))
+    with path.open("r+b") as start:
+        start.write(b"MATLAB 7.3 MAT-file, Platform: test".ljust(124) + b"\x00\x02IM")
+
+
+def attribute_h5(where: str) -> Callable[..., None]:
+    def write(path: Path, columns: Columns, name: str, value: float) -> None:
+        with h5py.File(path, "w") as file:
+            for key, x in columns.items():
+                file[f"run1/{key}"] = x
+            file["run2/pos"] = V[:-1]
+            file["run2"].attrs[name] = 77.0
+            file[where].attrs[name] = value
+
+    return write
+
+
+@pytest.mark.parametrize(("key", "value"), [("fs", 1000.0), ("SampleRate", 1000.0), ("dt", 0.001), ("dt_ms", 1.0)])
+@pytest.mark.parametrize(
+    ("file", "write"),
+    [("a.npz", beside_npz), ("a.mat", beside_mat), ("73.mat", beside_mat_73), ("a.h5", beside_h5),
+     ("f.h5", attribute_h5("/")), ("g.h5", attribute_h5("run1")), ("d.h5", attribute_h5("run1/v"))],
+)  # fmt: skip
+def test_a_sample_rate_beside_the_columns(
+    tmp_path: Path, file: str, write: Callable[..., None], key: str, value: float
+) -> None:
+    """It counts for the columns that it belongs to, and only where they have no time of their own."""
+    write(tmp_path / file, {"v": V, "y": Y}, key, value)
+    record = read_record(tmp_path / file)
+    check(record)
+    assert record.sample_time == pytest.approx(0.001)
+    assert "time from sample" in record.read_as
+    assert not any(key in note for note in record.notes)
+    assert read_record(tmp_path / file, sample_time=0.5).sample_time == 0.5
+    write(tmp_path / file, {"t": T, "v": V, "y": Y}, key, 3 * value)
+    check(read_record(tmp_path / file))
+
+
+def test_sample_rates_of_structs(tmp_path: Path) -> None:
+    for name, said in (("Fs", "data.Fs"), ("sampleRate", "data.sampleRate")):
+        scipy.io.savemat(tmp_path / "a.mat", {"data": {"drive": V, "position": Y, name: 1000.0}})
+        record = read_record(tmp_path / "a.mat")
+        check(record)
+        assert record.read_as == f"v = drive, y = position; time from sample rate 1000 Hz ({said}, which gives no unit)"
+    beside_struct(tmp_path / "b.mat", {"v": V, "y": Y}, "Fs", 1000.0)
+    (problem,) = problems(tmp_path / "b.mat")
+    assert "sample rate 7 Hz (fs, which gives no unit)" in problem
+    assert "give --sample-time" in problem
+
+
+def test_names_of_arrays_are_understood(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, x in (("Time", np.arange(N) * 1000.0), ("Drive", V), ("Sensor", Y)):
+            file[f"scan/{name}"] = x
+        file["scan/Time"].attrs["unit"] = "us"
+        file["scan/fs"] = "fast"
+    record = read_record(tmp_path / "a.h5")
+    check(record, np.arange(N) / 1000.0)
+    assert record.read_as == "t = Time, v = Drive, y = Sensor"
+    with h5py.File(tmp_path / "c.h5", "w") as file:
+        for name in ("one", "two"):
+            file[f"{name}/time"], file[f"{name}/drive"], file[f"{name}/pos"] = T, V, Y
+    found = problems(tmp_path / "c.h5")
+    assert len(found) == 3
+    assert all("2 columns may be meant by" in problem for problem in found)
+
+
 # Units -----------------------------------------------------------------------------------------------------
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from hystgen.problems import printable
+from hystgen.records.sampling import Step
 from hystgen.records.units import is_time_unit, split_unit
 
 LISTED = 20
@@ -141,7 +142,8 @@ def parse_columns(text: str) -> dict[str, str]:
 class Finder:
     """Finds the columns that are asked for; `problems` says what is wrong with the others.
 
-    `understood`: those found by what their names mean, by our names.
+    `understood`: those found by what their names mean, by our names; `steps`: what the file says of the sample rate of
+    the columns found, where it has no time.
     """
 
     def __init__(
@@ -157,14 +159,15 @@ class Finder:
         self.outside = outside
         self.problems: list[str] = []
         self.understood: dict[str, Column] = {}
+        self.steps: list[Step] = []
         self._unnamed: list[str] = []
         self._asked: set[str] = set()
 
-    def find(self, need: Sequence[str], timed: bool, stepped: bool = False) -> dict[str, Column]:
+    def find(self, need: Sequence[str], timed: bool, steps: Sequence[Step] = ()) -> dict[str, Column]:
         """Our names to columns.
 
         `need`: ours that must be there; `timed`: the user gives the sample time, so that the file need not have a time;
-        `stepped`: the file gives it, which counts only where it has no time.
+        `steps`: what the file says of it, which counts only where it has no time.
         """
         found: dict[str, Column] = {}
         wanted = dict.fromkeys([*need, *STANDARD, *self.mapping])
@@ -181,7 +184,10 @@ class Finder:
             chosen = None if ours in self.mapping else self._meant(ours, found)
             if chosen is not None:
                 found[ours] = self.understood[ours] = chosen
-            elif ours not in self._asked and not (ours == "t" and stepped and "t" not in self.mapping):
+                continue
+            if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
+                self.steps = [step for step in steps if step.belongs(c.name for c in found.values())]
+            if ours not in self._asked and not (ours == "t" and self.steps):
                 self._missing(ours, self.mapping.get(ours, ours))
         self._name_together()
         named = [found[ours] for ours in self.mapping if ours in found]

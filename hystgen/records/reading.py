@@ -130,11 +130,11 @@ class Reading:
         `steps`: what the file says of its sample rate; it counts where there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None, bool(steps))
+        found = finder.find(self.need, self.sample_time is not None, steps)
         for text in finder.problems:
             self.problem(text, line)
-        stepped = "t" not in found and self.sample_time is None and "t" not in self.columns and bool(steps)
-        if stepped and any(abs(step.seconds - steps[0].seconds) > AGREE * steps[0].seconds for step in steps):
+        steps = finder.steps
+        if any(abs(step.seconds - steps[0].seconds) > AGREE * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, and the file has {said}; give --sample-time", line)
         self.refuse_if_any()
@@ -142,7 +142,7 @@ class Reading:
             self.understood(
                 ", ".join(f"{ours} = {printable(c.own)}" for ours, c in sorted(found.items(), key=_standard_first))
             )
-        if stepped:
+        if steps:
             self.sample_time = steps[0].seconds
             self.understood(f"time from {steps[0].said}")
         return found

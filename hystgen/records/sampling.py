@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
+from hystgen.problems import printable
 from hystgen.records.units import TIMES, split_unit
 
 RATES = {
@@ -29,10 +30,19 @@ _LINE = re.compile(
 
 @dataclass(frozen=True)
 class Step:
-    """`seconds` between two samples, and how the file gives them."""
+    """`seconds` between two samples, and how the file gives them.
+
+    `of`: the column, or with its separator the group or struct, to which they belong; empty for all of the file.
+    """
 
     seconds: float
     said: str
+    of: str = ""
+
+    def belongs(self, names: Iterable[str]) -> bool:
+        """Whether they are those of any of the columns."""
+        group = not self.of or self.of[-1] in "./"
+        return any(name.startswith(self.of) if group else name == self.of for name in names)
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
@@ -52,17 +62,20 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
     return found
 
 
-def from_numbers(numbers: Mapping[str, float]) -> list[Step]:
-    """What named numbers, such as scalars beside arrays, say of the sample rate; names may have a folder and a unit."""
-    found = []
-    for name, value in numbers.items():
-        key, unit = split_unit(re.split(r"[./@]", name)[-1] if not name.endswith("]") else name)
-        rate = re.fullmatch(_RATE, key) is not None
-        if rate or re.fullmatch(_STEP, key):
-            step = _step(rate, value, unit, name)
-            if step is not None:
-                found.append(step)
-    return found
+def is_named(name: str) -> bool:
+    """Whether a name, with a unit or without, is one of a sample rate or a sample time."""
+    key, _ = split_unit(name)
+    return re.fullmatch(f"{_RATE}|{_STEP}", key) is not None
+
+
+def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step | None:
+    """What a number beside the columns says of their sample rate, by its name; `of` as in `Step`."""
+    key, own_unit = split_unit(name)
+    rate = re.fullmatch(_RATE, key) is not None
+    if not rate and re.fullmatch(_STEP, key) is None:
+        return None
+    step = _step(rate, value, unit or own_unit, f"{of} {name}".strip() if of[-1:] not in "./" else f"{of}{name}")
+    return None if step is None else replace(step, of=of)
 
 
 def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
@@ -81,4 +94,4 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
         factor, divisor = TIMES.get(plain.casefold(), (1.0, 1.0))
         said = f"sample time {value:g} {plain or 's'}"
         seconds = value / divisor * factor
-    return Step(seconds, f"{said} ({where}{'' if plain else ', which gives no unit'})")
+    return Step(seconds, f"{said} ({printable(where)}{'' if plain else ', which gives no unit'})")
