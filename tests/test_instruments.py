@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from nptdms import ChannelObject, TdmsWriter
 
+from hystgen import extras
 from hystgen.records import Record, RecordError, parse_columns, read_record
 
 N = 50
@@ -193,6 +196,62 @@ def test_pi_gcs_that_is_not_clear_or_damaged(tmp_path: Path) -> None:
     assert ":7:1: error: SAMPLE_TIME is no number of seconds" in problem(put(tmp_path / "c.dat", lines, "\n"))
     lines = [line.replace("DIM = 2", "DIM = 3") for line in gcs()]
     assert "2 columns where the header has 3" in problem(put(tmp_path / "d.dat", lines, "\n"), columns={"v": "#1"})
+
+
+# TDMS, written by npTDMS ----------------------------------------------------------------------------------------------
+
+
+def write_tdms(path: Path, channels: dict[str, Any], **properties: dict[str, Any]) -> Path:
+    with TdmsWriter(path) as file:
+        file.write_segment([ChannelObject("Scan", name, x, properties.get(name, {})) for name, x in channels.items()])
+    return path
+
+
+def test_tdms(tmp_path: Path) -> None:
+    wave = {"wf_increment": 0.001, "wf_start_offset": 0.0, "wf_start_time": np.datetime64("2024-03-05T14:21:05")}
+    path = write_tdms(
+        tmp_path / "a.tdms", {"Drive": V, "Sensor": Y, "Remark": ["a", "b"]},
+        Drive={**wave, "unit_string": "V"}, Sensor={**wave, "NI_UnitDescription": "um"},
+    )  # fmt: skip
+    record = read_record(path)
+    check(record)
+    assert record.units == {"v": "V", "y": "um"}
+    assert record.read_as == "v = Drive, y = Sensor; time from wf_increment 0.001 s (Scan/Drive)"
+    assert record.notes == ("columns without numbers were left out: Scan/Remark",)
+    check(read_record(path, parse_columns("v=Scan/Drive,y=Sensor")))
+    # Waveforms that start apart are not put side by side
+    later = {**wave, "wf_start_offset": 0.2}
+    path = write_tdms(tmp_path / "b.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor=later)
+    assert "the columns do not start together, Scan/Drive at 2024-03-05T14:21:05" in problem(path)
+    path = write_tdms(
+        tmp_path / "c.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor={**wave, "wf_increment": 0.002}
+    )
+    assert "give --sample-time" in problem(path)
+
+
+def test_tdms_with_times_and_without(tmp_path: Path) -> None:
+    path = write_tdms(tmp_path / "a.tdms", {"Time": T * 1e3, "Drive": V, "Sensor": Y}, Time={"unit_string": "ms"})
+    record = read_record(path)
+    assert record.t == pytest.approx(T, abs=1e-12)
+    assert np.array_equal(record.v, V)
+    stamps = np.datetime64("2024-03-05T14:21:05") + (np.arange(N) * 1000).astype("timedelta64[us]")
+    record = read_record(write_tdms(tmp_path / "b.tdms", {"Timestamp": stamps, "Drive": V, "Sensor": Y}))
+    check(record)
+    assert record.notes == ("Timestamp holds times of day; it was converted to seconds from its first",)
+    path = write_tdms(tmp_path / "c.tdms", {"v": V, "y": Y.astype(np.float32)}, v={"wf_increment": 0.0})
+    assert "give --sample-time" in problem(path)
+    assert read_record(path, sample_time=0.001).y == pytest.approx(Y, rel=1e-6)
+    (tmp_path / "d.tdms").write_bytes(b"something else, not written by LabVIEW")
+    assert "is not a TDMS file" in problem(tmp_path / "d.tdms")
+
+
+def test_tdms_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_tdms(tmp_path / "a.tdms", {"v": V, "y": Y})
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    assert problem(path) == (
+        f": error: TDMS files need the package npTDMS; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat "
+        "(v7)"
+    )
 
 
 def test_other_rate_of_the_user_counts(tmp_path: Path) -> None:

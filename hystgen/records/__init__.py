@@ -1,8 +1,12 @@
 """Measured data in, computed columns out: one file is one experiment.
 
 Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
-`.npz`, MATLAB `.mat`, HDF5 and Parquet files. What is wrong with a file is refused, all of it at once and each with its
-place; small faults of a recording are repaired and counted in `Record.notes`.
+`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. What is wrong with a file is refused, all of it at once and each
+with its place; small faults of a recording are repaired and counted in `Record.notes`.
+
+Of text, `text` makes lines of bytes, `layout` (for some instruments a file of their own) finds out what is where in
+them, `cells` and `clock` read cells, `csv_file` all rows; `columns` finds the columns asked for and `sampling` sample
+rates, for every format.
 
 A format is a file of this package and an entry of `FORMATS`.
 """
@@ -27,6 +31,7 @@ from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
 from hystgen.records.repair import SHORTEST, repaired
+from hystgen.records.tdms import read_tdms
 from hystgen.records.units import agreed_units, headers
 from hystgen.records.writing import columns_text, write_columns
 from hystgen.writing import write_atomically
@@ -51,6 +56,7 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
     ".mat": _any_mat,
     ".h5": read_hdf5,
     ".hdf5": read_hdf5,
+    ".tdms": read_tdms,
     ".parquet": read_parquet,
     ".pq": read_parquet,
 }

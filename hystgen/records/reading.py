@@ -134,6 +134,9 @@ class Reading:
         for text in finder.problems:
             self.problem(text, line)
         steps = finder.steps
+        if len({step.start for step in steps}) > 1:
+            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
+            self.problem(f"the columns do not start together, {starts}; export them with one time", line)
         if any(abs(step.seconds - steps[0].seconds) > AGREE * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, and the file has {said}; give --sample-time", line)

@@ -32,12 +32,14 @@ _LINE = re.compile(
 class Step:
     """`seconds` between two samples, and how the file gives them.
 
-    `of`: the column, or with its separator the group or struct, to which they belong; empty for all of the file.
+    `of`: the column, or with its separator the group or struct, to which they belong; empty for all of the file;
+    `start`: when the first sample was, where the file gives that for each column.
     """
 
     seconds: float
     said: str
     of: str = ""
+    start: str = ""
 
     def belongs(self, names: Iterable[str]) -> bool:
         """Whether they are those of any of the columns."""
