@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -265,6 +266,12 @@ def test_what_was_understood_is_said_once(tmp_path: Path, capsys: pytest.Capture
     assert read_record(plain).read_as == ""
 
 
+def test_a_header_in_a_comment_below_a_line_that_looks_like_one(tmp_path: Path) -> None:
+    check(read_record(put(tmp_path / "a.txt", "a,b,c", "# t,v,y", *table())))
+    record = read_record(put(tmp_path / "b.txt", "t,v,y", "# paused, once, only", *table()))
+    check(record)
+
+
 def test_every_command_reads_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     v = np.concatenate([np.linspace(0, 40, 60), np.linspace(40, -40, 120), np.linspace(-40, 40, 120)])
@@ -365,3 +372,64 @@ def test_cells_of_a_line() -> None:
     for cell in ("1.5", "1,2,3"):
         with pytest.raises(ValueError, match=r"\S"):
             Dialect(";", ",").number(cell)
+
+
+# Any style ------------------------------------------------------------------------------------------------------------
+
+
+def styled(seed: int) -> tuple[str, np.ndarray[Any, Any]]:
+    """A table in a style drawn at random, with the numbers t, v, y that its digits mean."""
+    rng = random.Random(seed)
+    size = rng.choice([16, 40, 200])
+    scale = rng.choice([1e-3, 1.0, 10.0, 100.0, 1000.0, 5000.0, 1e5])
+    digits = rng.choice([".0f", ".1f", ".3f", ".6f", "g", ".4e"])
+    delimiter = rng.choice([",", ";", "\t", "|", " ", "   "])
+    quoted = rng.random() < 0.2
+    decimal = rng.choice(".,") if delimiter != "," or quoted else "."
+    whole = rng.random() < 0.2
+    cells = [
+        [str(k) if whole else f"{0.01 * k:.4f}", format(scale * np.sin(0.3 * k + 1), digits),
+         format(scale * np.cos(0.3 * k), digits)]
+        for k in range(size)
+    ]  # fmt: skip
+    order = rng.sample(range(3), 3)
+    units = [("s", "V", "um")[k] for k in order]
+    names = rng.choice([("t", "v", "y"), ("Time", "Drive", "Position"), ("Zeit", "Spannung", "Weg")])
+    header = [names[k] for k in order]
+    remarks = ["ok", "off"] if rng.random() < 0.3 else []
+    rows = [[row[k].replace(".", decimal) for k in order] + remarks[:1] for row in cells]
+    if quoted:
+        rows = [[f'"{cell}"' for cell in row] for row in rows]
+    above = [
+        "Logger 7", "Serial,17", "Gain;2.5", "a,b,c", "Range,10,V", "# note", "Date: 2024-03-05 14:00:00", "1,5", "",
+    ]  # fmt: skip
+    lines = [rng.choice(above) for _ in range(rng.choice([0, 1, 3]))]
+    style = rng.choice(["plain", "units", "brackets", "comment", "none"])
+    if style == "brackets" and delimiter.strip():
+        header = [f"{name} [{unit}]" for name, unit in zip(header, units, strict=True)]
+    if style != "none":
+        lines.append(("# " if style == "comment" else "") + delimiter.join(header + ["state"] * bool(remarks)))
+    if style == "units":
+        lines.append(delimiter.join(units + ["-"] * bool(remarks)))
+    lines += [delimiter.join(row) for row in rows]
+    return "\n".join(lines) + "\n", np.array([[float(cell) for cell in row] for row in cells])
+
+
+def test_tables_in_any_style_are_read_right_or_refused(tmp_path: Path) -> None:
+    """A wrong reading is worse than a refusal; and of those with a header next to none is refused."""
+    read = refused = 0
+    for seed in range(200):
+        text, numbers = styled(seed)
+        (tmp_path / "a.csv").write_text(text)
+        try:
+            record = read_record(tmp_path / "a.csv", need=("v", "y", "t"))
+        except RecordError as error:
+            refused += not any(
+                reason in str(error) for reason in ("has numbers, not names", "above the numbers has", "throughout")
+            )
+        else:
+            read += 1
+            assert record.y is not None
+            assert np.array_equal(np.transpose([record.t, record.v, record.y]), numbers), text[:300]
+    assert read > 140
+    assert refused < 10

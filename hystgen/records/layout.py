@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from hystgen.records import sampling
 from hystgen.records.cells import BLANKS, Dialect, is_comment
+from hystgen.records.columns import STANDARD, column, meaning
 from hystgen.records.reading import Reading
 from hystgen.records.units import unit_alone
 
@@ -84,7 +85,7 @@ def find(reading: Reading, lines: Sequence[str]) -> Layout:
         return _without_numbers(reading, seen, dialects)
     best: tuple[_View, Layout | None] | None = None
     for view in sorted(views, key=lambda each: (each.width < 2, -each.score)):
-        layout = _layout(view, seen)
+        layout = _with_header(reading, view, seen)
         if best is None or (best[1] is None and layout is not None):
             best = view, layout
     assert best is not None
@@ -131,8 +132,22 @@ def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
     return _View(dialect, width, score, numeric, clean[0])
 
 
-def _layout(view: _View, lines: Sequence[_Line]) -> Layout | None:
-    """The layout with the header that belongs to a view; None where it has none."""
+def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layout | None:
+    """The layout with the header in plain text, or that in a comment right above the numbers where it means more."""
+    plain, comment = _plain_header(view, lines), _comment_header(view, lines)
+    if plain is None or comment is None:
+        return plain or comment
+
+    def known(found: Layout) -> int:
+        columns = [column(name, unit=unit) for name, unit in zip(found.names, found.units, strict=True)]
+        asked = {*STANDARD, "u", *reading.columns.values()}
+        return sum(bool({c.name, c.label} & asked or meaning(c)) for c in columns)
+
+    return comment if known(comment) > known(plain) else plain
+
+
+def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
+    """The layout with a header that is no comment; None where there is none."""
     block = []
     for k in range(view.start - 1, -1, -1):
         if lines[k].comment:
@@ -152,9 +167,7 @@ def _layout(view: _View, lines: Sequence[_Line]) -> Layout | None:
     if block and _may_be_names(view, block[-1][1]):
         line, names = block[-1]
         return _made(view, names, line.number, _next(lines, line))
-    if block:
-        return None
-    return _comment_header(view, lines)
+    return None
 
 
 def _next(lines: Sequence[_Line], above: _Line) -> int:
@@ -163,7 +176,8 @@ def _next(lines: Sequence[_Line], above: _Line) -> int:
 
 
 def _made(view: _View, names: list[str], header: int, first: int, units: Sequence[str] = ()) -> Layout:
-    return Layout(view.dialect, names, first, header, [unit_alone(unit) or "" for unit in units])
+    of = [unit_alone(unit) or "" for unit in units] or [""] * len(names)
+    return Layout(view.dialect, names, first, header, of)
 
 
 def _names(view: _View, text: str) -> list[str] | None:
@@ -293,4 +307,6 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
     """Whether a line may hold names, some of which are numbers, as those of channels."""
-    return bool(cells) and view.dialect.weight(cells[0]) < 0 and not _are_units(cells)
+    text = [cell for cell in cells if view.dialect.weight(cell) < 0]
+    numbers = all(cell in text or cell.isdecimal() for cell in cells if cell)
+    return numbers and cells[0] in text and not _are_units(cells)
