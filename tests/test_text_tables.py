@@ -209,10 +209,15 @@ def test_one_cause_one_message(tmp_path: Path) -> None:
     for k in range(10, 40):
         rows[k][1] = "OVER"
     rows[50][2] = "n.a"
+    for k in range(10):
+        rows[k][2] = f"0x{16 * k + 1:02x}"
     rows[51] = rows[51][:2]
     rows[55] = rows[55][:2]
     found = problems(put(tmp_path / "a.csv", "t,v,y", *(",".join(row) for row in rows)))
     column = len(",".join(rows[50][:2])) + 2
+    assert found.pop(0).split('"')[1] == "0x01"
+    assert len(found) <= 4
+    found = [problem for problem in found if "0x" not in problem]
     assert [problem.split(": error: ")[0] for problem in found] == [":12:9", f":52:{column}", ":53:1"]
     assert found[0].endswith("where there is no value (and 29 more, the last in line 41)")
     assert found[2].endswith("complete or remove the line (and 1 more, the last in line 57)")
@@ -336,6 +341,21 @@ def test_a_broken_time_of_day_has_a_place(tmp_path: Path) -> None:
     assert problem == ':31:1: error: "soon" in column "time" is no time of day; write every time as the first one'
     lines[30] = "," + lines[30].split(",", 1)[1]
     assert len(read_record(put(tmp_path / "a.csv", *lines))) == N - 1
+
+
+def test_times_since_1970(tmp_path: Path) -> None:
+    """In seconds they need no unit; in milliseconds, microseconds or nanoseconds nothing else can be meant, or said."""
+    rows = table(columns=2)
+
+    def stamps(name: str, factor: int) -> Path:
+        times = [f"{1709640000 * factor + factor // 1000 * k}" for k in range(N)]
+        return put(tmp_path / "a.csv", f"{name},v,y", *(f"{t},{r}" for t, r in zip(times, rows, strict=True)))
+
+    for factor in (10**3, 10**6, 10**9):
+        for name in ("timestamp", "t"):
+            text = f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit behind'
+            assert text in problems(stamps(name, factor))[0]
+    assert read_record(stamps("timestamp [ms]", 10**3)).sample_time == pytest.approx(0.001, rel=1e-3)
 
 
 def test_times_with_too_few_digits(tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ _THOUSANDS = (
 _EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 """A number whose comma may be a decimal comma or a thousands mark."""
 
+_MINUTES = re.compile(r"\d+:\d{2}(?:[.,]\d+)?")
+
 _WORD = re.compile(r"\S+")
 
 
@@ -81,7 +83,17 @@ class Dialect:
             return "thousands marks", "thousands marks are not read, export numbers without them"
         if "." in text and self.decimal != "." and _reads(text):
             return "decimal point", "the file has decimal commas, write every number with one"
+        if _MINUTES.fullmatch(text):
+            return "minutes", "write times as hours, minutes and seconds, 0:01:30.5, or in seconds"
         return "", "write a number, or nothing where there is no value"
+
+
+def shape(cell: str) -> str:
+    """What cells with the same fault have in common: a word itself, of text with digits what kinds of signs it has."""
+    text = cell.strip()
+    if not any(map(str.isdigit, text)):
+        return text
+    return re.sub("[^\\W\\d_]+", "a", re.sub("\\d+", "0", text))
 
 
 def _reads(text: str) -> bool:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hystgen.problems import printable
 from hystgen.records import layout, lvm, pi_gcs, tektronix
-from hystgen.records.cells import BLANKS, COMMENT, MISSING, Dialect, is_comment
+from hystgen.records.cells import BLANKS, COMMENT, MISSING, Dialect, is_comment, shape
 from hystgen.records.clock import Clock
 from hystgen.records.columns import LISTED, Column, column
 from hystgen.records.layout import Layout
@@ -52,7 +52,7 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     units = found.units or [""] * len(names)
     also = found.also or [""] * len(names)
     columns = [column(name, unit=units[k], also=also[k]) for k, name in enumerate(names)]
-    columns = [replace(c, unit="") if k in found.clocks else c for k, c in enumerate(columns)]
+    columns = [replace(c, unit="s") if k in found.clocks else c for k, c in enumerate(columns)]
     chosen = reading.chosen(columns, line=found.header or 1, steps=found.steps)
     if "t" in chosen and columns.index(chosen["t"]) in found.clocks:
         reading.understood("times of day counted in seconds from the first")
@@ -73,9 +73,11 @@ def _layout(reading: Reading, sample: str) -> Layout:
         reading.understood(found.kind)
     dialect = found.dialect
     if not found.kind and dialect != Dialect() and (reading.delimiter is None or dialect.decimal != "."):
-        decimals = " and decimal commas" if dialect.decimal == "," else ""
         between = layout.DELIMITERS.get(dialect.delimiter, f'"{printable(dialect.delimiter)}"')
-        reading.understood(f"{between} between cells{decimals}")
+        parts = [f"{between} between cells"] if len(found.names) > 1 else []
+        parts += ["decimal commas"] if dialect.decimal == "," else []
+        if parts:
+            reading.understood(" and ".join(parts))
     if found.header is None and not found.kind:
         reading.understood("no header")
     elif found.header is not None and not found.kind and _is_below_text(lines, found.header):
@@ -188,8 +190,6 @@ class _Body:
         taken = {**chosen, **reading.further(numeric, chosen)}
         place = {name: k for k, name in enumerate(self.names) if k in self.stored}
         numbers = {name: self.stored[place[c.name]] for name, c in taken.items()}
-        if self.clock_column is not None:
-            taken["t"] = replace(taken["t"], unit="s")
         return reading.finished(numbers, taken, self.lines)
 
     def _room(self, rows: int, size: int) -> None:
@@ -314,7 +314,7 @@ class _Body:
             kind, advice = self.dialect.fault(cell)
         self._wrong(
             f'"{printable(cell.strip())}" in column "{name}" is {no}; {advice}',
-            (kind,) if kind else (kind, name, cell.strip()),
+            (kind,) if kind else (kind, name, shape(cell)),
             line,
             place,
         )

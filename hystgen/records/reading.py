@@ -22,6 +22,10 @@ AGREE = 1e-6
 """Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
 
 
+NO_SECONDS = 1e11
+"""Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
+
+
 class Lines:
     """Line of the file that each row of a table came from, kept by stretches of rows."""
 
@@ -142,8 +146,12 @@ class Reading:
             self.problem(f"there is no time, and the file has {said}; give --sample-time", line)
         self.refuse_if_any()
         if finder.understood:
+            no_unit = "t" in finder.understood and not found["t"].unit
             self.understood(
-                ", ".join(f"{ours} = {printable(c.own)}" for ours, c in sorted(found.items(), key=_standard_first))
+                ", ".join(
+                    f"{ours} = {printable(c.own)}{' in seconds, as it has no unit' if ours == 't' and no_unit else ''}"
+                    for ours, c in sorted(found.items(), key=_standard_first)
+                )
             )
         if steps:
             self.sample_time = steps[0].seconds
@@ -205,6 +213,12 @@ class Reading:
                 self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as none"
             x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
+        if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
+            name = printable(taken["t"].own)
+            raise self.refuse(
+                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit behind its '
+                f'name, "{name} [ms]"'
+            )
         if "t" in units:
             numbers["t"], note = to_seconds(numbers["t"], units["t"])
             if note:
