@@ -48,13 +48,6 @@ _WORDS = re.compile(r"[^\W\d_]+")
 
 _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 
-ALIASES = {
-    "t": ("t", "time", "times", "zeit", "timestamp"),
-    "v": ("v", "voltage", "volt", "drive", "input", "u", "command"),
-    "y": ("y", "displacement", "position", "pos", "output", "measured", "sensor", "disp"),
-    "u": ("u", "reference", "ref", "setpoint", "target"),
-}
-
 
 @dataclass(frozen=True)
 class Column:
@@ -95,11 +88,7 @@ def column(
 
 def meaning(c: Column) -> str:
     """Which of our columns the words of a name mean; empty where they mean none, or more than one."""
-    # "Control Voltage of OutputChan1": what it is, not what it belongs to
-    quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
-    words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
-    # A capital T is a temperature more often than a time
-    plain = {word.casefold() for word in words if word != "T" or is_time_unit(c.unit)}
+    plain = _words(c)
     if plain & OTHERWISE:
         return ""
     timed = is_time_unit(c.unit)
@@ -109,6 +98,15 @@ def meaning(c: Column) -> str:
     if c.unit and timed != ("t" in found):
         return ""
     return found.pop() if len(found) == 1 else ""
+
+
+def _words(c: Column) -> set[str]:
+    """Words of a column's name, in lower case."""
+    # "Control Voltage of OutputChan1": what it is, not what it belongs to
+    quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
+    words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
+    # A capital T is a temperature more often than a time
+    return {word.casefold() for word in words if word != "T" or is_time_unit(c.unit)}
 
 
 def parse_columns(text: str) -> dict[str, str]:
@@ -278,14 +276,10 @@ class Finder:
 
     def _advice(self, ours: str) -> str:
         """Which column may be meant, by its name without units, else how to name one."""
-        words = [
-            (c.name, c.own.casefold().replace("[", " ").replace("(", " ").replace("_", " ").split())
-            for c in self.columns
-        ]
-        for alias in ALIASES.get(ours, (ours,)):
-            for name, parts in words:
-                if parts and parts[0] == alias and self.mapping.get(ours) != name:
-                    return f'did you mean --columns "{ours}={printable(name)}"?'
+        known = MEANINGS.get(ours, frozenset()) | DECIDE.get(ours, frozenset()) | {ours}
+        for c in self.columns:
+            if _words(c) & known and self.mapping.get(ours) != c.name:
+                return f'did you mean --columns "{ours}={printable(c.name)}"?'
         wanted = self.mapping.get(ours, ours).casefold()
         close = difflib.get_close_matches(wanted, [c.name.casefold() for c in self.columns], 1)
         for c in self.columns:
