@@ -26,9 +26,10 @@ _RULE = re.compile(r"\s*([-=_*~])\1{2,}[\s\-=_*~+]*")
 _MARKS = re.compile(r"^[\s#%/]+")
 
 EXAMPLES = {1: "v=#1", 2: "1,2 --sample-time SECONDS"}
-"""How columns are named by their numbers where there are so many; `EXAMPLE` for more."""
+"""How to name columns by their numbers in a table of this many columns."""
 
 EXAMPLE = "1,2,3"
+"""The same for every wider table."""
 
 
 @dataclass
