@@ -291,10 +291,11 @@ _RECORD_OPTIONS = [
     click.option(
         "--columns",
         metavar="t=Time,v=U,y=Pos",
-        help="our names for the file's columns; in HDF5 v=run1/drive, of a MATLAB struct v=data.v",
+        help="our names for the file's columns; in HDF5 v=run1/drive, of a MATLAB struct v=data.v; in text also by "
+        "their numbers, 1,2,3 for t, v, y",
     ),
     click.option("--sample-time", type=float, help="seconds, for files without time"),
-    click.option("--delimiter", help="default: a comma"),
+    click.option("--delimiter", help="default: what the file shows"),
     click.option("--history", metavar="V,V,..", help="drive values visited before"),
     click.option(
         "--rest", type=float, callback=_seconds, default=0.0, help="seconds of pause, seen by effects alone"

@@ -35,13 +35,13 @@ from hystgen.records import (
     Record,
     RecordError,
     agreed_units,
-    csv_file,
     hdf5,
     parquet,
     parse_columns,
     read_record,
 )
 from hystgen.records import headers as with_units
+from hystgen.records import text as record_text
 from hystgen.records.units import split_unit
 
 N = 50
@@ -542,6 +542,100 @@ def test_the_libraries_are_imported_late() -> None:
     assert not {"h5py", "pyarrow", "scipy", "rich"} & set(loaded)
 
 
+# Sample rates beside the columns ---------------------------------------------------------------------------
+
+
+def beside_npz(path: Path, columns: Columns, name: str, value: float) -> None:
+    np.savez(path, **columns, **{name: np.float64(value)})
+
+
+def beside_mat(path: Path, columns: Columns, name: str, value: float) -> None:
+    scipy.io.savemat(path, {**columns, name: value})
+
+
+def beside_struct(path: Path, columns: Columns, name: str, value: float) -> None:
+    scipy.io.savemat(path, {"data": {**columns, name: value}, "fs": 7.0 if name != "fs" else value})
+
+
+def beside_h5(path: Path, columns: Columns, name: str, value: float) -> None:
+    with h5py.File(path, "w") as file:
+        for key, x in columns.items():
+            file[f"run1/{key}"] = x
+        file[f"run1/{name}"] = value
+        file["run2/drive"], file[f"run2/{name}"] = V[:-1], 77.0
+
+
+def beside_mat_73(path: Path, columns: Columns, name: str, value: float) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for key, x in columns.items():
+            matlab(file, key, x.reshape(1, -1))
+        matlab(file, name, np.full((1, 1), value))
+    with path.open("r+b") as start:
+        start.write(b"MATLAB 7.3 MAT-file, Platform: test".ljust(124) + b"\x00\x02IM")
+
+
+def attribute_h5(where: str) -> Callable[..., None]:
+    def write(path: Path, columns: Columns, name: str, value: float) -> None:
+        with h5py.File(path, "w") as file:
+            for key, x in columns.items():
+                file[f"run1/{key}"] = x
+            file["run2/pos"] = V[:-1]
+            file["run2"].attrs[name] = 77.0
+            file[where].attrs[name] = value
+
+    return write
+
+
+@pytest.mark.parametrize(("key", "value"), [("fs", 1000.0), ("SampleRate", 1000.0), ("dt", 0.001), ("dt_ms", 1.0)])
+@pytest.mark.parametrize(
+    ("file", "write"),
+    [("a.npz", beside_npz), ("a.mat", beside_mat), ("73.mat", beside_mat_73), ("a.h5", beside_h5),
+     ("f.h5", attribute_h5("/")), ("g.h5", attribute_h5("run1")), ("d.h5", attribute_h5("run1/v"))],
+)  # fmt: skip
+def test_a_sample_rate_beside_the_columns(
+    tmp_path: Path, file: str, write: Callable[..., None], key: str, value: float
+) -> None:
+    """It counts for the columns that it belongs to, and only where they have no time of their own."""
+    write(tmp_path / file, {"v": V, "y": Y}, key, value)
+    record = read_record(tmp_path / file)
+    check(record)
+    assert record.sample_time == pytest.approx(0.001)
+    assert "time from sample" in record.read_as
+    assert not any(key in note for note in record.notes)
+    assert read_record(tmp_path / file, sample_time=0.5).sample_time == 0.5
+    write(tmp_path / file, {"t": T, "v": V, "y": Y}, key, 3 * value)
+    check(read_record(tmp_path / file))
+
+
+def test_sample_rates_of_structs(tmp_path: Path) -> None:
+    for name, said in (("Fs", "data.Fs"), ("sampleRate", "data.sampleRate")):
+        scipy.io.savemat(tmp_path / "a.mat", {"data": {"drive": V, "position": Y, name: 1000.0}})
+        record = read_record(tmp_path / "a.mat")
+        check(record)
+        assert record.read_as == f"v = drive, y = position; time from sample rate 1000 Hz ({said}, which gives no unit)"
+    beside_struct(tmp_path / "b.mat", {"v": V, "y": Y}, "Fs", 1000.0)
+    (problem,) = problems(tmp_path / "b.mat")
+    assert "sample rate 7 Hz (fs, which gives no unit)" in problem
+    assert "give --sample-time" in problem
+
+
+def test_names_of_arrays_are_understood(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for name, x in (("Time", np.arange(N) * 1000.0), ("Drive", V), ("Sensor", Y)):
+            file[f"scan/{name}"] = x
+        file["scan/Time"].attrs["unit"] = "us"
+        file["scan/fs"] = "fast"
+    record = read_record(tmp_path / "a.h5")
+    check(record, np.arange(N) / 1000.0)
+    assert record.read_as == "t = Time, v = Drive, y = Sensor"
+    with h5py.File(tmp_path / "c.h5", "w") as file:
+        for name in ("one", "two"):
+            file[f"{name}/time"], file[f"{name}/drive"], file[f"{name}/pos"] = T, V, Y
+    found = problems(tmp_path / "c.h5")
+    assert len(found) == 3
+    assert all("2 columns may be meant by" in problem for problem in found)
+
+
 # Units -----------------------------------------------------------------------------------------------------
 
 
@@ -765,7 +859,7 @@ def test_blocks_of_any_size_give_the_same_numbers(
     cells = awkward(400)
     cells = [row for row in cells if max(map(len, row)) < 25]
     (tmp_path / "a.csv").write_bytes(b"# one" + end.encode() + written(cells, "t,v,y", end))
-    monkeypatch.setattr(csv_file, "BLOCK", block)
+    monkeypatch.setattr(record_text, "BLOCK", block)
     record = read_record(tmp_path / "a.csv")
     check(record, *(np.array([float(row[k]) for row in cells]) for k in range(3)))
     assert len(cells) > 390
@@ -782,7 +876,7 @@ def test_both_ways_through_a_block_round_as_python_does(tmp_path: Path) -> None:
 
 def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The places told are those of the file, whichever blocks they are in."""
-    monkeypatch.setattr(csv_file, "BLOCK", 256)
+    monkeypatch.setattr(record_text, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5)), "ok"] for k in range(2000)]
     header = "t,v,y,state"
     (tmp_path / "good.csv").write_bytes(written(cells, header))
@@ -817,7 +911,7 @@ def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_column_that_turns_out_to_be_text_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(csv_file, "BLOCK", 256)
+    monkeypatch.setattr(record_text, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), str(k), repr(float(k % 5))] for k in range(500)]
     cells[300][2] = "fault, \u00b5"
     cells[300][2] = '"' + cells[300][2] + '"'
@@ -859,7 +953,7 @@ def test_a_row_too_long_and_one_too_short_do_not_make_up_for_each_other(tmp_path
 
 
 def test_latin_1_and_binary_parts_far_into_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(csv_file, "BLOCK", 256)
+    monkeypatch.setattr(record_text, "BLOCK", 256)
     text = written([[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5))] for k in range(500)], "t,v,y")
     (tmp_path / "a.csv").write_bytes(text + b"# 20 \xb0C\n# 21 \xb0C\n")
     record = read_record(tmp_path / "a.csv")

@@ -33,7 +33,7 @@ from hystgen.identification.workers import Result, Task
 from hystgen.progress import Progress
 from hystgen.records import FORMATS, Record, several, write_atomically
 
-SUFFIXES = (".csv", *FORMATS)
+SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
 """Files that are taken from a folder."""
 
 KEPT_IN = ".hystgen"

@@ -1,8 +1,12 @@
 """Measured data in, computed columns out: one file is one experiment.
 
-CSV with a header row (`t` in seconds, `v` drive, `y` measured, any further columns), and `.npz`, MATLAB `.mat`, HDF5
-and Parquet files with the same names. What is wrong with a file is refused, all of it at once and each with its
-place; small faults of a recording are repaired and counted in `Record.notes`.
+Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
+`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. What is wrong with a file is refused, all of it at once and each
+with its place; small faults of a recording are repaired and counted in `Record.notes`.
+
+Of text, `text` makes lines of bytes, `layout` (for some instruments a file of their own) finds out what is where in
+them, `cells` and `clock` read cells, `csv_file` all rows; `columns` finds the columns asked for and `sampling` sample
+rates, for every format.
 
 A format is a file of this package and an entry of `FORMATS`.
 """
@@ -15,11 +19,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
-from hystgen import arguments
+from hystgen import arguments, console
 from hystgen.problems import RecordError, printable
 from hystgen.progress import Progress
 from hystgen.records.array_files import read_mat, read_npz
-from hystgen.records.columns import parse_columns
+from hystgen.records.columns import LISTED, parse_columns
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
 from hystgen.records.no_value import LARGEST, no_value
@@ -27,6 +31,7 @@ from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import CountingFile, Reading, Table
 from hystgen.records.record import Record
 from hystgen.records.repair import SHORTEST, repaired
+from hystgen.records.tdms import read_tdms
 from hystgen.records.units import agreed_units, headers
 from hystgen.records.writing import columns_text, write_columns
 from hystgen.writing import write_atomically
@@ -51,10 +56,11 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
     ".mat": _any_mat,
     ".h5": read_hdf5,
     ".hdf5": read_hdf5,
+    ".tdms": read_tdms,
     ".parquet": read_parquet,
     ".pq": read_parquet,
 }
-"""How a file is read, by its suffix in lower case; anything else is CSV."""
+"""How a file is read, by its suffix in lower case; anything else is text."""
 
 
 def read_records(
@@ -67,13 +73,15 @@ def read_records(
 ) -> list[Record]:
     """Read several data files as `read_record` does; records that are in memory already are kept.
 
-    `progress`: a bar on a terminal's stderr when it takes more than a second. Raises RecordError with every problem in
-    all files, ValueError and TypeError for other arguments.
+    `progress`: says on stderr once how files were understood ("read as: .."), with a bar on a terminal when it takes
+    more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
+    arguments.
     """
     everything = several(sources)
     _check_options(columns, sample_time, delimiter)
     found: list[Record] = []
     refused: list[str] = []
+    ways: dict[str, list[str]] = {}
     with Progress(sum(_size(source) for source in everything), progress, "reading") as bar:
         for source in everything:
             try:
@@ -81,9 +89,15 @@ def read_records(
                     _check_arrays(source)
                 else:
                     source = _read(arguments.path("a record", source), columns, sample_time, delimiter, need, bar.tick)
+                    if source.read_as:
+                        ways.setdefault(source.read_as, []).append(source.name)
                 found.append(source)
             except RecordError as error:
                 refused.extend(error.problems)
+    if progress:
+        for way, names in ways.items():
+            more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+            console.note(f"read as: {', '.join(names[:LISTED])}{more}: {way}")
     if refused:
         raise RecordError(refused)
     return found
@@ -99,11 +113,12 @@ def read_record(
     """Read one data file.
 
     `columns`: our names to the file's (`{"t": "Time"}`), each the whole name (`session1/drive` in HDF5, `data.v` for
-    the field of a MATLAB struct), its last part or that without a unit, as long as only one column is meant; `t`, `v`
-    and `y` are found the same way. `sample_time`: seconds, for a file without time; `delimiter`: one character, default
-    a comma; `need`: the columns that must be there. When `y` is among them the record is meant for a fit: it then has
-    at least 16 samples and a drive that moves. Samples without a value in `t` or a needed column, and samples whose
-    time does not rise, are dropped with a note up to 5 % of the record. A time in another unit is converted to seconds.
+    the field of a MATLAB struct), its last part or that without a unit, as long as only one column is meant, or its
+    number, `#2`. `t`, `v` and `y` are found the same way, else by what the name of one column alone means (`Drive (V)`,
+    `Zeit [ms]`). `sample_time`: seconds, for a file without time; `delimiter`: one character, default what the file
+    shows; `need`: the columns that must be there. When `y` is among them the record is meant for a fit: it then has at
+    least 16 samples and a drive that moves. Samples without a value in `t` or a needed column, and samples whose time
+    does not rise, are dropped with a note up to 5 % of the record. A time in another unit is converted to seconds.
 
     Raises RecordError with every problem in the file.
     """
@@ -157,9 +172,10 @@ def _read(
     need: Sequence[str],
     tick: Callable[[float], None],
 ) -> Record:
-    reading = Reading(file, columns or {}, sample_time, delimiter or ",", tuple(need), tick)
-    if len(reading.delimiter) != 1 or reading.delimiter in "\"'.\r\n" or reading.delimiter.isalnum():
-        reading.problem(f'the delimiter "{printable(reading.delimiter)}" is not usable; give one character such as ;')
+    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick)
+    mark = reading.delimiter
+    if mark is not None and (len(mark) != 1 or mark in "\"'.\r\n" or mark.isalnum()):
+        reading.problem(f'the delimiter "{printable(mark)}" is not usable; give one character such as ;')
     if sample_time is not None and not (0.0 < sample_time < float("inf")):
         reading.problem(f"the sample time {sample_time:g} is not positive; give seconds per sample")
     reading.refuse_if_any()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.records.columns import Column, column
 from hystgen.records.reading import Reading, Table, one_dimension
+from hystgen.records.sampling import Step, from_number, is_named
 
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -30,30 +31,41 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
     with reading.parsing("a NumPy .npz archive"), np.load(stream, allow_pickle=False) as archive:
         columns = []
         ignored = []
+        steps: list[Step] = []
         members = frozenset(archive.zip.namelist())
         for name in archive.files:
-            length = _npy_length(archive, name if name in members else f"{name}.npy")
+            shape = _npy_shape(archive, name if name in members else f"{name}.npy")
+            length = one_dimension(shape)
             if length:
                 columns.append(column(name, length=length, read=partial(_npy_vector, archive, name)))
-            else:
+            elif not _scalar(name, "", partial(_npy_vector, archive, name), shape, steps):
                 ignored.append(name)
-        return reading.table(columns, ignored)
+        return reading.table(columns, ignored, steps=steps)
 
 
-def _npy_length(archive: Any, file: str) -> int:
-    """Length of an archived vector of numbers from its header alone; 0 for anything else."""
+def _scalar(name: str, of: str, read: Callable[[], NDArray[Any]], shape: tuple[int, ...], steps: list[Step]) -> bool:
+    """Whether one number beside the vectors says their sample rate, which is then among `steps`."""
+    if int(np.prod(shape)) != 1 or not is_named(name):
+        return False
+    step = from_number(name, float(read()[0]), of)
+    steps += [step] if step else []
+    return step is not None
+
+
+def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
+    """Shape of an archived array of numbers from its header alone; that of nothing for anything else."""
     with archive.zip.open(file) as member:
         header: Mapping[tuple[int, int], Callable[..., Any]] = {
             (1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0,
         }  # fmt: skip
         if member.read(len(npy.MAGIC_PREFIX)) != npy.MAGIC_PREFIX:
-            return 0
+            return (0,)
         member.seek(0)
         version = npy.read_magic(member)
         if version not in header:
-            return 0
+            return (0,)
         shape, _, dtype = header[version](member)
-    return one_dimension(shape) if dtype.kind in "fiub" else 0
+    return tuple(shape) if dtype.kind in "fiub" else (0,)
 
 
 def _npy_vector(archive: Any, name: str) -> NDArray[Any]:
@@ -67,16 +79,19 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
     with reading.parsing("a MATLAB v5 .mat file"):
         columns: list[Column] = []
         ignored: list[str] = []
+        steps: list[Step] = []
         vectors = _MatVectors(stream)
         for name, shape, kind in whosmat(stream):
             if kind == "struct":
-                _fields(_mat_variables(stream, [name])[name], f"{name}.", columns, ignored)
+                _fields(_mat_variables(stream, [name])[name], f"{name}.", columns, ignored, steps)
             elif kind in MATLAB_NUMBERS and one_dimension(shape):
                 vectors.add(name, one_dimension(shape))
                 columns.append(column(name, length=one_dimension(shape), read=partial(vectors.read, name)))
-            else:
+            elif kind not in MATLAB_NUMBERS or not _scalar(
+                name, "", partial(_mat_variable, stream, name), shape, steps
+            ):
                 ignored.append(name)
-        return reading.table(columns, ignored)
+        return reading.table(columns, ignored, steps=steps)
 
 
 def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, Any]:
@@ -85,6 +100,10 @@ def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, Any]:
     stream.seek(0)
     found: dict[str, Any] = loadmat(stream, variable_names=names)
     return found
+
+
+def _mat_variable(stream: IO[bytes], name: str) -> NDArray[Any]:
+    return np.asarray(_mat_variables(stream, [name])[name]).ravel()
 
 
 class _MatVectors:
@@ -114,7 +133,9 @@ class _MatVectors:
         return np.asarray(self._loaded[1].pop(name)).ravel()
 
 
-def _fields(struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str]) -> None:
+def _fields(
+    struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str], steps: list[Step]
+) -> None:
     """The vectors among the fields of a struct, and of the structs in it; lists of structs have none."""
     if struct.shape != (1, 1):
         ignored.append(folder[:-1])
@@ -122,8 +143,10 @@ def _fields(struct: NDArray[Any], folder: str, columns: list[Column], ignored: l
     for name in struct.dtype.names or ():
         value = struct[name][0, 0]
         if isinstance(value, np.ndarray) and value.dtype.names:
-            _fields(value, f"{folder}{name}.", columns, ignored)
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and one_dimension(value.shape):
+            _fields(value, f"{folder}{name}.", columns, ignored, steps)
+            continue
+        numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+        if numbers and one_dimension(value.shape):
             columns.append(column(name, folder, length=value.size, read=value.ravel))
-        else:
+        elif not numbers or not _scalar(name, folder, value.ravel, value.shape, steps):
             ignored.append(folder + name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,19 +12,41 @@ from typing import Any
 from numpy.typing import NDArray
 
 from hystgen.problems import printable
-from hystgen.records.units import split_unit
+from hystgen.records.sampling import Step
+from hystgen.records.units import is_time_unit, split_unit
 
 LISTED = 20
 """Columns or bad cells named one by one before the rest is only counted."""
 
 STANDARD = ("t", "v", "y")
 
-ALIASES = {
-    "t": ("t", "time", "times", "zeit", "timestamp"),
-    "v": ("v", "voltage", "volt", "drive", "input", "u", "command"),
-    "y": ("y", "displacement", "position", "pos", "output", "measured", "sensor", "disp"),
-    "u": ("u", "reference", "ref", "setpoint", "target"),
+MEANINGS = {
+    "t": frozenset(("t", "time", "times", "timestamp", "zeit", "temps", "tiempo")),
+    "v": frozenset(
+        ("v", "u", "voltage", "volt", "volts", "drive", "input", "spannung", "voltaje", "antrieb", "ansteuerung")
+    ),
+    "y": frozenset(
+        ("y", "displacement", "disp", "position", "pos", "output", "deflection", "elongation", "stroke", "weg",
+         "auslenkung", "déplacement", "deplacement", "desplazamiento")
+    ),
+}  # fmt: skip
+"""Words, one of which the name of a column has that may be meant where it is not called as we call it."""
+
+DECIDE = {
+    "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
+    "u": frozenset(("target", "reference", "ref", "setpoint", "desired", "commanded", "command", "soll", "sollwert")),
 }
+"""Words that say which column is meant, whatever other words stand beside them."""
+
+OTHERWISE = frozenset(
+    ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
+     "state", "offset", "gain", "scale", "constant", "range")
+)  # fmt: skip
+"""Words of names that belong to something else than the quantity itself."""
+
+_WORDS = re.compile(r"[^\W\d_]+")
+
+_HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 
 
 @dataclass(frozen=True)
@@ -32,7 +55,7 @@ class Column:
 
     `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: that without a unit,
     `drive`; `unit`: empty when the file gives none; `length`: samples, 0 where they are not counted before reading;
-    `read`: its numbers, an array of one dimension that nobody else holds.
+    `read`: its numbers, an array of one dimension that nobody else holds; `also`: another name that the file gives it.
     """
 
     name: str
@@ -41,6 +64,7 @@ class Column:
     unit: str = ""
     length: int = 0
     read: Callable[[], NDArray[Any]] | None = None
+    also: str = ""
 
     @property
     def folder(self) -> str:
@@ -49,16 +73,55 @@ class Column:
 
 
 def column(
-    name: str, folder: str = "", unit: str = "", length: int = 0, read: Callable[[], NDArray[Any]] | None = None
+    name: str,
+    folder: str = "",
+    unit: str = "",
+    length: int = 0,
+    read: Callable[[], NDArray[Any]] | None = None,
+    also: str = "",
 ) -> Column:
     """A column called `name` in `folder` (with its separator); a `unit` the file has beside the name wins over that
     in the name."""
     label, own_unit = split_unit(name)
-    return Column(folder + name, name, label, unit or own_unit, length, read)
+    return Column(folder + name, name, label, unit or own_unit, length, read, also)
+
+
+def meaning(c: Column) -> str:
+    """Which of our columns the words of a name mean; empty where they mean none, or more than one."""
+    plain = _words(c)
+    if plain & OTHERWISE:
+        return ""
+    timed = is_time_unit(c.unit)
+    found = {ours for ours, known in DECIDE.items() if plain & known}
+    found = found or {ours for ours, known in MEANINGS.items() if plain & known}
+    # What has a unit is a time if and only if it is one of time
+    if c.unit and timed != ("t" in found):
+        return ""
+    return found.pop() if len(found) == 1 else ""
+
+
+def _words(c: Column) -> set[str]:
+    """Words of a column's name, in lower case."""
+    # "Control Voltage of OutputChan1": what it is, not what it belongs to
+    quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
+    words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
+    # A capital T is a temperature more often than a time
+    return {word.casefold() for word in words if word != "T" or is_time_unit(c.unit)}
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """Mapping of our names to a file's: `t=Time,v=U,y=Pos`. Raises ValueError with what is wrong with it."""
+    """Mapping of our names to a file's: `t=Time,v=U,y=Pos`, or columns by their numbers from 1 on, `1,2,3` for t, v, y
+    and `1,2` for v, y, which become `#1` and so on. Raises ValueError with what is wrong with it."""
+    numbers = [part.strip() for part in text.split(",")]
+    if all(part.isdecimal() for part in numbers):
+        if len(numbers) not in (2, 3):
+            raise ValueError(
+                f"{len(numbers)} numbers of columns are given; 3 are time, drive and measured, 2 drive and measured, "
+                "others are written t=#1,v=#3"
+            )
+        if len(set(numbers)) < len(numbers) or any(int(number) == 0 for number in numbers):
+            raise ValueError(f'"{printable(text)}" names no columns; each has a number of its own, from 1 on')
+        return dict(zip(STANDARD[-len(numbers) :], (f"#{int(number)}" for number in numbers), strict=True))
     mapping: dict[str, str] = {}
     for part in text.split(","):
         ours, equals, theirs = (piece.strip() for piece in part.partition("="))
@@ -75,7 +138,11 @@ def parse_columns(text: str) -> dict[str, str]:
 
 
 class Finder:
-    """Finds the columns that are asked for; `problems` says what is wrong with the others."""
+    """Finds the columns that are asked for; `problems` says what is wrong with the others.
+
+    `understood`: those found by what their names mean, by our names; `steps`: what the file says of the sample rate of
+    the columns found, where it has no time.
+    """
 
     def __init__(
         self,
@@ -89,45 +156,99 @@ class Finder:
         self.ignored = ignored
         self.outside = outside
         self.problems: list[str] = []
+        self.understood: dict[str, Column] = {}
+        self.steps: list[Step] = []
+        self._unnamed: list[str] = []
+        self._asked: set[str] = set()
 
-    def find(self, need: Sequence[str], timed: bool) -> dict[str, Column]:
-        """Our names to columns. `need`: ours that must be there; `timed`: the file need not have a time."""
+    def find(self, need: Sequence[str], timed: bool, steps: Sequence[Step] = ()) -> dict[str, Column]:
+        """Our names to columns.
+
+        `need`: ours that must be there; `timed`: the user gives the sample time, so that the file need not have a time;
+        `steps`: what the file says of it, which counts only where it has no time.
+        """
         found: dict[str, Column] = {}
         wanted = dict.fromkeys([*need, *STANDARD, *self.mapping])
+        missing = []
         for ours in wanted:
             required = ours in self.mapping or (not timed if ours == "t" else ours in need)
             chosen = self._one(ours, required)
             if chosen is not None:
                 found[ours] = chosen
+            elif required and ours not in self._asked:
+                missing.append(ours)
+        # By their meaning only what is left: a name always comes first
+        for ours in missing:
+            chosen = None if ours in self.mapping else self._meant(ours, found)
+            if chosen is not None:
+                found[ours] = self.understood[ours] = chosen
+                continue
+            if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
+                self.steps = [step for step in steps if step.belongs(c.name for c in found.values())]
+            if ours not in self._asked and not (ours == "t" and self.steps):
+                self._missing(ours, self.mapping.get(ours, ours))
+        self._name_together()
         named = [found[ours] for ours in self.mapping if ours in found]
         for twice in dict.fromkeys(c.name for c in named if named.count(c) > 1):
             self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
         return found
 
+    def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
+        """The only column whose name means ours; a time is the first column with a unit of time, too."""
+        taken = {c.name for c in found.values()}
+        free = [c for c in self.columns if c.name and c.name not in taken]
+        meant = [c for c in free if meaning(c) == ours]
+        if not meant and ours == "t":
+            meant = [c for c in self.columns[:1] if c in free and is_time_unit(c.unit)]
+        if len(meant) > 1:
+            self._ask(ours, ours, meant)
+        return meant[0] if len(meant) == 1 else None
+
+    def _name_together(self) -> None:
+        """One question for all columns of which nothing is known."""
+        if len(self._unnamed) > 1:
+            *others, last = (f'"{ours}"' for ours in self._unnamed)
+            self.problems.append(
+                f"there are no columns {', '.join(others)} and {last} among {_listed(self.columns)}; name them with "
+                f'--columns "{",".join(f"{ours}=COLUMN" for ours in self._unnamed)}"'
+            )
+        elif self._unnamed:
+            (ours,) = self._unnamed
+            self.problems.append(
+                f'there is no column "{ours}" among {_listed(self.columns)}; name it with --columns "{ours}=COLUMN"'
+            )
+
     def _one(self, ours: str, required: bool) -> Column | None:
         theirs = self.mapping.get(ours, ours)
         # A path in an HDF5 file may be given from its root, as other tools print it
         exact = [c for c in self.columns if c.name in (theirs, theirs.removeprefix("/"))]
+        if not exact and theirs[:1] == "#" and theirs[1:].isdecimal():
+            place = int(theirs[1:])
+            exact = list(self.columns[place - 1 : place]) if place else []
         if len(exact) > 1:
+            self._asked.add(ours)
             self.problems.append(f'{len(exact)} columns are called "{printable(theirs)}"; give them different names')
             return None
         for matches in (
             exact,
             [c for c in self.columns if c.own == theirs],
             [c for c in self.columns if c.label == theirs],
+            [c for c in self.columns if c.also == theirs],
         ):
             if len(matches) == 1:
                 return matches[0]
             if matches:
                 if required:
-                    self.problems.append(
-                        f'{len(matches)} columns may be meant by "{printable(theirs)}": {_listed(matches)}; name one '
-                        f'with --columns "{ours}={printable(matches[0].name)}"'
-                    )
+                    self._ask(ours, theirs, matches)
                 return None
-        if required:
-            self._missing(ours, theirs)
         return None
+
+    def _ask(self, ours: str, theirs: str, matches: Sequence[Column]) -> None:
+        self._asked.add(ours)
+        self.problems.append(
+            f'{len(matches)} columns may be meant by "{printable(theirs)}": {_listed(matches)}; name one with '
+            f'--columns "{ours}={printable(matches[0].name)}"'
+        )
 
     def _missing(self, ours: str, theirs: str) -> None:
         if theirs in self.ignored:
@@ -148,18 +269,17 @@ class Finder:
         advice = self._advice(ours)
         if ours == "t" and "t" not in self.mapping:
             advice = "give --sample-time" + (f", or {advice}" if "did you mean" in advice else "")
+        elif ours not in self.mapping and "did you mean" not in advice:
+            self._unnamed.append(ours)
+            return
         self.problems.append(f'there is no column "{printable(theirs)}" among {_listed(self.columns)}; {advice}')
 
     def _advice(self, ours: str) -> str:
         """Which column may be meant, by its name without units, else how to name one."""
-        words = [
-            (c.name, c.own.casefold().replace("[", " ").replace("(", " ").replace("_", " ").split())
-            for c in self.columns
-        ]
-        for alias in ALIASES.get(ours, (ours,)):
-            for name, parts in words:
-                if parts and parts[0] == alias and self.mapping.get(ours) != name:
-                    return f'did you mean --columns "{ours}={printable(name)}"?'
+        known = MEANINGS.get(ours, frozenset()) | DECIDE.get(ours, frozenset()) | {ours}
+        for c in self.columns:
+            if _words(c) & known and self.mapping.get(ours) != c.name:
+                return f'did you mean --columns "{ours}={printable(c.name)}"?'
         wanted = self.mapping.get(ours, ours).casefold()
         close = difflib.get_close_matches(wanted, [c.name.casefold() for c in self.columns], 1)
         for c in self.columns:

@@ -1,4 +1,4 @@
-"""CSV with a header row, read in blocks: numpy's C reader takes those that are sound, the others go line by line.
+"""Text tables, read in blocks: numpy's C reader takes those that are sound, the others go line by line.
 
 A file of any size then needs little more memory than its columns, and every fault is told with its place.
 """
@@ -9,23 +9,31 @@ import io
 import os
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.problems import printable
+from hystgen.records import layout, lvm, pi_gcs, tektronix
+from hystgen.records.cells import BLANKS, COMMENT, MISSING, Dialect, is_comment, shape
+from hystgen.records.clock import Clock
 from hystgen.records.columns import LISTED, Column, column
+from hystgen.records.layout import Layout
 from hystgen.records.reading import Lines, Reading, Table
 from hystgen.records.record import Array
+from hystgen.records.text import texts
 from hystgen.words import counted
 
-BLOCK = 1 << 20
-"""Bytes read at a time; a longer line is none of a CSV file."""
+SAMPLE = 1 << 16
+"""Characters at the start of a file, in whole lines, that show its layout."""
 
-MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "infinity", "-infinity"))
-"""Cells, in lower case, that hold no value."""
+INSTRUMENTS: tuple[Callable[[Reading, Sequence[str]], Layout | None], ...] = (
+    lvm.layout, pi_gcs.layout, tektronix.layout,
+)  # fmt: skip
+"""Formats whose first lines say themselves what is where."""
 
 SPARE = 1.05
 """Rows are set aside for a file of so many times the rows that its first block makes expect."""
@@ -33,67 +41,67 @@ SPARE = 1.05
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     """Read a text file with one row a line."""
-    blocks = _texts(reading, stream)
-    skipped = 0
-    blank = True
+    blocks = texts(reading, stream)
+    sample = ""
+    while len(sample) < SAMPLE and (text := next(blocks, "")):
+        sample += text
+    if not sample.strip():
+        raise reading.refuse("is empty; record again or give another file")
+    found = _layout(reading, sample)
+    names = found.names
+    units = found.units or [""] * len(names)
+    also = found.also or [""] * len(names)
+    columns = [column(name, unit=units[k], also=also[k]) for k, name in enumerate(names)]
+    columns = [replace(c, unit="s") if k in found.clocks else c for k, c in enumerate(columns)]
+    chosen = reading.chosen(columns, line=found.header or 1, steps=found.steps)
+    if "t" in chosen and columns.index(chosen["t"]) in found.clocks:
+        reading.understood("times of day counted in seconds from the first")
+    body = _Body(reading, found, {ours: columns.index(c) for ours, c in chosen.items()}, _size(stream))
+    body.take(_below(sample, found.first))
     for text in blocks:
-        above, header, body = _split_header(text)
-        skipped += above
-        if header is not None:
-            break
-        blank = blank and not text.strip()
-    else:
-        raise reading.refuse(
-            "is empty; record again or give another file"
-            if blank
-            else "has no header row; the first line names the columns, for example t,v,y"
-        )
-    line = skipped + 1
-    names = _header(reading, header, line)
-    columns = [column(name) for name in names]
-    chosen = reading.chosen(columns, line=line)
-    body_reader = _Body(reading, names, [names.index(c.name) for c in chosen.values()], line, _size(stream))
-    body_reader.take(body)
-    for text in blocks:
-        body_reader.take(text)
-    return body_reader.table(columns, chosen)
+        body.take(text)
+    return body.table(columns, chosen)
 
 
-def _texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
-    """The file's text in blocks of whole lines that end in a line feed, as every line does but perhaps the last."""
-    first = True
-    latin = False
-    for data in _blocks(reading, stream):
-        if first and data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise reading.refuse("is UTF-16 text; save it as UTF-8")
-        if b"\0" in data:
-            raise reading.refuse("is not a text file; export CSV, .npz, .h5, Parquet or MATLAB .mat")
-        try:
-            text = data.decode("utf-8-sig" if first else "utf-8")
-        except UnicodeDecodeError:
-            text = data.decode("latin-1")
-            if not latin:
-                reading.notes.append("the text is not UTF-8; it was read as Latin-1")
-            latin = True
-        if "\r" in text:
-            text = text.replace("\r\n", "\n").replace("\r", "\n")
-        first = False
-        yield text
+def _layout(reading: Reading, sample: str) -> Layout:
+    """The layout that the first lines show, and what is said of it."""
+    start = sample[: sample.find("\n", SAMPLE) + 1] if len(sample) > SAMPLE else ""
+    lines = (start or sample).split("\n")
+    known = (each(reading, lines) for each in INSTRUMENTS)
+    found = next((each for each in known if each is not None), None) or layout.find(reading, lines)
+    if found.kind:
+        reading.understood(found.kind)
+    dialect = found.dialect
+    if not found.kind and dialect != Dialect() and (reading.delimiter is None or dialect.decimal != "."):
+        between = layout.DELIMITERS.get(dialect.delimiter, f'"{printable(dialect.delimiter)}"')
+        parts = [f"{between} between cells"] if len(found.names) > 1 else []
+        parts += ["decimal commas"] if dialect.decimal == "," else []
+        if parts:
+            reading.understood(" and ".join(parts))
+    if found.header is None and not found.kind:
+        reading.understood("no header")
+    elif found.header is not None and not found.kind and _is_below_text(lines, found.header):
+        reading.understood(f"header in line {found.header}")
+    if any(found.units) and not found.kind:
+        named = [f"{name} [{unit}]" for name, unit in zip(found.names, found.units, strict=True) if unit]
+        reading.understood(f"units {', '.join(map(printable, named[:LISTED]))}")
+    return found
 
 
-def _blocks(reading: Reading, stream: IO[bytes]) -> Iterator[bytes]:
-    rest = b""
-    while data := stream.read(BLOCK):
-        data = rest + data
-        # A carriage return at the end may be the first half of a line end
-        end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1
-        if end:
-            yield data[:end]
-        rest = data[end:]
-        if len(rest) > BLOCK:
-            raise reading.refuse(f"has a line of more than {BLOCK >> 20} MB; export one row a line")
-    if rest:
-        yield rest
+def _is_below_text(lines: Sequence[str], header: int) -> bool:
+    """Whether a header is a comment, or has lines above it that are none."""
+    above = (line for line in lines[: header - 1] if line.strip())
+    return is_comment(lines[header - 1]) or not all(map(is_comment, above))
+
+
+def _below(text: str, first: int) -> str:
+    """The text from a line on, counted from 1."""
+    start = 0
+    for _ in range(first - 1):
+        start = text.find("\n", start) + 1
+        if not start:
+            return ""
+    return text[start:]
 
 
 def _size(stream: IO[bytes]) -> int:
@@ -101,58 +109,51 @@ def _size(stream: IO[bytes]) -> int:
     return os.fstat(stream.fileno()).st_size
 
 
-def _split_header(text: str) -> tuple[int, str | None, str]:
-    """Number of lines above the header (blank, or comments that begin with #), the header, and what follows it."""
-    start = 0
-    skipped = 0
-    while start < len(text):
-        end = text.find("\n", start)
-        end = len(text) if end < 0 else end
-        line = text[start:end]
-        if line.strip() and not line.lstrip().startswith("#"):
-            return skipped, line, text[end + 1 :]
-        skipped += 1
-        start = end + 1
-    return skipped, None, ""
+@dataclass
+class _Fault:
+    """Something wrong, in words, where it is first, how many times it is there and where last."""
 
-
-def _header(reading: Reading, header: str, line: int) -> list[str]:
-    """Names of the columns. Raises RecordError where the line names none, or is separated by something else."""
-    names = [cell.strip() for _, cell in _cells(header, reading.delimiter)]
-    if all(_is_number(name) for name in names if name):
-        raise reading.refuse("the first line has numbers, not names; put a header such as t,v,y above them", line)
-    if len(names) == 1 and reading.delimiter not in header:
-        for other, option in ((";", '";"'), ("\t", "tab"), ("|", '"|"'), (" ", '" "'), (",", '","')):
-            if other in header.strip() and other != reading.delimiter:
-                raise reading.refuse(
-                    f"the header is one column, {printable(names[0])}; if its columns are separated otherwise, use "
-                    f"--delimiter {option}",
-                    line,
-                )
-    return names
+    text: str
+    line: int
+    column: int
+    times: int = 1
+    last: int = 0
 
 
 class _Body:
     """The rows below the header, as they come in."""
 
-    def __init__(self, reading: Reading, names: list[str], wanted: Sequence[int], line: int, size: int) -> None:
+    def __init__(self, reading: Reading, layout: Layout, wanted: Mapping[str, int], size: int) -> None:
         self.reading = reading
-        self.names = names
-        self.wanted = frozenset(wanted)
+        self.layout = layout
+        self.names = layout.names
+        self.dialect = layout.dialect
+        self.wanted = frozenset(wanted.values())
         self.size = size
+        # The time alone may be a time of day; elsewhere that is text
+        self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
+        self.clock = Clock()
         # Columns of numbers, as far as is known; those with text, and those called alike, are not stored
-        alike = Counter(names)
+        alike = Counter(self.names)
         self.stored: dict[int, Array] = {
-            k: np.empty(0) for k, name in enumerate(names) if name and (alike[name] == 1 or k in self.wanted)
+            k: np.empty(0) for k, name in enumerate(self.names) if name and (alike[name] == 1 or k in self.wanted)
         }
         self.text_columns: set[int] = set()
+        # Cells at the end of a line that have no name may be missing
+        self.fewest = max((k + 1 for k, name in enumerate(self.names) if name), default=len(self.names))
         self.rows = 0
-        self.line = line
+        self.line = layout.first - 1
         self.lines = Lines()
-        self.bad = 0
+        self.faults: dict[tuple[str, ...], _Fault] = {}
 
     def take(self, text: str) -> None:
         """Rows of one block of whole lines."""
+        another = text.find(self.layout.another) if self.layout.another else -1
+        if another >= 0:
+            raise self.reading.refuse(
+                f"has a second table in it ({self.layout.kind}); one file is one experiment, export each by itself",
+                self.line + 1 + text.count("\n", 0, another),
+            )
         lines = text.count("\n") + (not text.endswith("\n") and bool(text))
         if lines:
             cells = self._fast(text, lines)
@@ -170,8 +171,17 @@ class _Body:
     def table(self, columns: Sequence[Column], chosen: dict[str, Column]) -> Table:
         """Everything read so far. Raises RecordError when a cell or a line was wrong."""
         reading = self.reading
-        if self.bad > LISTED:
-            reading.problem(f"{self.bad - LISTED} more cells and lines are wrong; correct the export")
+        faults = list(self.faults.values())
+        for fault in faults[:LISTED]:
+            more = f" (and {fault.times - 1} more, the last in line {fault.last})" if fault.times > 1 else ""
+            reading.problem(fault.text + more, fault.line, fault.column)
+        if len(faults) > LISTED:
+            more_faults = sum(fault.times for fault in faults[LISTED:])
+            reading.problem(f"{more_faults} more cells and lines are wrong; correct the export")
+        if self.clock.problem:
+            reading.problem(self.clock.problem)
+        if self.layout.rows is not None and self.rows != self.layout.rows:
+            reading.notes.append(f"the file says that it has {self.layout.rows} samples, it has {self.rows}")
         reading.refuse_if_any()
         for x in self.stored.values():
             x.resize(self.rows, refcheck=False)
@@ -197,21 +207,31 @@ class _Body:
                 self.stored[k].resize(max(needed, expected), refcheck=False)
 
     def _fast(self, text: str, lines: int) -> NDArray[np.float64] | None:
-        """All cells by numpy's C reader; None when a line may have to be left out or told."""
+        """All cells by numpy's C reader; None when a line may have to be left out or has a fault."""
         stored = list(self.stored)
         everything = len(stored) == len(self.names)
-        if not everything and ("#" in text or not self._regular(text, lines)):
+        dialect = self.dialect
+        if not everything and (COMMENT.search(text) or not self._regular(text, lines)):
             return None
+        if dialect.decimal != ".":
+            if dialect.decimal == dialect.delimiter or "." in text:
+                return None
+            text = text.replace(dialect.decimal, ".")
+        clock = self.clock.copy()
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 cells = np.loadtxt(
-                    io.StringIO(text), delimiter=self.reading.delimiter, comments=None, ndmin=2, quotechar='"',
-                    usecols=None if everything else stored,
+                    io.StringIO(text), delimiter=None if dialect.delimiter == BLANKS else dialect.delimiter,
+                    comments=None, ndmin=2, quotechar='"', encoding=None, usecols=None if everything else stored,
+                    converters=None if self.clock_column is None else {self.clock_column: clock.seconds},
                 )  # fmt: skip
         except (ValueError, UserWarning):
             return None
-        return cells if cells.shape == (lines, len(stored)) else None
+        if cells.shape != (lines, len(stored)):
+            return None
+        self.clock = clock
+        return cells
 
     def _regular(self, text: str, lines: int) -> bool:
         """Whether every line has as many cells as the header; numpy looks only at those it is asked for."""
@@ -219,7 +239,17 @@ class _Body:
             data = np.frombuffer(text.encode("latin-1"), dtype=np.uint8)
         except UnicodeEncodeError:
             return False
-        ends, between = data == ord("\n"), data == ord(self.reading.delimiter)
+        ends = data == ord("\n")
+        if self.dialect.delimiter == BLANKS:
+            if '"' in text:
+                return False
+            blank = (data == ord(" ")) | (data == ord("\t")) | ends
+            # Where a cell begins; a line has one more than it has places between cells
+            between = ~blank & np.concatenate([[True], blank[:-1]])
+            extra = 1
+        else:
+            between = data == ord(self.dialect.delimiter)
+            extra = 0
         if '"' in text:
             quotes = data == ord('"')
             quoted = np.logical_xor.accumulate(quotes)
@@ -229,42 +259,36 @@ class _Body:
                 return False
             between &= ~quoted
         rows = np.append(np.flatnonzero(ends)[: lines - 1], len(data))
-        found = np.searchsorted(np.flatnonzero(between), rows)
-        return bool(np.all(np.diff(found, prepend=0) == len(self.names) - 1))
+        found = np.diff(np.searchsorted(np.flatnonzero(between), rows), prepend=0) - extra + 1
+        return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
         """Line by line: finds what is wrong and where, and takes what is merely missing."""
-        names, delimiter = self.names, self.reading.delimiter
+        names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []
         for line, row in enumerate(text.split("\n"), self.line + 1):
-            if not row.strip() or row.lstrip().startswith("#"):
+            if not row.strip() or is_comment(row):
                 continue
-            cells = _cells(row, delimiter)
-            if len(cells) != len(names):
-                self._wrong(f"{counted(len(cells), 'column')} where the header has {len(names)}; complete or remove "
-                            "the line", line, 1)  # fmt: skip
+            cells = self.dialect.cells(row)
+            if not self.fewest <= len(cells) <= len(names):
+                count = counted(len(cells), "column")
+                self._wrong(
+                    f"{count} where the header has {len(names)}; complete or remove the line", (count,), line, 1
+                )
                 continue
             lines.append(line)
             for k, numbers in values.items():
                 start, cell = cells[k]
                 try:
-                    number = float(cell)
-                    if "_" in cell:
-                        raise ValueError
+                    number = self._number(k, cell)
                 except ValueError:
                     number = float("nan")
-                    if cell.strip().lower() not in MISSING:
-                        if k not in self.wanted:
-                            self.text_columns.add(k)
-                            self.stored.pop(k, None)
-                        else:
-                            self._wrong(
-                                f'"{printable(cell.strip())}" in column "{printable(names[k])}" is no number; '
-                                + _cell_advice(cell),
-                                line,
-                                start + 1,
-                            )
+                    if k not in self.wanted:
+                        self.text_columns.add(k)
+                        self.stored.pop(k, None)
+                    else:
+                        self._bad_cell(k, cell, line, start + 1)
                 numbers.append(number)
             if len(values) > len(self.stored):
                 values = {k: values[k] for k in self.stored}
@@ -275,47 +299,30 @@ class _Body:
             self.lines.add(self.rows, np.array(lines))
         self.rows += len(lines)
 
-    def _wrong(self, text: str, line: int, column: int) -> None:
-        self.bad += 1
-        if self.bad <= LISTED:
-            self.reading.problem(text, line, column)
+    def _number(self, column: int, cell: str) -> float:
+        if column == self.clock_column and cell.strip().lower() not in MISSING:
+            return self.clock.seconds(cell)
+        return self.dialect.number(cell)
 
+    def _bad_cell(self, column: int, cell: str, line: int, place: int) -> None:
+        """A cell of a column that is needed is no number. The same fault in many cells is one problem."""
+        name = printable(self.names[column])
+        if column == self.clock_column:
+            kind, no, advice = "", "no time of day", "write every time as the first one"
+        else:
+            no = "no number"
+            kind, advice = self.dialect.fault(cell)
+        self._wrong(
+            f'"{printable(cell.strip())}" in column "{name}" is {no}; {advice}',
+            (kind,) if kind else (kind, name, shape(cell)),
+            line,
+            place,
+        )
 
-def _cells(line: str, delimiter: str) -> list[tuple[int, str]]:
-    """Cells of a line with the position at which each starts; quotes are taken off."""
-    if '"' not in line:
-        cells = []
-        start = 0
-        for cell in line.split(delimiter):
-            cells.append((start, cell))
-            start += len(cell) + 1
-        return cells
-    return list(_quoted_cells(line, delimiter))
-
-
-def _quoted_cells(line: str, delimiter: str) -> Iterator[tuple[int, str]]:
-    start = 0
-    quoted = False
-    for k in range(len(line) + 1):
-        if k == len(line) or (line[k] == delimiter and not quoted):
-            cell = line[start:k].strip()
-            if len(cell) >= 2 and cell[0] == cell[-1] == '"':
-                cell = cell[1:-1].replace('""', '"')
-            yield start, cell
-            start = k + 1
-        elif line[k] == '"':
-            quoted = not quoted
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return text.strip().lower() not in MISSING
-
-
-def _cell_advice(cell: str) -> str:
-    if "," in cell and _is_number(cell.replace(",", ".", 1)):
-        return "write decimals with a point"
-    return "write a number, or nothing where there is no value"
+    def _wrong(self, text: str, cause: tuple[str, ...], line: int, column: int) -> None:
+        fault = self.faults.get(cause)
+        if fault is None:
+            self.faults[cause] = _Fault(text, line, column)
+        else:
+            fault.times += 1
+            fault.last = line

@@ -16,6 +16,7 @@ from hystgen import extras
 from hystgen.records.array_files import MATLAB_NUMBERS
 from hystgen.records.columns import Column, column
 from hystgen.records.reading import Reading, Table, one_dimension
+from hystgen.records.sampling import Step, from_number, is_named
 
 SLICE = 1 << 18
 """Samples read at a time."""
@@ -48,6 +49,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
         columns: list[Column] = []
         ignored: list[str] = []
         outside: list[str] = []
+        steps: list[Step] = []
         join = "." if matlab else "/"  # MATLAB writes a field of a struct with a point
 
         def link(path: str, found: Any) -> None:
@@ -55,22 +57,48 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 outside.append(path.replace("/", join))
 
         def visit(path: str, found: Any) -> None:
-            if not isinstance(found, h5py.Dataset) or (matlab and path.split("/")[0] in _MATLAB_OWN):
+            if matlab and path.split("/")[0] in _MATLAB_OWN:
                 return
             *folders, name = path.split("/")
             folder = "".join(part + join for part in folders)
+            if not matlab:
+                of = f"{folder}{name}" if isinstance(found, h5py.Dataset) else f"{folder}{name}/"
+                steps.extend(_attributes(found, of))
+            if not isinstance(found, h5py.Dataset):
+                return
             length = _length(found, matlab)
             if found.external or found.is_virtual:
                 outside.append(folder + name)
             elif length:
                 unit = "" if matlab else _unit(found)
                 columns.append(column(name, folder, unit, length, partial(_vector, reading, found)))
+            elif (step := _scalar(found, name, folder, matlab)) is not None:
+                steps.append(step)
             else:
                 ignored.append(folder + name)
 
+        steps.extend(_attributes(file, ""))
         file.visititems(visit)
         file.visititems_links(link)
-        return reading.table(columns, ignored, outside)
+        return reading.table(columns, ignored, outside, steps)
+
+
+def _attributes(found: Any, of: str) -> list[Step]:
+    """What the attributes of a file, group or dataset say of the sample rate."""
+    numbers = {name: np.asarray(found.attrs[name]) for name in found.attrs if is_named(name)}
+    steps = [
+        from_number(name, float(value.ravel()[0]), of)
+        for name, value in numbers.items()
+        if value.dtype.kind in "fiu" and value.size == 1
+    ]
+    return [step for step in steps if step is not None]
+
+
+def _scalar(dataset: Any, name: str, folder: str, matlab: bool) -> Step | None:
+    """What one number beside the vectors says of their sample rate."""
+    if dataset.shape is None or dataset.dtype.kind not in "fiu" or dataset.size != 1 or not is_named(name):
+        return None
+    return from_number(name, float(np.asarray(dataset[()]).ravel()[0]), folder, "" if matlab else _unit(dataset))
 
 
 def _length(dataset: Any, matlab: bool) -> int:

@@ -12,10 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.problems import RecordError, printable
-from hystgen.records.columns import LISTED, Column, Finder, further_names
+from hystgen.records.columns import LISTED, STANDARD, Column, Finder, further_names
 from hystgen.records.no_value import no_value
 from hystgen.records.record import Array
+from hystgen.records.sampling import Step
 from hystgen.records.units import to_seconds
+
+AGREE = 1e-6
+"""Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
+
+
+NO_SECONDS = 1e11
+"""Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
 
 
 class Lines:
@@ -57,7 +65,9 @@ class Table:
 class Reading:
     """One file being read: what was asked for, and what is found to be wrong or worth a note.
 
-    `fills`: of each column with numbers that stand for no value which ones these are, in words.
+    `delimiter`: what separates cells, None where the file has to show it; `fills`: of each column with numbers that
+    stand for no value which ones these are, in words; `read_as`: what was understood that the file does not say in the
+    plainest way.
     """
 
     def __init__(
@@ -65,7 +75,7 @@ class Reading:
         file: str,
         columns: Mapping[str, str],
         sample_time: float | None,
-        delimiter: str,
+        delimiter: str | None,
         need: tuple[str, ...],
         tick: Callable[[float], None],
     ) -> None:
@@ -78,6 +88,11 @@ class Reading:
         self.problems: list[str] = []
         self.notes: list[str] = []
         self.fills: dict[str, str] = {}
+        self.read_as: list[str] = []
+
+    def understood(self, text: str) -> None:
+        """Something that was found out about the file, for the line that says how it was read."""
+        self.read_as.append(text)
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
         """Something for which the file is refused, with its place where it has lines."""
@@ -112,13 +127,35 @@ class Reading:
         ignored: Sequence[str] = (),
         outside: Sequence[str] = (),
         line: int | None = None,
+        steps: Sequence[Step] = (),
     ) -> dict[str, Column]:
-        """The columns that are asked for, by our names. Raises RecordError for those that are not there."""
+        """The columns that are asked for, by our names. Raises RecordError for those that are not there.
+
+        `steps`: what the file says of its sample rate; it counts where there is neither a time nor `sample_time`.
+        """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None)
+        found = finder.find(self.need, self.sample_time is not None, steps)
         for text in finder.problems:
             self.problem(text, line)
+        steps = finder.steps
+        if len({step.start for step in steps}) > 1:
+            starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
+            self.problem(f"the columns do not start together, {starts}; export them with one time", line)
+        if any(abs(step.seconds - steps[0].seconds) > AGREE * steps[0].seconds for step in steps):
+            said = " and ".join(dict.fromkeys(step.said for step in steps))
+            self.problem(f"there is no time, and the file has {said}; give --sample-time", line)
         self.refuse_if_any()
+        if finder.understood:
+            no_unit = "t" in finder.understood and not found["t"].unit
+            self.understood(
+                ", ".join(
+                    f"{ours} = {printable(c.own)}{' in seconds, as it has no unit' if ours == 't' and no_unit else ''}"
+                    for ours, c in sorted(found.items(), key=_standard_first)
+                )
+            )
+        if steps:
+            self.sample_time = steps[0].seconds
+            self.understood(f"time from {steps[0].said}")
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
@@ -136,13 +173,19 @@ class Reading:
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
             self.notes.append(f"columns {which} were left out: {', '.join(map(printable, names[:LISTED]))}{more}")
 
-    def table(self, columns: Sequence[Column], ignored: Sequence[str], outside: Sequence[str] = ()) -> Table:
+    def table(
+        self,
+        columns: Sequence[Column],
+        ignored: Sequence[str],
+        outside: Sequence[str] = (),
+        steps: Sequence[Step] = (),
+    ) -> Table:
         """The table of a file whose columns are read one by one.
 
         Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
         that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`).
         """
-        chosen = self.chosen(columns, ignored, outside)
+        chosen = self.chosen(columns, ignored, outside, steps=steps)
         lengths = {c.length for c in chosen.values()}
         if len(lengths) > 1:
             told = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
@@ -170,12 +213,22 @@ class Reading:
                 self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as none"
             x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
+        if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
+            name = printable(taken["t"].own)
+            raise self.refuse(
+                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit behind its '
+                f'name, "{name} [ms]"'
+            )
         if "t" in units:
             numbers["t"], note = to_seconds(numbers["t"], units["t"])
             if note:
                 self.notes.append(note)
             units["t"] = "s"
         return Table(numbers, units, lines)
+
+
+def _standard_first(entry: tuple[str, Column]) -> int:
+    return STANDARD.index(entry[0]) if entry[0] in STANDARD else len(STANDARD)
 
 
 def one_dimension(shape: tuple[int, ...]) -> int:

@@ -18,7 +18,8 @@ class Record:
     `name`: file name without its folder; `t`: seconds, strictly rising; `v`: drive (empty when the file has no such
     column and none was needed); `y`: measured displacement or None; `extra`: further numeric columns by name;
     `sample_time`: median step of `t`; `notes`: what was repaired or left out, one sentence each; `units`: the units
-    that the file gives, by column (`{"t": "s", "v": "V"}`), the numbers of `v` and `y` as they are in the file.
+    that the file gives, by column (`{"t": "s", "v": "V"}`), the numbers of `v` and `y` as they are in the file;
+    `read_as`: how the file was understood, empty where it is plain CSV or arrays under our names.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Record:
     sample_time: float = 1.0
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    read_as: str = ""
 
     def __len__(self) -> int:
         return len(self.t)

@@ -35,7 +35,9 @@ def repaired(reading: Reading, table: Table) -> Record:
     which = f"without a value in {' or '.join(dict.fromkeys(needed))}{f' ({fills})' if fills else ''}"
     _drop(reading, table, length, ~keep, which)
     reading.notes += [f"{name}: {said}" for name, said in reading.fills.items() if name not in needed]
-    if "t" in columns:
+    if "t" in columns and _repeats(columns["t"][keep]):
+        columns["t"] = _even(reading, table, columns["t"], keep)
+    elif "t" in columns:
         keep = _rising(reading, table, columns["t"], keep)
     samples = int(np.count_nonzero(keep))
     if samples < length:
@@ -60,7 +62,8 @@ def repaired(reading: Reading, table: Table) -> Record:
         t = np.arange(samples, dtype=np.float64) * step
     v: Array = columns.pop("v", np.empty(0, dtype=np.float64))
     y = columns.pop("y", None)
-    return Record(Path(reading.file).name, t, v, y, columns, step, tuple(reading.notes), table.units)
+    name, read_as = Path(reading.file).name, "; ".join(reading.read_as)
+    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as)
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:
@@ -79,6 +82,43 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
         )
     else:
         reading.notes.append(f"{counted(number, 'sample')} {which} dropped, {first}")
+
+
+def _repeats(t: Array) -> bool:
+    """Whether a time that never goes back stands still too often to be repaired: it is written with too few digits."""
+    steps = np.diff(t)
+    if not len(steps) or float(steps.min()) != 0.0 or float(steps.max()) == 0.0:
+        return False
+    return int(np.count_nonzero(steps == 0.0)) > REPAIRABLE * len(t)
+
+
+def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> Array:
+    """Times at the sample time given in place of times that repeat, as long as these do not speak against it."""
+    rows = np.flatnonzero(keep)
+    steps = np.diff(t[rows])
+    finest = float(np.min(steps[steps > 0.0]))
+    row = int(rows[int(np.argmin(steps)) + 1])
+    given = reading.sample_time
+    if given is None:
+        mean = float(t[rows[-1]] - t[rows[0]]) / float(rows[-1] - rows[0])
+        reading.problem(
+            f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, it is written in steps of "
+            f"{finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
+            table.line(row),
+        )
+        return t
+    even: Array = np.arange(len(t)) * given + t[rows[0]]
+    # Rounding to such steps moves a time by up to one of them; a sample may be counted to either neighbour
+    apart = float(np.ptp(even[rows] - t[rows]))
+    if apart > finest + given:
+        reading.problem(
+            f"the sample time {given:g} s given does not fit the time of the file: over the record they come apart by "
+            f"{apart:.3g} s; correct it, or export the time with more digits",
+            table.line(row),
+        )
+    else:
+        reading.notes.append(f"t is written in steps of {finest:.3g} s; the sample time {given:g} s given was used")
+    return even
 
 
 def _rising(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> NDArray[np.bool_]:

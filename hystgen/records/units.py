@@ -52,6 +52,20 @@ def split_unit(header: str) -> tuple[str, str]:
     return (name, unit) if name and known else (text, "")
 
 
+def unit_alone(text: str) -> str | None:
+    """The unit that a cell below a header holds, `s` or `[um]`, empty for none; None for a cell that is no unit."""
+    inside = re.fullmatch(r"\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\)", text.strip())
+    unit = text.strip() if inside is None else inside[1] or inside[2] or ""
+    if unit in ("", "-") or (inside is not None and inside[1] and not unit.isdecimal()):
+        return "" if unit == "-" else unit
+    return unit if _UNIT.fullmatch(_plain(unit)) or _plain(unit).casefold() in TIMES else None
+
+
+def is_time_unit(unit: str) -> bool:
+    """Whether a unit is one of time."""
+    return _plain(unit).casefold() in TIMES
+
+
 def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
     """Names of columns with their units, `v [V]`, wherever that is read back as the same name and unit."""
     made = []

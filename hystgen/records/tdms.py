@@ -1,0 +1,68 @@
+"""TDMS files of LabVIEW and other programs of NI, by npTDMS: channels in groups, with unit and sampling beside them."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen import extras
+from hystgen.records.columns import Column, column
+from hystgen.records.reading import Reading, Table
+from hystgen.records.sampling import Step
+
+_UNITS = ("unit_string", "NI_UnitDescription")
+
+NANO = 1e9
+
+
+def read_tdms(reading: Reading, stream: IO[bytes]) -> Table:
+    """Read a TDMS file: its channels of numbers, `group/channel`; time stamps as seconds from the first of them."""
+    try:
+        from nptdms import TdmsFile
+    except ImportError:
+        raise reading.refuse(
+            f"TDMS files need the package npTDMS; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat (v7)"
+        ) from None
+    with reading.parsing("a TDMS file"), TdmsFile.open(stream) as file:
+        columns: list[Column] = []
+        ignored: list[str] = []
+        steps: list[Step] = []
+        for group in file.groups():
+            for channel in group.channels():
+                folder = f"{group.name}/"
+                stamps = channel.dtype.kind == "M"
+                if len(channel) < 2 or not (stamps or channel.dtype.kind in "fiub"):
+                    ignored.append(folder + channel.name)
+                    continue
+                unit = "s" if stamps else _unit(channel)
+                read = partial(_vector, reading, channel)
+                columns.append(column(channel.name, folder, unit, len(channel), read))
+                steps += _steps(channel, folder + channel.name)
+        return reading.table(columns, ignored, steps=steps)
+
+
+def _unit(channel: Any) -> str:
+    return next((str(channel.properties[key]).strip() for key in _UNITS if channel.properties.get(key)), "")
+
+
+def _steps(channel: Any, name: str) -> list[Step]:
+    """The sampling of a waveform; that of a channel which is none has an increment of 0, or no such property."""
+    seconds = channel.properties.get("wf_increment")
+    if not isinstance(seconds, float | int) or not 0.0 < seconds < float("inf"):
+        return []
+    start = channel.properties.get("wf_start_time", "")
+    offset = channel.properties.get("wf_start_offset", 0.0)
+    begins = f"{start}{f' + {offset:g} s' if offset else ''}"
+    return [Step(float(seconds), f"wf_increment {seconds:g} s ({name})", name, begins)]
+
+
+def _vector(reading: Reading, channel: Any) -> NDArray[Any]:
+    numbers = np.asarray(channel[:])
+    if numbers.dtype.kind != "M":
+        return numbers
+    reading.notes.append(f"{channel.name} holds times of day; it was converted to seconds from its first")
+    seconds: NDArray[np.float64] = (numbers - numbers[0]).astype("timedelta64[ns]").astype(np.int64) / NANO
+    return seconds

@@ -1,0 +1,258 @@
+"""Files of instruments, written here by their makers' descriptions of the formats."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+from hystgen import extras
+from hystgen.records import Record, RecordError, parse_columns, read_record
+
+N = 50
+T = np.arange(N) * 0.001
+V = np.round(30.0 * np.sin(0.25 * np.arange(N)), 6)
+Y = np.round(0.4 * V - 2.0, 6)
+
+
+def put(path: Path, lines: Sequence[str], end: str = "\r\n") -> Path:
+    path.write_bytes((end.join(lines) + end).encode("latin-1"))
+    return path
+
+
+def check(record: Record, rest: float = 0.0) -> None:
+    assert record.t - record.t[0] == pytest.approx(T, abs=1e-12)
+    assert np.array_equal(record.v, V)
+    assert record.y is not None
+    assert np.array_equal(record.y, Y)
+    assert record.t[0] == pytest.approx(rest)
+
+
+def problem(path: Path, **options: Any) -> str:
+    with pytest.raises(RecordError) as caught:
+        read_record(path, **options)
+    (only,) = caught.value.problems
+    return only.removeprefix(str(path))
+
+
+# LabVIEW, by NI's specification of .lvm files -------------------------------------------------------------------------
+
+
+def lvm(
+    kept: str = "One",
+    separator: str = "Tab",
+    decimal: str = ".",
+    comment: bool = True,
+    steps: tuple[str, str] = ("1.000000E-3", "1.000000E-3"),
+) -> list[str]:
+    mark = "\t" if separator == "Tab" else ","
+    head = [
+        ("LabVIEW Measurement", ""), ("Writer_Version", "2"), ("Reader_Version", "2"), ("Separator", separator),
+        ("Decimal_Separator", decimal), ("Multi_Headings", "No"), ("X_Columns", kept), ("Time_Pref", "Relative"),
+        ("Operator", "Jane"), ("Date", "2024/03/05"), ("Time", "14:21:05.123"), ("***End_of_Header***", ""), ("", ""),
+        ("***Start_Special***", ""), ("Delta_X", "7"), ("***End_Special***", ""),
+        ("Channels", "2", ""), ("Samples", str(N), str(N), ""), ("Date", "2024/03/05", "2024/03/05", ""),
+        ("Y_Unit_Label", "V", "um", ""), ("X_Dimension", "Time", "Time", ""), ("X0", f"0{decimal}0", "0.0", ""),
+        ("Delta_X", *steps, ""), ("***End_of_Header***", "", "", ""),
+    ]  # fmt: skip
+    rows: list[tuple[str, ...]] = []
+    for t, v, y in zip(T, V, Y, strict=True):
+        one = {"One": ("{t}", "{v}", "{y}"), "No": ("", "{v}", "{y}"), "Multi": ("{t}", "{v}", "{t}", "{y}")}[kept]
+        rows.append(tuple(cell.format(t=f"{t:.6f}", v=f"{v:.6f}", y=f"{y:.6f}") for cell in one))
+    names = ("X_Value", "Drive", "X_Value", "Position") if kept == "Multi" else ("X_Value", "Drive", "Position")
+    if comment:
+        names = (*names, "Comment")
+    lines = [mark.join(cells) for cells in (*head, names)]
+    return lines + [mark.join(row).replace(".", decimal) for row in rows]
+
+
+@pytest.mark.parametrize("kept", ["One", "No", "Multi"])
+@pytest.mark.parametrize(("separator", "decimal"), [("Tab", "."), ("Tab", ","), ("Comma", ".")])
+@pytest.mark.parametrize("comment", [True, False])
+def test_labview(tmp_path: Path, kept: str, separator: str, decimal: str, comment: bool) -> None:
+    record = read_record(put(tmp_path / "a.lvm", lvm(kept, separator, decimal, comment)))
+    check(record)
+    assert record.units == ({"v": "V", "y": "um"} if kept == "No" else {"t": "s", "v": "V", "y": "um"})
+    assert record.extra == {}
+    assert record.notes == ()
+    assert record.read_as.startswith("LabVIEW measurement file; ")
+
+
+def test_labview_with_comments_and_faults(tmp_path: Path) -> None:
+    lines = lvm()
+    first = len(lines) - N
+    lines[first] += "\tstarted by hand"
+    check(read_record(put(tmp_path / "a.lvm", lines)))
+    bad = [*lines]
+    bad[first + 3] = bad[first + 3].replace(f"{V[3]:.6f}", "overload")
+    assert f':{first + 4}:10: error: "overload" in column "Drive" is no number' in problem(put(tmp_path / "b.lvm", bad))
+    several = [*lines, *lines[16:]]
+    assert "has a second table in it" in problem(put(tmp_path / "c.lvm", several))
+    text = problem(put(tmp_path / "d.lvm", lvm("Multi", steps=("1E-3", "2E-3"))))
+    assert "channels have times of their own" in text
+    cut = read_record(put(tmp_path / "e.lvm", lines[:-10]))
+    assert cut.notes == ("the file says that it has 50 samples, it has 40",)
+    assert "without a segment" in problem(put(tmp_path / "f.lvm", lines[:14]))
+
+
+# Tektronix, by what the manuals of MDO, MSO and DPO say of spreadsheet files ----------------------------------------
+
+
+def tektronix(label: str = "Drive,Sensor", unit: str = "V,V") -> list[str]:
+    return [
+        "Model,MSO3014", "Firmware Version,2.38", "", "Waveform Type,ANALOG", "Point Format,Y", "Horizontal Units,s",
+        "Horizontal Scale,0.004", "Horizontal Delay,0", "Sample Interval,0.001", f"Record Length,{N}",
+        "Gating,0.0% to 100.0%", "Probe Attenuation,10,1", f"Vertical Units,{unit}", "Vertical Offset,0,0",
+        "Vertical Scale,10,1", "Vertical Position,0,0", ",", ",", f"Label,{label}", "TIME,CH1,CH2",
+        *(f"{t - 0.02:.8e},{v:.6f},{y:.6f}" for t, v, y in zip(T, V, Y, strict=True)),
+    ]  # fmt: skip
+
+
+def test_tektronix(tmp_path: Path) -> None:
+    path = put(tmp_path / "tek0000ALL.csv", tektronix())
+    record = read_record(path)
+    check(record, -0.02)
+    assert record.units == {"t": "s", "v": "V", "y": "V"}
+    assert record.read_as == "Tektronix CSV; t = TIME, v = Drive, y = Sensor"
+    check(read_record(path, {"v": "CH1", "y": "Sensor"}), -0.02)
+    # Without labels nothing says which channel is which
+    path = put(tmp_path / "tek0001ALL.csv", tektronix(","))
+    assert problem(path) == (
+        ':20:1: error: there are no columns "v" and "y" among TIME, CH1, CH2; name them with --columns '
+        '"v=COLUMN,y=COLUMN"'
+    )
+    record = read_record(path, parse_columns("v=CH1,y=CH2"))
+    check(record, -0.02)
+    assert read_record(put(tmp_path / "a.csv", tektronix(unit="V,A"))).units["y"] == "A"
+
+
+# Keysight InfiniiVision and DAQ: two lines of header, UTF-16 with lines above it -------------------------------------
+
+
+def test_keysight(tmp_path: Path) -> None:
+    rows = [f"{t - 0.02:.8e},{v:.6f},{y:.6f}" for t, v, y in zip(T, V, Y, strict=True)]
+    path = put(tmp_path / "scope_1.csv", ["x-axis,1,2", "second,Volt,Volt", *rows])
+    text = problem(path)
+    assert 'there are no columns "v" and "y" among x-axis, 1, 2; name them' in text
+    for option in ("v=1,y=2", "1,2,3", "t=x-axis,v=1,y=2"):
+        record = read_record(path, parse_columns(option))
+        check(record, -0.02)
+        assert record.units == {"t": "s", "v": "Volt", "y": "Volt"}
+    check(read_record(path, parse_columns("t=#1,v=#2,y=#3")), -0.02)
+
+
+def test_keysight_daq(tmp_path: Path) -> None:
+    start = 14 * 3600 + 21 * 60 + 5
+    times = [f"03/05/2024 14:21:{int(start + t) % 60:02}:{round(1000 * t) % 1000:03}" for t in T]
+    rows = [f"{k + 1},{t},{v:.6f},{y:.6f}" for k, (t, v, y) in enumerate(zip(times, V, Y, strict=True))]
+    lines = ["Name:,Stage X", "Owner:,Jane", "", "Scan,Time,101 Drive (VDC),102 Sensor (VDC)", *rows]
+    (tmp_path / "a.csv").write_bytes("\r\n".join(lines).encode("utf-16"))
+    record = read_record(tmp_path / "a.csv")
+    check(record)
+    assert "UTF-16" in record.read_as
+    assert "times of day" in record.read_as
+    assert list(record.extra) == ["Scan"]
+
+
+# Physik Instrumente, by the description of GCS arrays ----------------------------------------------------------------
+
+
+def gcs(separator: int = 32, names: tuple[str, ...] = ("", ""), count: int = N) -> list[str]:
+    names = names if names[0] else ("Control Voltage of OutputChan1", "Actual Position of Axis1")
+    mark = chr(separator)
+    return [
+        "# REM E-709 data recorder", "#", "# VERSION = 1", "# TYPE = 1", f"# SEPARATOR = {separator}", "# DIM = 2",
+        "# SAMPLE_TIME = 0.001000", f"# NDATA = {count}", "#", *(f"# NAME{k} = {x}" for k, x in enumerate(names)), "#",
+        "# END_HEADER",
+        *(f"{v:.6f}{mark}{y:.6f}{' ' if separator == 32 else ''}" for v, y in zip(V, Y, strict=True)),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("separator", [32, 9, 44])
+def test_pi_gcs(tmp_path: Path, separator: int) -> None:
+    record = read_record(put(tmp_path / "record.dat", gcs(separator), "\n"))
+    check(record)
+    assert record.sample_time == 0.001
+    assert record.notes == ()
+    assert record.read_as == (
+        "PI GCS array; v = Control Voltage of OutputChan1, y = Actual Position of Axis1; time from SAMPLE_TIME 0.001 s "
+        "(line 7)"
+    )
+
+
+def test_pi_gcs_that_is_not_clear_or_damaged(tmp_path: Path) -> None:
+    names = ("Target Position of Axis1", "Current Position of Axis1")
+    path = put(tmp_path / "a.dat", gcs(names=names), "\n")
+    assert ':10:1: error: there is no column "v" among Target Position' in problem(path)
+    check(read_record(path, {"v": names[0]}))
+    cut = read_record(put(tmp_path / "b.dat", gcs(count=N + 1), "\n"))
+    assert cut.notes == ("the file says that it has 51 samples, it has 50",)
+    lines = [line.replace("= 0.001000", "= fast") for line in gcs()]
+    assert ":7:1: error: SAMPLE_TIME is no number of seconds" in problem(put(tmp_path / "c.dat", lines, "\n"))
+    lines = [line.replace("DIM = 2", "DIM = 3") for line in gcs()]
+    assert "2 columns where the header has 3" in problem(put(tmp_path / "d.dat", lines, "\n"), columns={"v": "#1"})
+
+
+# TDMS, written by npTDMS ----------------------------------------------------------------------------------------------
+
+
+def write_tdms(path: Path, channels: dict[str, Any], **properties: dict[str, Any]) -> Path:
+    with TdmsWriter(path) as file:
+        file.write_segment([ChannelObject("Scan", name, x, properties.get(name, {})) for name, x in channels.items()])
+    return path
+
+
+def test_tdms(tmp_path: Path) -> None:
+    wave = {"wf_increment": 0.001, "wf_start_offset": 0.0, "wf_start_time": np.datetime64("2024-03-05T14:21:05")}
+    path = write_tdms(
+        tmp_path / "a.tdms", {"Drive": V, "Sensor": Y, "Remark": ["a", "b"]},
+        Drive={**wave, "unit_string": "V"}, Sensor={**wave, "NI_UnitDescription": "um"},
+    )  # fmt: skip
+    record = read_record(path)
+    check(record)
+    assert record.units == {"v": "V", "y": "um"}
+    assert record.read_as == "v = Drive, y = Sensor; time from wf_increment 0.001 s (Scan/Drive)"
+    assert record.notes == ("columns without numbers were left out: Scan/Remark",)
+    check(read_record(path, parse_columns("v=Scan/Drive,y=Sensor")))
+    # Waveforms that start apart are not put side by side
+    later = {**wave, "wf_start_offset": 0.2}
+    path = write_tdms(tmp_path / "b.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor=later)
+    assert "the columns do not start together, Scan/Drive at 2024-03-05T14:21:05" in problem(path)
+    path = write_tdms(
+        tmp_path / "c.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor={**wave, "wf_increment": 0.002}
+    )
+    assert "give --sample-time" in problem(path)
+
+
+def test_tdms_with_times_and_without(tmp_path: Path) -> None:
+    path = write_tdms(tmp_path / "a.tdms", {"Time": T * 1e3, "Drive": V, "Sensor": Y}, Time={"unit_string": "ms"})
+    record = read_record(path)
+    assert record.t == pytest.approx(T, abs=1e-12)
+    assert np.array_equal(record.v, V)
+    stamps = np.datetime64("2024-03-05T14:21:05") + (np.arange(N) * 1000).astype("timedelta64[us]")
+    record = read_record(write_tdms(tmp_path / "b.tdms", {"Timestamp": stamps, "Drive": V, "Sensor": Y}))
+    check(record)
+    assert record.notes == ("Timestamp holds times of day; it was converted to seconds from its first",)
+    path = write_tdms(tmp_path / "c.tdms", {"v": V, "y": Y.astype(np.float32)}, v={"wf_increment": 0.0})
+    assert "give --sample-time" in problem(path)
+    assert read_record(path, sample_time=0.001).y == pytest.approx(Y, rel=1e-6)
+    (tmp_path / "d.tdms").write_bytes(b"something else, not written by LabVIEW")
+    assert "is not a TDMS file" in problem(tmp_path / "d.tdms")
+
+
+def test_tdms_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_tdms(tmp_path / "a.tdms", {"v": V, "y": Y})
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    assert problem(path) == (
+        f": error: TDMS files need the package npTDMS; {extras.install('formats')}, or export CSV, .npz or MATLAB .mat "
+        "(v7)"
+    )
+
+
+def test_other_rate_of_the_user_counts(tmp_path: Path) -> None:
+    assert read_record(put(tmp_path / "a.dat", gcs(), "\n"), sample_time=0.5).sample_time == 0.5
