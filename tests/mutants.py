@@ -14,6 +14,9 @@ CODES = "templates/front_fixed.c.j2"
 CORNERS = "c_runtime/corners_fixed.c"
 USUAL = "c_runtime/inverse_fixed.c"
 FRONT = "c_runtime/inverse_front_fixed.c"
+FLOAT = "c_runtime/corners_float.c"
+INVERSE = "c_runtime/inverse.c"
+FLOAT_FRONT = "c_runtime/inverse_front.c"
 CURVE = "c_runtime/curve.c"
 
 ROUND = """
@@ -63,6 +66,73 @@ class Mutant:
 
 
 KILLED = (
+    Mutant("a limit keeps no status", USUAL, "if (self->bits == 0) {", "if (self->bits < 8u) {", "outside", "q31"),
+    Mutant(
+        "a usual step is not taken back, float", INVERSE,
+        "if (self->before < m->here.input || self->before > m->here.input) {",
+        "if (self->before < m->here.input) {",
+        "plain", "float32",
+    ),
+    Mutant(
+        "a block beyond the limit is passed", FLOAT,
+        "s->reach > room ? HYSTGEN_REAL_MAX",
+        "s->reach > room + room ? HYSTGEN_REAL_MAX",
+        "above", "float32",
+    ),
+    Mutant(
+        "the limit is met late", FLOAT,
+        "if (t->segment[c->top].reach > room) {",
+        "if (t->segment[c->top].reach > room + room) {",
+        "above", "float32",
+    ),
+    Mutant(
+        "a turn keeps the limit", FLOAT,
+        "    m->here.rising = !m->here.rising;\n    m->limited = false;\n",
+        "    m->here.rising = !m->here.rising;\n",
+        "above", "float32",
+    ),
+    Mutant(
+        "a step back by rounding goes on", FLOAT,
+        "    cap = back ? x : cap;\n",
+        "",
+        "listed", "float32",
+    ),
+    Mutant(
+        "an answer steps back", FLOAT,
+        "m->here.output = back ? m->here.output : output;",
+        "m->here.output = output;",
+        "listed", "float32",
+    ),
+    Mutant(
+        "no number behind a commit keeps the commit", INVERSE,
+        "if (self->stepped && self->committed) {",
+        "if (self->stepped && !self->committed) {",
+        "plain", "float32",
+    ),
+    Mutant(
+        "the same behind a front", FLOAT_FRONT,
+        "self->stepped && self->committed ? self->returned : self->drive",
+        "self->drive",
+        "bent", "float32",
+    ),
+    Mutant(
+        "the plays do not go to a clamped drive", FLOAT_FRONT,
+        "if (clamped || (inside <= self->drive && inside >= self->drive)) {",
+        "if (inside <= self->drive && inside >= self->drive) {",
+        "curved", "float32",
+    ),
+    Mutant(
+        "plays of a start list are all left by rising moves", FLOAT,
+        "m->here.rising = k <= start->risen;",
+        "m->here.rising = true;",
+        "below", "float32",
+    ),
+    Mutant(
+        "a corner is passed only beyond it", FLOAT,
+        "if (m->here.depth > 1u && x >= c->pass[rising]) {",
+        "if (m->here.depth > 1u && x > c->pass[rising]) {",
+        "plain", "float32",
+    ),
     Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),
     Mutant(
         "a kink inside a block is not counted from", CORNERS, "c = k > before ? top : c;", "c = k > before ? c : c;",
