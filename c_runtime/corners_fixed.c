@@ -42,7 +42,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
                                 int64_t x, bool by_output, hystgen_kink_t *kink)
 {
     const int64_t to = hystgen_along(here, x);
-    const hystgen_corner_t *c = 0; /* held play k until it began to follow */
+    unsigned int held = here->depth; /* the corner of play k until it began to follow, or as many as there are */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
@@ -58,8 +58,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
         low = passed ? low : middle + 1u;
     }
     if (left < here->depth) {
-        c = &corner[left];
-        k = c->top;
+        held = left;
+        k = corner[left].top;
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const hystgen_corner_t *top = &corner[left - 1u];
@@ -72,11 +72,12 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
             k = begun ? middle : k;
             last = begun ? last : middle - 1u;
         }
-        c = k > before ? top : c;
+        held = k > before ? left - 1u : held;
     }
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
-    if (c) {
+    if (held < here->depth) {
+        const hystgen_corner_t *c = &corner[held];
         kink->input = c->input;
         kink->output = c->output;
         if (c->rose != here->rising) {
@@ -208,7 +209,7 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *her
     here->depth = 0;
     for (k = t->n; k > 0; --k) {
         const hystgen_segment_t *s = &t->segment[k];
-        const int64_t w = play[step * k];
+        const int64_t w = play[step > 0 ? k : 0u];
         here->rising = w + s->way / 2u <= 2147483647;
         here->input = (int32_t)(w + hystgen_along(here, s->way / 2u));
         here->output = aside + w * (int64_t)s->slope + hystgen_along(here, s->reach / 2);

@@ -53,13 +53,13 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hyst
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before `way`; `step` is the way, or the reach, of segment 1. */
-static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last,
-                                         hystgen_real_t way)
+/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of segment 1. */
+static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last, hystgen_real_t x)
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const bool before = way > step[4u * middle];
+        const unsigned int at = 4u * middle;
+        const bool before = x > step[at];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -226,8 +226,8 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, 
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = start->center[start->step * k][0] + hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
-        m->here.output = start->center[start->step * k][1] + hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
+        m->here.input = start->center[start->step > 0 ? k : 0u][0] + hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
+        m->here.output = start->center[start->step > 0 ? k : 0u][1] + hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
     }
     m->here.k = 0;
