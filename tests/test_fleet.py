@@ -137,7 +137,7 @@ def test_summary(units: Path, fleet: Path) -> None:
         "garbage": "failed", "nothing": "failed",
     }  # fmt: skip
     assert table["nothing"]["message"] == f"{units}/nothing.csv: error: is empty; record again or give another file"
-    assert table["garbage"]["message"].startswith(f"{units}/garbage.csv:1:1: error: the header is one column, ")
+    assert table["garbage"]["message"].startswith(f"{units}/garbage.csv:2:1: error: the first line has numbers, ")
     row, fit = table["SN_100"], hystgen.identify(units / "SN-100.csv")
     every = {r.part: r for r in fit.rows if r.model == "written" or r.part == "held out"}
     part = fit.parameters.model.pi
