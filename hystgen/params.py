@@ -181,9 +181,13 @@ def _data(parameters: Parameters) -> dict[str, Any]:
 def canonical_json(parameters: Parameters) -> str:
     """The one text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
-    A density stands as it was given, not as the plays made from it.
+    A density stands as it was given, not as the plays made from it. `emit.optimize` came later: it stands there only
+    where it is not the default, so that files without it keep their hash.
     """
-    return json.dumps(_data(parameters), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    data = _data(parameters)
+    if parameters.emit.optimize == "auto":
+        del data["emit"]["optimize"]
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def parameters_sha256(parameters: Parameters) -> str:

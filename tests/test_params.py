@@ -586,7 +586,7 @@ REFUSED = [
         '5:50: emit.engine: must be auto, corners or loop, not 5; choose one of them',
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',
-        '5:83: emit.x: unknown key; known here are operator, arithmetic, engine, drive_lsb, output_lsb',
+        '5:83: emit.x: unknown key; known here are operator, arithmetic, engine, optimize, drive_lsb, output_lsb',
     ]),
     case('emit_lsb', H + M + "emit: {drive_lsb: q, output_lsb: 1e31}\n", [
         '5:19: emit.drive_lsb: must be a number, not the text "q"; write it like 0.45',
@@ -906,6 +906,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
             "operator": draw(st.sampled_from(["inverse", "forward", "both"])),
             "arithmetic": draw(st.sampled_from(["float32", "float64", "q31", "q15"])),
             "engine": draw(st.sampled_from(["auto", "corners", "loop"])),
+            "optimize": draw(st.sampled_from(["auto", "speed", "size"])),
             "drive_lsb": draw(st.none() | sizes),
             "output_lsb": draw(st.none() | sizes),
         },
@@ -994,6 +995,7 @@ def test_canonical_json() -> None:
         '"pi":{"density":{"formula":"r","n":2,"p0":1.0,"r_max":1.0,"table":null,"tolerance":null},"initial_state":0.0}},'
         '"name":"a","sample_time":null,"units":{"input":"","output":""}}'
     )
+    assert '"optimize":"size"' in canonical_json(parse_parameters(H + M + "emit: {optimize: size}\n"))
     assert parameters_sha256(parse_parameters(H + M)) == "2fbbca7334d59f1230679aa4ffa15effc67782184e067b2ccb5010972c1b339f"
 
 
