@@ -220,9 +220,10 @@ class TestPage:
         assert page.declared.lower() == "doctype html"
         assert [title for title in page.sections if title != "lead"] == [
             "How good it is", "Loops", "Along time", "What is left, and what it depends on", "Initial loading curve",
-            "Thresholds and weights", "What was done to the data", "Warnings", "Drive range", "Parameters",
-            "Provenance",
+            "Thresholds and weights", "What was done to the data", "Warnings", "Drive range", "What the C costs",
+            "Parameters", "Provenance",
         ]  # fmt: skip
+        assert "bytes on a Cortex-M0+" in page.sections["What the C costs"]
 
     def test_verdict(self, page: Page, fitted: tuple[Fit, Record, Record]) -> None:
         fit = fitted[0]
