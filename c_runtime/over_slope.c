@@ -24,6 +24,6 @@ HYSTGEN_API int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned 
     const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> 32;
     const uint64_t quotient = hystgen_wide((uint32_t)((uint64_t)d >> 32), reciprocal) + low;
     const uint32_t high = (uint32_t)(quotient >> 32);
-    const uint32_t whole = (high & ((1u << shift) - 1u)) << (32u - shift) | (uint32_t)quotient >> shift;
+    const uint32_t whole = (high & (((uint32_t)1 << shift) - 1u)) << (32u - shift) | (uint32_t)quotient >> shift;
     return (int64_t)(((uint64_t)(high >> shift) << 32 | whole) + ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
