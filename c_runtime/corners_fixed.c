@@ -42,7 +42,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
                                 int64_t x, bool by_output, hystgen_kink_t *kink)
 {
     const int64_t to = hystgen_along(here, x);
-    unsigned int held = here->depth; /* the corner of play k until it began to follow, or as many as there are */
+    const hystgen_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
@@ -58,8 +58,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
         low = passed ? low : middle + 1u;
     }
     if (left < here->depth) {
-        held = left;
-        k = corner[left].top;
+        c = &corner[left];
+        k = c->top;
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const hystgen_corner_t *top = &corner[left - 1u];
@@ -72,12 +72,11 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
             k = begun ? middle : k;
             last = begun ? last : middle - 1u;
         }
-        held = k > before ? left - 1u : held;
+        c = k > before ? top : c;
     }
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
-    if (held < here->depth) {
-        const hystgen_corner_t *c = &corner[held];
+    if (c != NULL) {
         kink->input = c->input;
         kink->output = c->output;
         if (c->rose != here->rising) {

@@ -10,6 +10,7 @@
 
 #include <float.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 /* What the numbers of a model are: in floating point all of one type, in fixed point whole numbers as wide as they

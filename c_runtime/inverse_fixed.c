@@ -18,8 +18,7 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
     self->usual = false;
 }
 
-/* Steps are usual up to where another play begins to follow or something is limited, less what rounding can add. None is
-   while the output lies, by rounding, before the least reference of the move: one ahead could be limited as well. */
+/* Steps are usual up to the next kink or limit, less what rounding can add; none is from before the least reference. */
 HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const hystgen_place_t *here = &self->here;

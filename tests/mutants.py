@@ -135,8 +135,8 @@ KILLED = (
     ),
     Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),
     Mutant(
-        "a kink inside a block is not counted from", CORNERS, "held = k > before ? left - 1u : held;",
-        "held = k > before ? held : held;",
+        "a kink inside a block is not counted from", CORNERS, "c = k > before ? top : c;",
+        "c = k > before ? c : c;",
         "plain", "q31",
     ),
     Mutant(

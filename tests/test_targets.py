@@ -545,7 +545,7 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
     ],
 )
 def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, engine: str) -> None:
-    """RAM to the byte; code, which was measured for another model of the kind, to a tenth or 100 bytes."""
+    """RAM to the byte; code, which was measured for another model of the kind, to a fifth."""
     options = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
     header = emitted_files(model(name), **options)[f"{name}.h"]
     stated = {op: int(ram) for op, ram in re.findall(r"(forward|inverse) instance +(\d+) bytes", header)}
@@ -558,8 +558,8 @@ def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, e
         flash = [row.flash for row in report.rows if row.target == core and row.flash]
         taken = max(flash) - tables
         gcc = shutil.which(targets.find(core).gcc)
-        assert taken <= max(1.1 * most, most + 100)
-        assert taken >= 0.9 * most or not gcc, "of both compilers the larger one"
+        assert taken <= 1.2 * most
+        assert taken >= 0.8 * most or not gcc, "of both compilers the larger one"
 
 
 def test_reports_hold_the_figures(tmp_path: Path) -> None:

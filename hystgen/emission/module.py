@@ -349,7 +349,7 @@ def _details(parameters: Parameters, cascade: Cascade, options: Options, values:
         *values.precision,
         "",
         "Cost (32-bit target):",
-        f"    code at -O2       {estimate.code_words}, as measured for this kind of model",
+        f"    code at -O2       about {estimate.code_words}, as measured for such a model",
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),

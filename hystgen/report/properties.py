@@ -79,7 +79,7 @@ def cost(model: Model) -> str:
         return ""
     instances = (f"{op} instance {size} bytes of RAM" for op, size in found.memory.instances)
     return (
-        f"{options.operator} in {options.arithmetic}, engine {options.engine}; code at -O2 {found.code_words}; "
+        f"{options.operator} in {options.arithmetic}, engine {options.engine}; code at -O2 about {found.code_words}; "
         f"constant tables {found.memory.tables} bytes; {', '.join(instances)}"
     )
 
