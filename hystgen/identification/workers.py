@@ -24,6 +24,7 @@ import hystgen
 from hystgen import extras, writing
 from hystgen.identification.settings import Settings
 
+LOST = "the Dask scheduler was lost; the same command goes on from here"
 DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
 
 PATIENCE = 15.0
@@ -258,7 +259,10 @@ def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Gen
     finished = as_completed(loop=client.loop)
 
     def refill() -> None:
-        wanted = 2 * max(sum(client.nthreads().values()), 1)
+        try:
+            wanted = 2 * max(sum(client.nthreads().values()), 1)
+        except OSError:
+            raise SchedulerError(LOST) from None
         while len(under_way) < wanted and (task := next(waiting, None)) is not None:
             future = client.submit(work, task, pure=False)
             under_way[future] = task.unit
@@ -269,7 +273,7 @@ def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Gen
         for future in finished:
             unit = under_way.pop(future)
             if future.status not in ("finished", "error"):
-                raise SchedulerError("the Dask scheduler was lost; the same command goes on from here")
+                raise SchedulerError(LOST)
             try:
                 result = future.result()
             except KilledWorker:
