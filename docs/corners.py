@@ -26,9 +26,9 @@ model:
     thresholds: [0, 0.75, 1.5, 2.5, 3.5]
     weights: [0.5, 0.2, 0.2, 0.2, 0.2]
 """
-TURNS = (0.0, 9.5, 2.5, 8.0, 4.5)  # the drive turns at these, but for the first, where it starts
-END = 6.5
-NEXT = 8.6  # where a move that goes on has passed two corners
+TURNS = (0.0, 9.5, 2.5, 8.0, 4.5)  # V: start, then four turns of a shrinking swing, so that each leaves a corner
+END = (TURNS[4] + TURNS[3]) / 2  # V: short of corner 3, which is not passed yet
+NEXT = (TURNS[3] + TURNS[1]) / 2  # V: beyond corner 3 and short of corner 1
 BLUE, ORANGE, GREY = "#1f77b4", "#d95f02", "#777777"
 
 

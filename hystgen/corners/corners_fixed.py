@@ -9,7 +9,7 @@ from hystgen.corners.memory import DEPTH, INPUT, NEXT, OUTPUT, RISING, FixedMemo
 from hystgen.fixed import MARGIN, PLAY_MAX, PLAY_MIN, FixedTables, over_slope
 from hystgen.reference import OFFSET
 
-INPUT_MOST = 2**31 - 1
+INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
 Kink = tuple[Any, Any, int, int]
 """`hystgen_kink_t`: output, input, plays that follow from there on, corners that hold the others."""
