@@ -269,8 +269,8 @@ def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
 
 
 def neighbours(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
-    """The end of a trial, which may be all that matters; a trial with other numbers, on which the cost of floating point
-    in software depends; with its last jump, or a point shortly before, led elsewhere; and what is longer."""
+    """The end of a trial, which may be all that matters; a trial with other numbers, on which the cost of software
+    floating point depends; with its last jump, or a point shortly before, led elsewhere; and what is longer."""
     for length in (4, 8, 16, 32, 64):
         if length < len(trial):
             yield trial[-length:]
