@@ -115,7 +115,7 @@ def main() -> int:
         if given.one:
             files, doorways = walk(every[given.one])
             print(f"{given.one:40} {len(files):5} {doorways:9}")
-            print(*(f"    {file}" for file in files if given.verbose), sep="\n", end="")
+            print(*(f"    {file}" for file in files if given.verbose), sep="\n")
             return 0
     print(f"{'walk':40} files  doorways", flush=True)
     for name in every:
