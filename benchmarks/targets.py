@@ -35,10 +35,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import fixed_tables, reference, simulation, tables
-from hystgen.api import Model, emit_options
+from hystgen.compensator import fixed_tables, float_tables
+from hystgen.compensator.session import Session
+from hystgen.emission.calls import emit_options
 from hystgen.emission.text import operand, table
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 HERE = Path(__file__).resolve().parent
@@ -148,8 +151,8 @@ def walk(samples: int) -> Reals:
 def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
     """Operations and arguments that run drive records one after another, each from a reset."""
     x = np.concatenate([np.append(record[0], record) for record in records])
-    call = np.full(len(x), reference.OP_STEP, dtype=np.uint8)
-    call[np.cumsum([0, *(len(record) + 1 for record in records[:-1])])] = reference.OP_RESET
+    call = np.full(len(x), slots.OP_STEP, dtype=np.uint8)
+    call[np.cumsum([0, *(len(record) + 1 for record in records[:-1])])] = slots.OP_RESET
     return call, x
 
 
@@ -162,7 +165,7 @@ def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
     if case.operator == "forward":
         return drive
     cascade = case.model.cascade
-    session = simulation.Session(cascade, "forward")
+    session = Session(cascade, "forward")
     x = session.run(drive)[0] if call is None else session.operate(call, drive)[0]
     return np.asarray(x + cascade.pi.weights[0] * (drive - np.clip(drive, *cascade.input_range)) * bool(case.middle))
 
@@ -328,13 +331,13 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
         paths += [np.append(trial, on) for on in (trial[-2], -trial[-1])]
     call, drive = together(paths)
     asked = iter(np.split(given(case, drive, call=call), np.cumsum([len(path) + 1 for path in paths[:-1]])))
-    step, commit = reference.OP_STEP, reference.OP_COMMIT
+    step, commit = slots.OP_STEP, slots.OP_COMMIT
     operations: list[int] = []
     arguments: list[Any] = []
     ends = []
 
     def add(head: Any, *tail: tuple[int, Any]) -> None:
-        operations.extend([reference.OP_RESET, *[step] * (len(head) - 1), *(op for op, _ in tail)])
+        operations.extend([slots.OP_RESET, *[step] * (len(head) - 1), *(op for op, _ in tail)])
         arguments.extend([*head, *(x for _, x in tail)])
 
     for trial in found:
@@ -361,14 +364,14 @@ def ties() -> tuple[Any, Any]:
     arguments: list[float] = []
     for trial in TIES:
         words = trial.replace("commit ", "commit=").split()
-        operations += [reference.OP_RESET, *(reference.OP_COMMIT if "=" in w else reference.OP_STEP for w in words)]
+        operations += [slots.OP_RESET, *(slots.OP_COMMIT if "=" in w else slots.OP_STEP for w in words)]
         arguments += [0.0, *(float(w.rpartition("=")[2]) for w in words)]
     return np.array(operations, dtype=np.uint8), np.array(arguments, dtype=np.float32)
 
 
 def behind_commit(call: Any, x: Any) -> Any:
     """Which operations are steps of what is no number right behind a commit."""
-    return (call == reference.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == reference.OP_COMMIT)
+    return (call == slots.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == slots.OP_COMMIT)
 
 
 def plain(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
@@ -432,7 +435,7 @@ class Bench:
         else:
             dtype = np.dtype(case.arithmetic).type
             weights, thresholds = ([dtype(x) for x in numbers] for numbers in (pi.weights, pi.thresholds))
-            limits = [list(tables.inward(*pair, dtype)) for pair in ends]
+            limits = [list(float_tables.inward(*pair, dtype)) for pair in ends]
             sizes += f"#define TEXTBOOK_REAL_MAX {'FLT' if dtype is np.float32 else 'DBL'}_MAX\n"
             kind = "textbook_real_t"
         names = ("INPUT_MIN", "INPUT_MAX", "OUTPUT_MIN", "OUTPUT_MAX")
@@ -451,7 +454,7 @@ class Bench:
         image = self.image(case, "textbook")
         core = emulator.Core(case.target, image)
         x = given(case, drive, 2)
-        answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
+        answer, _ = core.run("textbook", "forward", np.full(len(x), slots.OP_STEP, dtype=np.uint8), x)
         cascade = case.model.cascade
         forward = case.operator == "forward"
         into, out = (2 * lsb for lsb in (lsbs(case) if forward else lsbs(case)[::-1]))
@@ -488,7 +491,7 @@ class Bench:
             calls.append(form(case, best)[:2])
         for call, x in calls:
             core = self.run(case, image, "corners", x, call)
-            returning = behind_commit(call, x)[call == reference.OP_STEP]
+            returning = behind_commit(call, x)[call == slots.OP_STEP]
             steps.append(core.counts[~returning])
             returns.append(core.counts[returning])
             stack = max(stack, core.stack)
@@ -511,7 +514,7 @@ class Bench:
     ) -> emulator.Core:
         """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
         numbers = case.model.tables(case.arithmetic, engine)
-        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8) if call is None else call, x)
+        calls = ("signal", np.full(len(x), slots.OP_STEP, dtype=np.uint8) if call is None else call, x)
         real = comparison.REALS[case.arithmetic]
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)
@@ -582,7 +585,7 @@ class Bench:
         that jump from the same place."""
         call, x, ends = form(case, found)
         counts = np.zeros(len(call))
-        counts[call == reference.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
+        counts[call == slots.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
         counts[behind_commit(call, x) != behind] = 0
         dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
         kept: dict[bytes, Reals] = {}

@@ -16,16 +16,16 @@ import numpy as np
 from modelfiles import FILES
 
 import hystgen
-from hystgen import reference
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import comparison, compilers
 
 CALLS = {
-    "step": reference.OP_STEP,
-    "init": reference.OP_INIT,
-    "reset": reference.OP_RESET,
-    "commit": reference.OP_COMMIT,
+    "step": slots.OP_STEP,
+    "init": slots.OP_INIT,
+    "reset": slots.OP_RESET,
+    "commit": slots.OP_COMMIT,
 }
 SANITIZERS = "address,undefined,float-cast-overflow"
 FLAGS = ["-std=c99", "-g", "-O1", f"-fsanitize=fuzzer,{SANITIZERS}", "-fno-sanitize-recover=all"]
@@ -109,7 +109,7 @@ class Target:
         wrong = answer.view(bits) != expected.answer.view(bits)
         gathered = 0
         for i, read in enumerate(table[:, 3]):
-            if call[i] in (reference.OP_INIT, reference.OP_RESET):
+            if call[i] in (slots.OP_INIT, slots.OP_RESET):
                 gathered = 0
             gathered |= int(expected.status[i])
             if read >= 0:

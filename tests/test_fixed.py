@@ -15,15 +15,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
 
-import hystgen
-from hystgen import compiled, fixed, fixed_tables, reference
-from hystgen.api import Model, cascade_of
+from hystgen.basics.problems import FormatError
+from hystgen.cascade import PI, Cascade
 from hystgen.cli import main
-from hystgen.corners import memory
-from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
-from hystgen.params import parse_parameters
-from hystgen.simulation import Session
-from hystgen.tables import FormatError
+from hystgen.compensator import fixed_tables, reference
+from hystgen.compensator.layout import FixedTables
+from hystgen.compensator.session import Session
+from hystgen.emission.calls import emitted_files
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.model import Model, cascade_of
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import fixed, slots
+from hystgen.plays.corners import memory
 
 ARITHMETICS = ("q31", "q15")
 
@@ -65,7 +69,7 @@ def models(draw: st.DrawFn) -> Cascade:
     return Cascade(PI(r.tolist(), p.tolist()), stages, offset, (low * scale, scale))  # type: ignore[arg-type]
 
 
-def built(model: Cascade, arithmetic: str, engine: str = "corners") -> tuple[fixed.FixedTables, fixed_tables.Format]:
+def built(model: Cascade, arithmetic: str, engine: str = "corners") -> tuple[FixedTables, fixed_tables.Format]:
     return fixed_tables.build(model, arithmetic, engine)
 
 
@@ -86,8 +90,8 @@ def test_errors_stay_inside_the_bound_and_engines_agree(arithmetic: str, model: 
     except FormatError:
         return
     for operator, first, bound in (
-        ("forward", reference.DRIVE_MIN, form.forward_error),
-        ("inverse", reference.OUTPUT_MIN, form.inverse_error),
+        ("forward", slots.DRIVE_MIN, form.forward_error),
+        ("inverse", slots.OUTPUT_MIN, form.inverse_error),
     ):
         assert bound is not None
         codes = records(*(int(x) for x in tables.limits[first : first + 2]), seed)
@@ -161,7 +165,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     model = load(name)
     tables, form = built(model, arithmetic)
     assert form.largest_sum < 2**62
-    plain = compiled.reference(tables, compiled=False)
+    plain = reference.reference(tables, compiled=False)
     whole = tables._replace(
         **{
             field: getattr(tables, field).astype(object)
@@ -173,15 +177,15 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     for inverse in (0, 1):
         state = plain.new_state(whole)
         plain.init(whole, state, inverse)
-        first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+        first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
         codes = records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7]
         answers = []
         for code in codes.tolist():
             answers.append((plain.inverse_step if inverse else plain.forward_step)(whole, state, code))
             assert max(map(abs, [state.real[memory.OUTPUT], *state.output])) <= form.largest_sum
             assert max(map(abs, [state.real[memory.INPUT], *state.input])) < 2**31
-        steps = np.full(len(codes), reference.OP_STEP)
-        assert answers == compiled.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
+        steps = np.full(len(codes), slots.OP_STEP)
+        assert answers == reference.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
 
 
 @given(
@@ -212,7 +216,7 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     tables, form = built(model, arithmetic)
     low, high = (int(x) for x in tables.limits[:2])
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
-    plain = compiled.reference(tables)
+    plain = reference.reference(tables)
     builder = fixed_tables._Builder(model, arithmetic, "corners", None, None)
     builder.build()
     for up in (1, 0) if tables.branches else (1,):
@@ -230,7 +234,7 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
 def test_converter_formats_are_honoured() -> None:
     text = FILES["plain"] + "\nemit: {arithmetic: q15, drive_lsb: 0.001, output_lsb: 0.002}\n"
     model = Model(parse_parameters(text, "plain.yaml"))
-    header = hystgen.api.emitted_files(model)["plain.h"]  # type: ignore[attr-defined]
+    header = emitted_files(model)["plain.h"]  # type: ignore[attr-defined]
     assert "PLAIN_DRIVE_LSB 0.001 " in header
     assert "PLAIN_OUTPUT_LSB 0.002" in header
     assert "PLAIN_DRIVE_MAX 4000" in header

@@ -25,7 +25,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hystgen import kernels
+from hystgen.front.tanh import kernels
 
 RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
 COMPILERS = ("gcc", "clang", "zig")

@@ -13,9 +13,9 @@ import pytest
 from mutants import Mutant
 
 import hystgen
-from hystgen.api import Model
 from hystgen.emission import module, runtime
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import comparison, host
 from hystgen.verification import run as verification
 from hystgen.verification.report import Report

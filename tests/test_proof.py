@@ -24,8 +24,8 @@ from granted import granted
 from modelfiles import FILES, head
 
 import hystgen
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers, signals
 from hystgen.verification.comparison import REALS
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled
-from hystgen.operators import followed
+from hystgen.basics import jit
+from hystgen.plays.operators import followed
 
 Array = NDArray[np.float64]
 
@@ -371,7 +371,7 @@ COMPILED: list[Callable[..., Any]] = [
 @functools.cache
 def code() -> Any:
     """The compiled recursions."""
-    return compiled.compile_together(COMPILED)
+    return jit.compile_together(COMPILED)
 
 
 def load() -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled
+from hystgen.basics import jit
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,7 @@ COMPILED: list[Callable[..., Any]] = [_close_segment, _segment_rows]
 
 @functools.cache
 def _compiled() -> Any:
-    return compiled.compile_together(COMPILED)
+    return jit.compile_together(COMPILED)
 
 
 def rows(v: Array, y: Array, thresholds: Array, states: Array, wanted: bool) -> Array:

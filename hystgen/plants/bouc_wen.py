@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, positive, signal
+from hystgen.basics import jit
+from hystgen.basics.checks import Array, finite, positive, signal
 from hystgen.plants import integration
 
 
@@ -65,7 +65,7 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
 
 @functools.cache
 def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_back, _on, _exactly])
+    return jit.compile_together([_back, _on, _exactly])
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, positive, signal
+from hystgen.basics import jit
+from hystgen.basics.checks import Array, finite, positive, signal
 from hystgen.plants import integration
 from hystgen.plants.integration import Slope
 
@@ -88,7 +88,7 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
 
 @functools.cache
 def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_dahl])
+    return jit.compile_together([_dahl])
 
 
 @dataclass(frozen=True)

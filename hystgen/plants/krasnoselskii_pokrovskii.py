@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, numbers, positive, signal, whole
+from hystgen.basics import jit
+from hystgen.basics.checks import Array, finite, numbers, positive, signal, whole
 
 
 def _add_kernel(v: Array, p1: float, p2: float, ramp: float, weight: float, state: float, out: Array) -> None:
@@ -24,7 +24,7 @@ def _add_kernel(v: Array, p1: float, p2: float, ramp: float, weight: float, stat
 
 @functools.cache
 def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_add_kernel])
+    return jit.compile_together([_add_kernel])
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, numbers, signal
+from hystgen.basics import jit
+from hystgen.basics.checks import Array, finite, numbers, signal
 
 Places = NDArray[np.int64]
 Everett = Callable[[Array, Array], Array]
@@ -53,7 +53,7 @@ def _add_up(corner: Places, change: Array, out: Array) -> None:
 
 @functools.cache
 def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_staircase, _add_up])
+    return jit.compile_together([_staircase, _add_up])
 
 
 @dataclass(frozen=True)

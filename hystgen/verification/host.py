@@ -11,8 +11,8 @@ import cffi
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import extras
-from hystgen.reference import Bytes
+from hystgen.basics import extras
+from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.comparison import Expected, compare
 from hystgen.verification.loading import LoadError, load

@@ -6,9 +6,10 @@ from typing import Any
 
 import cffi
 
-from hystgen import extras, writing
-from hystgen.api import Model
-from hystgen.emission import module, runtime
+from hystgen.basics import extras, writing
+from hystgen.emission import runtime
+from hystgen.emission.options import Options
+from hystgen.model import Model
 from hystgen.verification import compilers, sources
 from hystgen.verification.loading import load
 
@@ -21,7 +22,7 @@ class Instance:
     is no compiler, LoadError, and ValueError for another name.
     """
 
-    def __init__(self, model: Model, options: module.Options, compiler: str | None = None) -> None:
+    def __init__(self, model: Model, options: Options, compiler: str | None = None) -> None:
         if compiler is not None and compiler not in compilers.NAMES:
             raise ValueError(f"compiler {compiler!r} is none of {', '.join(compilers.NAMES)}")
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)

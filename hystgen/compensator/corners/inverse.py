@@ -1,0 +1,181 @@
+"""The inverse of plays alone: `c_runtime/inverse.c`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hystgen.compensator.layout import Tables
+from hystgen.plays.corners.corners_float import (
+    forget_line,
+    move_in_block,
+    move_to_input,
+    move_to_output,
+    start,
+    stop_in_block,
+)
+from hystgen.plays.corners.memory import (
+    BEFORE,
+    BEGIN,
+    CAP,
+    COMMITTED,
+    DEPTH,
+    GAIN,
+    INPUT,
+    LIMITED,
+    NEXT,
+    OUTPUT,
+    RETURNED,
+    RISING,
+    START,
+    STATUS,
+    STEPPED,
+    UNDO_DEPTH,
+    UNDO_INPUT,
+    UNDO_K,
+    UNDO_OUTPUT,
+    UNDO_RISING,
+    Curve,
+    K,
+    Memory,
+    Start,
+)
+from hystgen.plays.loop import PlayTables
+from hystgen.plays.slots import (
+    DRIVE_MAX,
+    DRIVE_MIN,
+    HELD,
+    INPUT_CLAMPED,
+    OFFSET,
+    OUTPUT_CLAMPED,
+    OUTPUT_MAX,
+    OUTPUT_MIN,
+    REAL_MAX,
+    ZERO,
+)
+
+
+def clamp_drive(t: PlayTables, v: Any) -> Any:
+    """v inside the range of the drive."""
+    if v < t.limits[DRIVE_MIN]:
+        return t.limits[DRIVE_MIN]
+    if v > t.limits[DRIVE_MAX]:
+        return t.limits[DRIVE_MAX]
+    return v
+
+
+def put_undo(t: Curve, m: Memory) -> None:
+    """Put the plays where they were before the last step."""
+    m.real[INPUT] = m.real[UNDO_INPUT]
+    m.real[OUTPUT] = m.real[UNDO_OUTPUT]
+    m.counts[K] = m.counts[UNDO_K]
+    m.counts[DEPTH] = m.counts[UNDO_DEPTH]
+    m.counts[RISING] = m.counts[UNDO_RISING]
+    forget_line(t, m)
+
+
+def set_undo(m: Memory) -> None:
+    """Remember where the plays are."""
+    m.real[UNDO_INPUT] = m.real[INPUT]
+    m.real[UNDO_OUTPUT] = m.real[OUTPUT]
+    m.counts[UNDO_K] = m.counts[K]
+    m.counts[UNDO_DEPTH] = m.counts[DEPTH]
+    m.counts[UNDO_RISING] = m.counts[RISING]
+
+
+def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
+    """Any other sample than a usual one."""
+    x = u - t.limits[OFFSET]
+    bits = 0
+    set_undo(m)
+    if not (t.limits[OUTPUT_MIN] <= u <= t.limits[OUTPUT_MAX]):
+        bits = INPUT_CLAMPED if -t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX] else HELD
+        x = (t.limits[OUTPUT_MIN] if u < t.limits[OUTPUT_MIN] else t.limits[OUTPUT_MAX]) - t.limits[OFFSET]
+    if bits == HELD:
+        if m.counts[STEPPED] and m.counts[COMMITTED]:
+            move_to_output(t.inverse, m, m.real[RETURNED])
+    elif m.counts[LIMITED] and (x >= m.real[INPUT] if m.counts[RISING] else x <= m.real[INPUT]):
+        bits |= OUTPUT_CLAMPED
+    elif x != m.real[INPUT] and not move_to_input(t.inverse, m, x):
+        stop_in_block(t.inverse, m, t.limits[DRIVE_MAX] if m.counts[RISING] else t.limits[DRIVE_MIN], x)
+        m.counts[LIMITED] = 1
+        bits |= OUTPUT_CLAMPED
+    m.real[BEFORE] = m.real[INPUT]
+    m.counts[STEPPED] = 1
+    m.counts[COMMITTED] = 0
+    m.counts[STATUS] |= bits
+    return m.real[OUTPUT]
+
+
+def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
+    """One sample."""
+    rising = m.counts[RISING]
+    x = u - t.limits[OFFSET]
+    if x > m.real[INPUT] if rising else x < m.real[INPUT]:
+        if x < m.real[NEXT] if rising else x > m.real[NEXT]:
+            m.real[BEFORE] = m.real[INPUT]
+            m.real[INPUT] = x
+            m.real[OUTPUT] = m.real[START] + (x - m.real[BEGIN]) * m.real[GAIN]
+            return m.real[OUTPUT]
+        if x < m.real[CAP] if rising else x > m.real[CAP]:
+            set_undo(m)
+            m.real[BEFORE] = x
+            if move_in_block(t.inverse, m, x):
+                return m.real[OUTPUT]
+    return inverse_search(t, m, u)
+
+
+def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
+    """What the drive really applied in place of the last answer."""
+    v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
+    if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
+        m.counts[STATUS] |= HELD
+        return
+    if v != applied:
+        m.counts[STATUS] |= INPUT_CLAMPED
+    if m.counts[STEPPED] and not m.counts[COMMITTED]:
+        m.real[RETURNED] = m.real[OUTPUT]
+    m.counts[COMMITTED] = 1
+    if m.real[BEFORE] != m.real[INPUT]:
+        set_undo(m)
+        m.real[UNDO_INPUT] = m.real[BEFORE]
+        m.real[UNDO_OUTPUT] = m.real[START] + (m.real[BEFORE] - m.real[BEGIN]) * m.real[GAIN]
+    put_undo(t.inverse, m)
+    move_to_output(t.inverse, m, v)
+    m.real[BEFORE] = m.real[INPUT]
+
+
+def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
+    """What init and reset have in common."""
+    start(t.inverse, m, which)
+    move_to_output(t.inverse, m, clamp_drive(t, m.real[OUTPUT]))
+    set_undo(m)
+    m.real[BEFORE] = m.real[INPUT]
+    m.counts[STEPPED] = 0
+    m.counts[COMMITTED] = 0
+    m.counts[STATUS] = 0
+
+
+def inverse_init(t: Tables, m: Memory) -> None:
+    """Start memory of the parameter file."""
+    inverse_begin(t, m, t.inverse_first)
+
+
+def inverse_reset(t: Tables, m: Memory, u: Any) -> None:
+    """All plays 0, status cleared, then one ordinary step."""
+    inverse_begin(t, m, t.inverse_zero)
+    inverse_step(t, m, u)
+
+
+def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
+    """Let the actuator be at drive v, in range or not, before the next sample."""
+    move_to_output(t.inverse, m, v)
+    set_undo(m)
+    m.real[BEFORE] = m.real[INPUT]
+
+
+COMPILED: list[Callable[..., Any]] = [
+    clamp_drive, put_undo, set_undo, inverse_search, inverse_step, inverse_commit,
+    inverse_begin, inverse_init, inverse_reset, inverse_visit,
+]  # fmt: skip
+INLINED: set[Callable[..., Any]] = {inverse_step}
