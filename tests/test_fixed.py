@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
 
+from hystgen.basics.jit import plain
 from hystgen.basics.problems import FormatError
 from hystgen.cascade import PI, Cascade
 from hystgen.cli import main
@@ -165,7 +166,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     model = load(name)
     tables, form = built(model, arithmetic)
     assert form.largest_sum < 2**62
-    plain = reference.reference(tables, compiled=False)
+    operations = reference.operations(tables)
     whole = tables._replace(
         **{
             field: getattr(tables, field).astype(object)
@@ -175,13 +176,15 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         }
     )  # fmt: skip
     for inverse in (0, 1):
-        state = plain.new_state(whole)
-        plain.init(whole, state, inverse)
+        state = reference.new_state(whole)
+        with plain():
+            operations.init(whole, state, inverse)
         first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
         codes = records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7]
         answers = []
         for code in codes.tolist():
-            answers.append((plain.inverse_step if inverse else plain.forward_step)(whole, state, code))
+            with plain():
+                answers.append((operations.inverse_step if inverse else operations.forward_step)(whole, state, code))
             assert max(map(abs, [state.real[memory.OUTPUT], *state.output])) <= form.largest_sum
             assert max(map(abs, [state.real[memory.INPUT], *state.input])) < 2**31
         steps = np.full(len(codes), slots.OP_STEP)
@@ -195,7 +198,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
 def test_nearest_rounds_ties_away_from_zero(x: int, bits: int) -> None:
     exact = Fraction(x, 2**bits)
     expected = math.floor(exact + Fraction(1, 2)) if exact >= 0 else -math.floor(-exact + Fraction(1, 2))
-    assert fixed.nearest(x, bits) == expected
+    assert fixed.nearest.py_func(x, bits) == expected
 
 
 @given(d=st.integers(0, 2**61), seed=st.integers(0, 1000))
@@ -205,7 +208,7 @@ def test_the_reciprocal_divides_to_the_nearest(d: int, seed: int) -> None:
         slope = int(tables.slope[k])
         if d // slope < 2**32:
             allowed = Fraction(1, 2) + Fraction(d, slope * 2**31) + Fraction(1, 2**8)
-            assert abs(int(fixed.over_slope(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
+            assert abs(int(fixed.over_slope.py_func(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
 
 
 @pytest.mark.parametrize("name", ["curved", "two_branches", "mixed", "bent", "behind"])
@@ -216,15 +219,15 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     tables, form = built(model, arithmetic)
     low, high = (int(x) for x in tables.limits[:2])
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
-    plain = reference.reference(tables)
+    reference_code = reference.operations(tables)
     builder = fixed_tables._Builder(model, arithmetic, "corners", None, None)
     builder.build()
     for up in (1, 0) if tables.branches else (1,):
         exact = np.asarray(model.front(codes * float(form.drive_lsb), bool(up)))
-        w = np.array([plain.front_forward(tables, code, up) for code in codes])
+        w = np.array([reference_code.front_forward(tables, code, up) for code in codes])
         gap = np.abs(w * float(builder.step) - exact).max() / float(builder.step)
         assert gap <= builder.front[1 - up].error + 1e-4
-        back = np.array([plain.front_inverse(tables, x, up)[0] for x in w])
+        back = np.array([reference_code.front_inverse(tables, x, up)[0] for x in w])
         slopes = np.abs(np.diff(exact)) / float(form.drive_lsb)
         slack = (builder.front[3 - up].error / 2.0 ** int(tables.below[2])) + 0.5
         per_code = builder.front[1 - up].error * float(builder.step) / (slopes.min() * float(form.drive_lsb))

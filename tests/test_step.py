@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
 
+from hystgen.basics.jit import plain
 from hystgen.cascade import Cascade
 from hystgen.compensator import reference, tables
 from hystgen.front.tanh.model import TanhEnvelope
@@ -179,9 +180,7 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
-    code = reference.reference(numbers, compiled=False)
-    state = code.new_state(numbers)
-    code.init(numbers, state, int(inverse))
+    code, state = reference.operations(numbers), reference.new_state(numbers)
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range
@@ -193,7 +192,9 @@ def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]
         ]
     )
     answers, status = np.zeros(len(x)), np.zeros(len(x), np.int64)
-    code.run(numbers, state, int(inverse), op, x, answers, status)
+    with plain():
+        code.init(numbers, state, int(inverse))
+        code.run(numbers, state, int(inverse), op, x, answers, status)
     return x, answers, status, np.array([low, high])
 
 

@@ -1,20 +1,29 @@
-"""Numba-compiled twins of plain Python functions, made when they are first needed.
+"""Functions that numba compiles when they are first called, or first needed by another one.
 
-The functions of the bit reference and of the operators run as ordinary Python (short signals, no start-up cost) and,
-unchanged, compiled (long signals). Compiled code is cached on disk; its cache key contains the source of every
-function that takes part, so that a change in a helper can never leave a stale caller behind. The cache saves time and
-is never needed: where no folder can be written to there is none, and files of it that cannot be read are made again.
+    @jit
+    def followed(state, x, r): ...
+
+`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python that
+stands there, as `followed.py_func` is anywhere. Numba is imported with the first call that needs it.
+
+Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
+in a helper can never leave a stale caller behind. The cache saves time and is never needed: where no folder can be
+written to there is none, and files of it that cannot be read are made again.
 """
 
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import functools
 import hashlib
 import inspect
 import types
-from collections.abc import Callable, Collection, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, Generic, ParamSpec, TypeVar, overload
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 # Called once, before the first function is compiled that is not in the cache, with a word to the user
 announce: Callable[[str], None] | None = None
@@ -28,34 +37,80 @@ EVERY_TIME = (
 # The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
 
-
-def bind_together(functions: Sequence[Callable[..., Any]]) -> types.SimpleNamespace:
-    """Copies of `functions`, given callees first, that call each other by name whatever module they are from."""
-    return _bound(functions, lambda _, twin: twin)
+_plain = contextvars.ContextVar("plain", default=False)
 
 
-def compile_together(
-    functions: Sequence[Callable[..., Any]], inlined: Collection[Callable[..., Any]] = ()
-) -> types.SimpleNamespace:
-    """Compile `functions`, given callees first, so that they call each other's compiled form by name.
+@contextlib.contextmanager
+def plain() -> Iterator[None]:
+    """Inside, functions run as plain Python, for short signals: there is nothing to compile or to load."""
+    before = _plain.set(True)
+    try:
+        yield
+    finally:
+        _plain.reset(before)
 
-    Those in `inlined` become part of their callers: handing over a model's many tables costs more than they compute.
-    """
-    import numba
 
-    _listen()
-    sources = "".join(inspect.getsource(function) for function in functions) + _constants(functions) + repr(OPTIONS)
-    mark = hashlib.sha256(sources.encode()).hexdigest()[:12]
+class Jit(Generic[P, R]):
+    """A function that runs compiled; `py_func` is its Python."""
 
-    def compiled(function: Callable[..., Any], twin: types.FunctionType) -> Any:
-        twin.__qualname__ = f"{twin.__name__}_{mark}"
-        how = {**OPTIONS, "inline": "always" if function in inlined else "never"}
-        made = numba.njit(**how)(twin)
+    def __init__(self, function: Callable[P, R], inline: bool) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self.targetoptions = {**OPTIONS, "inline": "always" if inline else "never"}
+        """options of numba, which looks here for those of a function that others call"""
+
+    def __call__(self, *given: P.args, **named: P.kwargs) -> R:
+        function = self.py_func if _plain.get() else self.dispatcher
+        return function(*given, **named)
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of it."""
+        import numba
+
+        _listen()
+        function = self.py_func
+        assert isinstance(function, types.FunctionType)
+        twin = types.FunctionType(
+            function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+        )
+        twin.__module__ = function.__module__
+        twin.__qualname__ = f"{function.__name__}_{self.mark}"
+        made = numba.njit(**self.targetoptions)(twin)
         with contextlib.suppress(RuntimeError):  # no folder that can be written to
             made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
         return made
 
-    return _bound(functions, compiled)
+    @property
+    def _numba_type_(self) -> Any:
+        """Numba's type of the function where another one calls it."""
+        return self.dispatcher._numba_type_
+
+    @functools.cached_property
+    def mark(self) -> str:
+        """What its compiled code depends on, as a word: its source and that of all that it calls, and constants."""
+        text, functions = repr(OPTIONS), [self]
+        for function in functions:
+            text += inspect.getsource(function.py_func) + repr(function.targetoptions)
+            names = inspect.getclosurevars(function.py_func)
+            for name, value in sorted({**names.globals, **names.nonlocals}.items()):
+                if isinstance(value, int | float | tuple):  # numba freezes them into the compiled code
+                    text += f"{name} = {value!r}\n"
+                elif isinstance(value, Jit) and not any(value is each for each in functions):
+                    functions.append(value)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+@overload
+def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
+@overload
+def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
+def jit(function: Callable[..., Any] | None = None, /, *, inline: bool = False) -> Any:
+    """Have a function compiled; `inline` makes it part of its callers, since handing over a model's many tables costs
+    more than a short function computes."""
+    if function is None:
+        return functools.partial(Jit, inline=inline)
+    return Jit(function, inline)
 
 
 @functools.cache
@@ -64,6 +119,10 @@ def _cache_class() -> Any:
     from numba.core.caching import FunctionCache
 
     class Cache(FunctionCache):
+        def _index_key(self, sig: Any, codegen: Any) -> Any:
+            # The name holds the mark of everything that the code depends on; numba would pickle what a closure holds
+            return sig, codegen.magic_tuple(), self._py_func.__qualname__
+
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             try:
                 return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
@@ -77,30 +136,6 @@ def _cache_class() -> Any:
                 super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
     return Cache
-
-
-def _bound(
-    functions: Sequence[Callable[..., Any]], finish: Callable[[Callable[..., Any], types.FunctionType], Any]
-) -> types.SimpleNamespace:
-    made: dict[str, Any] = {}
-    for function in functions:
-        assert isinstance(function, types.FunctionType)
-        scope = {**function.__globals__, **made}
-        twin = types.FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
-        twin.__module__ = function.__module__
-        made[function.__name__] = finish(function, twin)
-    return types.SimpleNamespace(**made)
-
-
-def _constants(functions: Sequence[Callable[..., Any]]) -> str:
-    """The module constants that the functions read; numba freezes them into the compiled code."""
-    seen: dict[str, str] = {}
-    for function in functions:
-        scope = function.__globals__
-        for name in function.__code__.co_names:
-            if isinstance(scope.get(name), int | float | tuple):
-                seen[name] = repr(scope[name])
-    return repr(sorted(seen.items()))
 
 
 def _cache_folder() -> str | None:

@@ -48,8 +48,8 @@ class Session:
         )
         self.tables = self._build()
         self._range, self._cascade = cascade.input_range, cascade
-        self._code = reference.reference(self.tables)
-        self.state = self._code.new_state(self.tables)
+        self._code = reference.operations(self.tables)
+        self.state = reference.new_state(self.tables)
         self.init()
 
     def init(self) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import importlib
-import pkgutil
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ _FIRST = (
 
 
 def _catalogue() -> tuple[str, ...]:
-    found = [each.name for each in pkgutil.iter_modules(__path__) if each.ispkg]
+    found = [path.parent.name for path in Path(__file__).parent.glob("*/model.py")]
     return tuple(sorted(found, key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name)))
 
 

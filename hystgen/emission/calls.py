@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from hystgen.basics import arguments
 from hystgen.compensator import engines
-from hystgen.emission import files, module, stale
+from hystgen.emission import files, module
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, as_model, check_arithmetic
+
+if TYPE_CHECKING:
+    from hystgen.emission.stale import Difference
 
 Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
 
@@ -90,6 +93,8 @@ def differences(source: Sources, output: str | os.PathLike[str] = ".", **options
 @arguments.taking(emit_options, "emit")
 def stale_files(
     source: Sources, output: str | os.PathLike[str] = ".", **options: str | None
-) -> list[stale.Difference]:
+) -> list[Difference]:
     """The differences behind the sentences of `differences`."""
+    from hystgen.emission import stale
+
     return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))

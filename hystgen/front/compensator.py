@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.front.dead_zone.compensator import dead_zone
 from hystgen.front.stage import StageTables
 from hystgen.front.tanh.compensator import envelope_forward, envelope_inverse
 from hystgen.plays.slots import DEAD_ZONE
 
 
+@jit
 def front_forward(t: StageTables, v: Any, ascending: int) -> Any:
     """w = G[v] on one branch, stage by stage from the drive."""
     w = v
@@ -25,6 +26,7 @@ def front_forward(t: StageTables, v: Any, ascending: int) -> Any:
     return w
 
 
+@jit
 def front_inverse(t: StageTables, w: Any, ascending: int) -> tuple[Any, int]:
     """v = G^-1[w] on one branch, stages in reverse order, and whether an envelope's argument was limited."""
     v = w
@@ -39,6 +41,3 @@ def front_inverse(t: StageTables, w: Any, ascending: int) -> tuple[Any, int]:
             v, one = envelope_inverse(t, first, v)
             limited = limited | one
     return v, limited
-
-
-FRONT: list[Callable[..., Any]] = [envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse]

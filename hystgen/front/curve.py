@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.front.stage import CurveTables
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, FINE
@@ -14,6 +15,7 @@ HALF = 1 << 30
 FORWARD, INVERSE = 0, 2
 
 
+@jit
 def curve(t: CurveTables, which: int, x: Any) -> Any:
     """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece that x lies on, h = 0 .. 1 along it."""
     j = t.first[which]
@@ -31,6 +33,7 @@ def curve(t: CurveTables, which: int, x: Any) -> Any:
     return y
 
 
+@jit
 def front_forward(t: CurveTables, v: Any, ascending: int) -> Any:
     """w = G[v] on one branch."""
     if t.fronts:
@@ -38,6 +41,7 @@ def front_forward(t: CurveTables, v: Any, ascending: int) -> Any:
     return v << t.limits[FINE]
 
 
+@jit
 def front_inverse(t: CurveTables, w: Any, ascending: int) -> tuple[Any, int]:
     """v = G^-1[w] on one branch, one code beyond the range where w lies beyond it; whether an envelope limits w."""
     if not t.fronts:

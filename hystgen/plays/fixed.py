@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
+from hystgen.basics.jit import jit
 from hystgen.plays.loop import PlayTables, State, loop_output
 from hystgen.plays.slots import MARGIN, PLAY_MAX, PLAY_MIN, Reals
 
@@ -29,6 +30,7 @@ class FixedPlayTables(PlayTables, Protocol):
     def shift(self) -> Reals: ...
 
 
+@jit
 def nearest(x: Any, bits: Any) -> Any:
     """x / 2^bits to the nearest whole number, ties away from zero."""
     if bits == 0:
@@ -39,6 +41,7 @@ def nearest(x: Any, bits: Any) -> Any:
     return (x + half) >> bits
 
 
+@jit
 def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
     """d / slope[k] to the nearest whole number, d not negative."""
     r = t.reciprocal[k]
@@ -47,6 +50,7 @@ def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
     return ((quotient >> (shift - 1)) + 1) >> 1
 
 
+@jit
 def going(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
     """Input of the plays that is d further on in output than w, kept near the range of the plays' input."""
     step = over_slope(t, d, k)
@@ -61,6 +65,7 @@ def going(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
     return w - step
 
 
+@jit
 def loop_solve(t: FixedPlayTables, s: State, output: Any) -> Any:
     """Input of the plays that gives `output`, taking along the plays one by one."""
     here = loop_output(t, s)

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from hystgen.basics.jit import jit
 from hystgen.plays.slots import ZERO, Counts, Reals
 
 PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
@@ -56,18 +57,21 @@ def new_state(t: PlayTables) -> State:
 # ---------------------------------------------------------------- loop_absorb.c, loop_solve.c
 
 
+@jit
 def loop_rest(s: State, w: Any) -> None:
     """Every play holds w."""
     for i in range(len(s.play)):
         s.play[i] = w
 
 
+@jit
 def loop_start(s: State, start: Reals) -> None:
     """Each play holds its own start value."""
     for i in range(len(s.play)):
         s.play[i] = start[i]
 
 
+@jit
 def loop_absorb(t: PlayTables, s: State, w: Any) -> None:
     """play_r[w] = max(w - r, min(w + r, play)), play by play."""
     for i in range(len(s.play)):
@@ -81,6 +85,7 @@ def loop_absorb(t: PlayTables, s: State, w: Any) -> None:
         s.play[i] = upper
 
 
+@jit
 def loop_output(t: PlayTables, s: State) -> Any:
     """p_0 play_0 + p_1 play_1 + ..., in this order."""
     total = t.limits[ZERO]
@@ -89,6 +94,7 @@ def loop_output(t: PlayTables, s: State) -> Any:
     return total
 
 
+@jit
 def loop_solve(t: LoopTables, s: State, output: Any) -> Any:
     """Input of the plays that gives `output`, letting go of the largest thresholds one by one."""
     rising = output >= loop_output(t, s)

@@ -7,20 +7,18 @@ the README.
 
 from __future__ import annotations
 
-import functools
-import types
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics import jit
 from hystgen.basics.checks import samples
+from hystgen.basics.jit import jit
 
 Array = NDArray[np.float64]
 
 
+@jit
 def followed(state: float, x: float, r: float) -> float:
     """State of a play of threshold r after its input has gone to `x`."""
     low = x - r
@@ -32,6 +30,7 @@ def followed(state: float, x: float, r: float) -> float:
     return state
 
 
+@jit
 def _play_into(v: Array, r: float, state: float, out: Array) -> float:
     for k in range(len(v)):
         state = followed(state, v[k], r)
@@ -39,6 +38,7 @@ def _play_into(v: Array, r: float, state: float, out: Array) -> float:
     return state
 
 
+@jit
 def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
     # Four side by side, since each by itself waits for its own last sample
     fours = len(r) // 4 * 4
@@ -53,6 +53,7 @@ def _plays_into(v: Array, r: Array, states: Array, out: Array) -> None:
         _play_into(v, r[i], states[i], out[i])
 
 
+@jit
 def _play_sum_into(v: Array, r: Array, states: Array, p: Array, out: Array) -> None:
     for k in range(len(v)):
         out[k] = 0.0
@@ -72,6 +73,7 @@ def _play_sum_into(v: Array, r: Array, states: Array, p: Array, out: Array) -> N
             out[k] += p[i] * state
 
 
+@jit
 def _weighted_into(p: Array, rows: Array, out: Array) -> None:
     for k in range(len(out)):
         out[k] = 0.0
@@ -81,6 +83,7 @@ def _weighted_into(p: Array, rows: Array, out: Array) -> None:
                 out[k] += p[i] * rows[i, k]
 
 
+@jit
 def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) -> None:
     for k in range(len(v)):
         state = state + (v[k] - previous)  # a repeated sample adds nothing
@@ -92,14 +95,6 @@ def _stop_into(v: Array, r: float, previous: float, state: float, out: Array) ->
         out[k] = state
 
 
-COMPILED: list[Callable[..., Any]] = [followed, _play_into, _plays_into, _play_sum_into, _weighted_into, _stop_into]
-
-
-@functools.cache
-def _code() -> types.SimpleNamespace:
-    return jit.compile_together(COMPILED)
-
-
 def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     """Play operator: `s_k = max(v_k - r, min(v_k + r, s_(k-1)))`, started at `start` (1)(2).
 
@@ -109,7 +104,7 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
         raise ValueError("a play threshold is not negative")
     signal = samples(v)
     out = np.empty_like(signal)
-    _code()._play_into(signal, float(threshold), float(start), out)
+    _play_into(signal, float(threshold), float(start), out)
     return out
 
 
@@ -125,7 +120,7 @@ def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
         raise ValueError("play thresholds are a list of numbers that are not negative")
     states = np.full(r.shape, start, dtype=np.float64)
     out = np.empty((len(r), len(signal)))
-    _code()._plays_into(signal, r, states, out)
+    _plays_into(signal, r, states, out)
     return out
 
 
@@ -134,14 +129,14 @@ def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array
     signal = samples(v)
     out = np.empty_like(signal)
     some = np.flatnonzero(weights)
-    _code()._play_sum_into(signal, thresholds[some], start[some], weights[some], out)
+    _play_sum_into(signal, thresholds[some], start[some], weights[some], out)
     return out
 
 
 def weighted_sum(weights: Array, rows: Array) -> Array:
     """`weights @ rows` (N,), without rows of weight 0, added one after the other: of plays it is their `play_sum`."""
     out = np.empty(rows.shape[1])
-    _code()._weighted_into(weights, rows, out)
+    _weighted_into(weights, rows, out)
     return out
 
 
@@ -154,7 +149,7 @@ def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
         raise ValueError("a stop threshold is not negative")
     signal = samples(v)
     out = np.empty_like(signal)
-    _code()._stop_into(signal, float(threshold), float(start), 0.0, out)
+    _stop_into(signal, float(threshold), float(start), 0.0, out)
     return out
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.jit import plain
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays import slots
@@ -41,7 +42,7 @@ class _Textbook:
 
     def __init__(self, tables: Tables | FixedTables) -> None:
         self.tables = tables
-        self.code = reference.reference(tables, compiled=False)
+        self.code = reference.operations(tables)
         self.kind = tables.threshold.dtype.type
         self.r = tables.threshold[1:].astype(float)
         self.begin(slots.OP_INIT)
@@ -55,14 +56,16 @@ class _Textbook:
 
     def drive_at(self, w: float, branch: int) -> float:
         """The drive that gives the input w of the plays, or one beyond the range."""
-        return float(self.code.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
+        with plain():
+            return float(self.code.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
 
     def move(self, drive: float) -> None:
         """The drive goes there."""
         if drive != self.drive and not np.isnan(self.drive):
             self.rising = int(drive > self.drive)
         self.drive = drive
-        self.w = float(self.code.front_forward(self.tables, self.kind(drive), self.rising))
+        with plain():
+            self.w = float(self.code.front_forward(self.tables, self.kind(drive), self.rising))
         self.s = np.clip(self.s, self.w - self.r, self.w + self.r)
 
 

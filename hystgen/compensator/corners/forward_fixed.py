@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.compensator.corners.inverse import clamp_drive
 from hystgen.compensator.layout import FixedTables
 from hystgen.front.curve import front_forward
@@ -14,6 +14,7 @@ from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import CODE_MAX, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED, SATURATED
 
 
+@jit
 def code(t: FixedTables, m: FixedMemory) -> Any:
     """Output code for the memory as it is, limited to the type."""
     found = nearest(m.real[OUTPUT], t.limits[FRACTION])
@@ -26,6 +27,7 @@ def code(t: FixedTables, m: FixedMemory) -> Any:
     return found
 
 
+@jit
 def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """The actuator is at drive v, which decides the direction of its move and so the branch."""
     if v > m.real[DRIVE]:
@@ -36,6 +38,7 @@ def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
     plays_step(t, m, front_forward(t, v, m.counts[ASCENDING]))
 
 
+@jit(inline=True)
 def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     """One sample."""
     inside = clamp_drive(t, v)
@@ -45,6 +48,7 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     return code(t, m)
 
 
+@jit
 def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
     """What init and reset have in common; `first` as in `FixedTables.applied`."""
     start(t, m, play)
@@ -54,23 +58,20 @@ def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
     m.counts[STATUS] = 0
 
 
+@jit
 def forward_init(t: FixedTables, m: FixedMemory) -> None:
     """Start memory of the parameter file."""
     forward_begin(t, m, t.start, 0)
 
 
+@jit
 def forward_reset(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """All plays 0, status cleared, then one ordinary step."""
     forward_begin(t, m, t.zero, 1)
     forward_step(t, m, v)
 
 
+@jit
 def forward_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     forward_arrive(t, m, v)
-
-
-COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, code, forward_arrive, forward_step, forward_begin, forward_init, forward_reset, forward_visit,
-]  # fmt: skip
-INLINED: set[Callable[..., Any]] = {forward_step}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
 from hystgen.front.compensator import front_forward
 from hystgen.plays.corners.corners_float import plays_step, start
@@ -12,6 +12,7 @@ from hystgen.plays.corners.memory import ASCENDING, DRIVE, OUTPUT, STATUS, Memor
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
 
 
+@jit
 def forward_arrive(m: Memory, v: Any) -> None:
     """The actuator is at drive v, which decides the direction of its move and so the branch."""
     if v > m.real[DRIVE]:
@@ -21,6 +22,7 @@ def forward_arrive(m: Memory, v: Any) -> None:
     m.real[DRIVE] = v
 
 
+@jit(inline=True)
 def forward_step(t: Tables, m: Memory, v: Any) -> Any:
     """One sample."""
     if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
@@ -33,6 +35,7 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
     return plays_step(t.forward, m, front_forward(t, v, m.counts[ASCENDING])) + t.limits[OFFSET]
 
 
+@jit
 def forward_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
     """What init and reset have in common; `first` as in `Tables.applied`."""
     start(t.forward, m, which)
@@ -41,24 +44,21 @@ def forward_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
     m.counts[STATUS] = 0
 
 
+@jit
 def forward_init(t: Tables, m: Memory) -> None:
     """Start memory of the parameter file."""
     forward_begin(t, m, t.forward_first, 0)
 
 
+@jit
 def forward_reset(t: Tables, m: Memory, v: Any) -> None:
     """All plays 0, status cleared, then one ordinary step."""
     forward_begin(t, m, t.forward_zero, 1)
     forward_step(t, m, v)
 
 
+@jit
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     forward_arrive(m, v)
     plays_step(t.forward, m, front_forward(t, v, m.counts[ASCENDING]))
-
-
-COMPILED: list[Callable[..., Any]] = [
-    forward_arrive, forward_step, forward_begin, forward_init, forward_reset, forward_visit,
-]  # fmt: skip
-INLINED: set[Callable[..., Any]] = {forward_step}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
 from hystgen.plays.corners.corners_float import (
     forget_line,
@@ -55,6 +55,7 @@ from hystgen.plays.slots import (
 )
 
 
+@jit
 def clamp_drive(t: PlayTables, v: Any) -> Any:
     """v inside the range of the drive."""
     if v < t.limits[DRIVE_MIN]:
@@ -64,6 +65,7 @@ def clamp_drive(t: PlayTables, v: Any) -> Any:
     return v
 
 
+@jit
 def put_undo(t: Curve, m: Memory) -> None:
     """Put the plays where they were before the last step."""
     m.real[INPUT] = m.real[UNDO_INPUT]
@@ -74,6 +76,7 @@ def put_undo(t: Curve, m: Memory) -> None:
     forget_line(t, m)
 
 
+@jit
 def set_undo(m: Memory) -> None:
     """Remember where the plays are."""
     m.real[UNDO_INPUT] = m.real[INPUT]
@@ -83,6 +86,7 @@ def set_undo(m: Memory) -> None:
     m.counts[UNDO_RISING] = m.counts[RISING]
 
 
+@jit
 def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
     """Any other sample than a usual one."""
     x = u - t.limits[OFFSET]
@@ -107,6 +111,7 @@ def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
     return m.real[OUTPUT]
 
 
+@jit(inline=True)
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     """One sample."""
     rising = m.counts[RISING]
@@ -125,6 +130,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     return inverse_search(t, m, u)
 
 
+@jit
 def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
     """What the drive really applied in place of the last answer."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
@@ -145,6 +151,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
     m.real[BEFORE] = m.real[INPUT]
 
 
+@jit
 def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
     """What init and reset have in common."""
     start(t.inverse, m, which)
@@ -156,26 +163,22 @@ def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
     m.counts[STATUS] = 0
 
 
+@jit
 def inverse_init(t: Tables, m: Memory) -> None:
     """Start memory of the parameter file."""
     inverse_begin(t, m, t.inverse_first)
 
 
+@jit
 def inverse_reset(t: Tables, m: Memory, u: Any) -> None:
     """All plays 0, status cleared, then one ordinary step."""
     inverse_begin(t, m, t.inverse_zero)
     inverse_step(t, m, u)
 
 
+@jit
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_output(t.inverse, m, v)
     set_undo(m)
     m.real[BEFORE] = m.real[INPUT]
-
-
-COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, put_undo, set_undo, inverse_search, inverse_step, inverse_commit,
-    inverse_begin, inverse_init, inverse_reset, inverse_visit,
-]  # fmt: skip
-INLINED: set[Callable[..., Any]] = {inverse_step}

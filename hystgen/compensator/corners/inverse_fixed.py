@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.compensator.corners.inverse import clamp_drive
 from hystgen.compensator.layout import FixedTables
 from hystgen.plays.corners.corners_fixed import FAR, along, move_to_input, move_to_solution, solve, start
@@ -45,6 +45,7 @@ from hystgen.plays.slots import (
 NEVER = -(2**31)
 
 
+@jit
 def inverse_clamp(t: FixedTables, u: Any) -> Any:
     """u inside the range of the output."""
     if u < t.limits[OUTPUT_MIN]:
@@ -54,6 +55,7 @@ def inverse_clamp(t: FixedTables, u: Any) -> Any:
     return u
 
 
+@jit
 def set_undo(m: FixedMemory) -> None:
     """Remember where the plays are."""
     m.real[UNDO_INPUT] = m.real[INPUT]
@@ -63,6 +65,7 @@ def set_undo(m: FixedMemory) -> None:
     m.counts[UNDO_RISING] = m.counts[RISING]
 
 
+@jit
 def put_undo(m: FixedMemory) -> None:
     """Put the plays where they were before the last step."""
     m.real[INPUT] = m.real[UNDO_INPUT]
@@ -72,17 +75,20 @@ def put_undo(m: FixedMemory) -> None:
     m.counts[RISING] = m.counts[UNDO_RISING]
 
 
+@jit(inline=True)
 def inverse_sees(m: FixedMemory, u: Any) -> Any:
     """A reference as the present move sees it: ~u is one less than -u, and no less than the least number."""
     return u if m.counts[RISING] else ~u
 
 
+@jit
 def inverse_stay(m: FixedMemory) -> None:
     """The next sample searches; the next step begins here."""
     m.real[NEXT] = NEVER
     m.counts[ON] = 0
 
 
+@jit
 def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
     """Steps are usual up to where another play begins to follow or something is limited, less what rounding can add."""
     rising = m.counts[RISING]
@@ -96,6 +102,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
         m.real[NEXT] = usual if usual < most else most
 
 
+@jit
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """Any other sample than a usual one."""
     set_undo(m)
@@ -116,6 +123,7 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     return m.real[INPUT] >> t.limits[FINE]
 
 
+@jit
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """One sample."""
     on = along(m, (u << t.limits[FRACTION]) - m.real[OUTPUT])
@@ -131,6 +139,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     return inverse_search(t, m, u)
 
 
+@jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     """What the drive really applied in place of the last answer."""
     v = clamp_drive(t, applied)
@@ -146,6 +155,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     move_to_input(t, m, v << t.limits[FINE])
 
 
+@jit
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     """What init and reset have in common."""
     start(t, m, play)
@@ -158,26 +168,22 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     m.counts[STATUS] = 0
 
 
+@jit
 def inverse_init(t: FixedTables, m: FixedMemory) -> None:
     """Start memory of the parameter file."""
     inverse_begin(t, m, t.start)
 
 
+@jit
 def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
     """All plays 0, status cleared, then one ordinary step."""
     inverse_begin(t, m, t.zero)
     inverse_step(t, m, u)
 
 
+@jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
     set_undo(m)
     inverse_stay(m)
-
-
-COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, inverse_clamp, set_undo, put_undo, inverse_sees, inverse_stay, inverse_look_ahead, inverse_search,
-    inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
-]  # fmt: skip
-INLINED: set[Callable[..., Any]] = {inverse_sees}

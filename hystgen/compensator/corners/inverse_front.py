@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import Jit, jit
 from hystgen.compensator.corners.inverse import clamp_drive, put_undo, set_undo
 from hystgen.compensator.layout import Tables
 from hystgen.front.compensator import front_forward, front_inverse
@@ -41,6 +42,7 @@ from hystgen.plays.slots import (
 )
 
 
+@jit
 def inverse_keep(m: Memory) -> None:
     """The next step begins here."""
     set_undo(m)
@@ -48,6 +50,7 @@ def inverse_keep(m: Memory) -> None:
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
 
 
+@jit
 def inverse_arrive(m: Memory, v: Any) -> None:
     """The actuator is at drive v, which decides the direction of its move and so the branch."""
     if v > m.real[DRIVE]:
@@ -57,6 +60,7 @@ def inverse_arrive(m: Memory, v: Any) -> None:
     m.real[DRIVE] = v
 
 
+@jit
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
     """The actuator has gone to v in place of where the last step led."""
     put_undo(t.inverse, m)
@@ -68,6 +72,7 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
         move_to_output(t.inverse, m, w)
 
 
+@jit
 def inverse_hold(t: Tables, m: Memory) -> Any:
     """A sample that is no number: the last answer once more."""
     inverse_keep(m)
@@ -78,6 +83,7 @@ def inverse_hold(t: Tables, m: Memory) -> Any:
     return m.real[DRIVE]
 
 
+@jit
 def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
     inside = clamp_drive(t, v)
@@ -86,27 +92,37 @@ def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
     return bool((inside > m.real[DRIVE]) == (ascending != 0))
 
 
-def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> tuple[Any, int]:
-    """The drive that gives w on the branch of its own move, and whether an envelope cannot give w."""
-    up = 1
-    if t.branches:
-        up = m.counts[ASCENDING]
-        if level > m.real[LEVEL]:
-            up = 1
-        elif level < m.real[LEVEL]:
-            up = 0
-    v, limited = front_inverse(t, w, up)
-    if t.branches:
-        fits = inverse_fits(t, m, v, up)
-        back = clamp_drive(t, v) - m.real[DRIVE]
-        if not fits and (up != m.counts[ASCENDING] or back < -t.limits[HOLD] or back > t.limits[HOLD]):
-            v, limited = front_inverse(t, w, 1 - up)
-            fits = inverse_fits(t, m, v, 1 - up)
-        if not fits:
-            v = m.real[DRIVE]
-    return v, limited
+def choosing(front_inverse: Callable[..., Any]) -> Jit[[Any, Any, Any, Any], tuple[Any, int]]:
+    """`inverse_choose` with the inverse of the memoryless part of an arithmetic."""
+
+    @jit
+    def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> tuple[Any, int]:
+        """The drive that gives w on the branch of its own move, and whether an envelope cannot give w."""
+        up = 1
+        if t.branches:
+            up = m.counts[ASCENDING]
+            if level > m.real[LEVEL]:
+                up = 1
+            elif level < m.real[LEVEL]:
+                up = 0
+        v, limited = front_inverse(t, w, up)
+        if t.branches:
+            fits = inverse_fits(t, m, v, up)
+            back = clamp_drive(t, v) - m.real[DRIVE]
+            if not fits and (up != m.counts[ASCENDING] or back < -t.limits[HOLD] or back > t.limits[HOLD]):
+                v, limited = front_inverse(t, w, 1 - up)
+                fits = inverse_fits(t, m, v, 1 - up)
+            if not fits:
+                v = m.real[DRIVE]
+        return v, limited
+
+    return inverse_choose
 
 
+inverse_choose = choosing(front_inverse)
+
+
+@jit
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     """One sample."""
     if not (-t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX]):
@@ -137,6 +153,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     return m.real[DRIVE]
 
 
+@jit
 def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
     """What the drive really applied in place of the last answer."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
@@ -152,6 +169,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
     inverse_replace(t, m, v)
 
 
+@jit
 def inverse_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
     """What init and reset have in common; `first` as in `Tables.applied`."""
     start(t.inverse, m, which)
@@ -169,27 +187,23 @@ def inverse_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
     m.counts[STATUS] = 0
 
 
+@jit
 def inverse_init(t: Tables, m: Memory) -> None:
     """Start memory of the parameter file."""
     inverse_begin(t, m, t.inverse_first, 2)
 
 
+@jit
 def inverse_reset(t: Tables, m: Memory, u: Any) -> None:
     """All plays 0, status cleared, then one ordinary step."""
     inverse_begin(t, m, t.inverse_zero, 3)
     inverse_step(t, m, u)
 
 
+@jit
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     inverse_keep(m)
     inverse_replace(t, m, v)
     inverse_keep(m)
     m.real[LEVEL] = m.real[INPUT] + t.limits[OFFSET]
-
-
-COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, put_undo, set_undo, inverse_keep, inverse_arrive, inverse_replace, inverse_hold, inverse_fits,
-    inverse_choose, inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
-]  # fmt: skip
-INLINED: set[Callable[..., Any]] = set()

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.compensator.corners.forward_fixed import code
 from hystgen.compensator.corners.inverse import clamp_drive
 from hystgen.compensator.corners.inverse_fixed import inverse_clamp, put_undo, set_undo
-from hystgen.compensator.corners.inverse_front import inverse_choose, inverse_fits
+from hystgen.compensator.corners.inverse_front import choosing
 from hystgen.compensator.layout import FixedTables
-from hystgen.front.curve import front_forward
+from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.corners.corners_fixed import FAR, move_to_input, move_to_solution, solve, start
 from hystgen.plays.corners.memory import (
     ASCENDING,
@@ -28,7 +28,10 @@ from hystgen.plays.corners.memory import (
 )
 from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
 
+inverse_choose = choosing(front_inverse)
 
+
+@jit
 def inverse_keep(m: FixedMemory) -> None:
     """The next step begins here."""
     set_undo(m)
@@ -36,6 +39,7 @@ def inverse_keep(m: FixedMemory) -> None:
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
 
 
+@jit
 def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     """The actuator is at drive v, which decides the direction of its move and so the branch; the input of the plays."""
     if v > m.real[DRIVE]:
@@ -46,6 +50,7 @@ def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     return front_forward(t, v, m.counts[ASCENDING])
 
 
+@jit
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """One sample."""
     inverse_keep(m)
@@ -65,6 +70,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     return m.real[DRIVE]
 
 
+@jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     """What the drive really applied in place of the last answer."""
     v = clamp_drive(t, applied)
@@ -78,6 +84,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     move_to_input(t, m, inverse_arrive(t, m, v))
 
 
+@jit
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
     """What init and reset have in common; `first` as in `FixedTables.applied`."""
     start(t, m, play)
@@ -92,26 +99,22 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
     m.counts[STATUS] = 0
 
 
+@jit
 def inverse_init(t: FixedTables, m: FixedMemory) -> None:
     """Start memory of the parameter file."""
     inverse_begin(t, m, t.start, 2)
 
 
+@jit
 def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
     """All plays 0, status cleared, then one ordinary step."""
     inverse_begin(t, m, t.zero, 3)
     inverse_step(t, m, u)
 
 
+@jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
     m.real[LEVEL] = code(t, m)
-
-
-COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, inverse_clamp, set_undo, put_undo, inverse_keep, inverse_arrive, inverse_fits, inverse_choose,
-    inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
-]  # fmt: skip
-INLINED: set[Callable[..., Any]] = set()

@@ -11,8 +11,8 @@ from pydantic import Field
 
 from hystgen.basics.quantities import NotNegative, Positive
 from hystgen.basics.words import counted
+from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
-from hystgen.effects.recursions import code
 
 FASTEST = 0.01
 """s; what follows a move faster than this is a lag or friction of the domain walls, and has other names."""
@@ -30,7 +30,8 @@ def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
     """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
     rows = np.ascontiguousarray(np.atleast_2d(h).T)
     total, states = np.zeros_like(rows), np.repeat(rows[:1], len(weights), axis=0)
-    code().creep(rows, run.different[1], *run.spectrum(tuple(time_constants.tolist())), weights, states, total)
+    decay, early, late = run.spectrum(tuple(time_constants.tolist()))
+    recursions.creep(rows, run.different[1], decay, early, late, weights, states, total)
     return total.T.reshape(np.shape(h))
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import NotNegative
+from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
-from hystgen.effects.recursions import code
 
 
 class Lag(Effect):
@@ -30,7 +30,8 @@ class Lag(Effect):
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""
         out = np.empty_like(a)
-        code().follow(a, *run.factors(self.time_constant), float(a[0]), out)
+        decay, early, late = run.factors(self.time_constant)
+        recursions.follow(a, decay, early, late, float(a[0]), out)
         return out
 
     @classmethod

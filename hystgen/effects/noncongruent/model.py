@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import MAX_PLAYS, Number, Positive
+from hystgen.effects import recursions
 from hystgen.effects.base import (
     About,
     Array,
@@ -22,7 +23,6 @@ from hystgen.effects.base import (
     span,
     without_plays,
 )
-from hystgen.effects.recursions import code
 
 MAX_TERMS = 8
 
@@ -94,7 +94,7 @@ class PlayFunctions(_Noncongruent):
 
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """What its polynomial adds to a play."""
-        code().curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
+        recursions.curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from hystgen.basics import parallel
 from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Positive
+from hystgen.effects import recursions
 from hystgen.effects.base import (
     About,
     Array,
@@ -25,7 +26,6 @@ from hystgen.effects.base import (
     not_one_a_play,
     without_plays,
 )
-from hystgen.effects.recursions import code
 from hystgen.plays import operators
 
 Places = NDArray[np.intp]
@@ -98,7 +98,7 @@ class ThresholdRate(_RateDependence):
             slope = np.minimum(np.abs(np.diff(w)) / run.steps, 1e300)
         rate = np.concatenate([[0.0], slope])
         betas = np.array(self.betas)[chosen - 1]
-        code().dilated_plays(w, rate, thresholds[chosen], betas, start[chosen], out)
+        recursions.dilated_plays(w, rate, thresholds[chosen], betas, start[chosen], out)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -151,7 +151,7 @@ class RelaxingPlays(_RateDependence):
         starts = start[chosen]
 
         def move(some: slice) -> None:
-            code().relaxing_plays(w, run.steps, thresholds[chosen[some]], *about, starts[some], out[some])
+            recursions.relaxing_plays(w, run.steps, thresholds[chosen[some]], *about, starts[some], out[some])
 
         if self.exponent == 1.0 or out.size < LARGE:
             move(slice(None))

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import Positive
+from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
-from hystgen.effects.recursions import code
 
 
 class Resonance(Effect):
@@ -63,7 +63,8 @@ class Resonance(Effect):
         rows = np.ascontiguousarray(np.atleast_2d(h))
         out = np.empty_like(rows)
         factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self._forced))
-        code().ring(rows, *factors, self.damping, out)
+        a, b, early, late = factors
+        recursions.ring(rows, a, b, early, late, self.damping, out)
         return out.reshape(np.shape(h))
 
     def transients(self, run: Run) -> Array:

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from hystgen.basics.quantities import Positive
+from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
-from hystgen.effects.recursions import code
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
 """Starts below the fastest recorded rate, in decades: a limit that is never met, or always, tells nothing of itself."""
@@ -44,7 +44,7 @@ class SlewLimit(Effect):
     def drive(self, a: Array, run: Run) -> Array:
         """The drive as fast as it may be."""
         out = np.empty_like(a)
-        code().limit(a, self.rate * run.steps, self.falling_rate * run.steps, out)
+        recursions.limit(a, self.rate * run.steps, self.falling_rate * run.steps, out)
         return out
 
     @classmethod

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import NotNegative, Number, Positive
+from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, span
-from hystgen.effects.recursions import code
 
 COLUMN = "temperature"
 
@@ -99,7 +99,7 @@ class _OwnHeat(_Thermal):
     def _rise(self, run: Run) -> Array:
         decay, kept, none = run.of_steps(lambda steps: _kept(steps / self.time_constant))
         out = np.empty(len(run.t))
-        code().follow(np.append(self.heat(run), 0.0), decay, kept, none, 0.0, out)
+        recursions.follow(np.append(self.heat(run), 0.0), decay, kept, none, 0.0, out)
         return out
 
 
@@ -155,7 +155,7 @@ class HysteresisHeating(_OwnHeat):
 
     def _lost(self, run: Run) -> Array:
         out = np.empty(len(run.steps))
-        code().lost(run.v, self.reach, np.empty(len(run.v)), out)
+        recursions.lost(run.v, self.reach, np.empty(len(run.v)), out)
         return out
 
     @classmethod

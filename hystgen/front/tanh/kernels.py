@@ -2,8 +2,8 @@
 
 The same operations in the same order on numbers of the same format, for float32 and float64 alike: every constant
 comes from a table of the format, because a Python float next to a float32 would widen it once numba compiles the
-function. Plain functions without decorators; they run on numpy scalars as they are and unchanged under
-`numba.njit`. The method is that of the C files' comments, the numbers are those of `c_runtime/fit_coefficients.py`.
+function. They run on numpy scalars as they are (`tanh.py_func`) and unchanged when compiled. The method is that of the
+C files' comments, the numbers are those of `c_runtime/fit_coefficients.py`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+from hystgen.basics.jit import jit
 
 __all__ = [
     "ATANH_MAX_ULP",
@@ -58,6 +60,7 @@ class AtanhTables(NamedTuple):
     number: Reals  # 0, 1, .. likewise
 
 
+@jit
 def tanh(x: Real, t: TanhTables) -> Real:
     """Hyperbolic tangent of one number, with the bits of `hystgen_tanh`.
 
@@ -90,6 +93,7 @@ def tanh(x: Real, t: TanhTables) -> Real:
     return -y if x < 0 else y
 
 
+@jit
 def atanh(x: Real, t: AtanhTables) -> Real:
     """Inverse hyperbolic tangent of one number, with the bits of `hystgen_atanh`.
 

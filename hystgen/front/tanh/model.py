@@ -48,7 +48,7 @@ class TanhEnvelope:
         a0, a1, a2, a3 = self.branch(ascending)
         if isinstance(x, float):
             tables = kernels.tanh_tables(np.float64)
-            return np.asarray(a0 * float(kernels.tanh(np.float64(a1 * x + a2), tables)) + a3)
+            return np.asarray(a0 * float(kernels.tanh.py_func(np.float64(a1 * x + a2), tables)) + a3)
         return np.asarray(a0 * np.tanh(a1 * np.asarray(x, dtype=np.float64) + a2) + a3)
 
     def inverse(
@@ -60,7 +60,7 @@ class TanhEnvelope:
         if isinstance(y, float):
             tables = kernels.atanh_tables(np.float64)
             argument = min(max((y - a3) / a0, -edge), edge)
-            return np.asarray((float(kernels.atanh(np.float64(argument), tables)) - a2) / a1)
+            return np.asarray((float(kernels.atanh.py_func(np.float64(argument), tables)) - a2) / a1)
         arguments = np.clip((np.asarray(y, dtype=np.float64) - a3) / a0, -edge, edge)
         return np.asarray((np.arctanh(arguments) - a2) / a1)
 
@@ -76,7 +76,7 @@ class TanhEnvelope:
         tables = kernels.tanh_tables(np.float64)
 
         def slope(argument: float) -> float:
-            t = float(kernels.tanh(np.float64(argument), tables))
+            t = float(kernels.tanh.py_func(np.float64(argument), tables))
             return a0 * a1 * (1.0 - t) * (1.0 + t)
 
         return min(slope(ends[0]), slope(ends[1])), slope(nearest)

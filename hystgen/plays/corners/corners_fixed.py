@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.plays.corners.memory import DEPTH, INPUT, NEXT, OUTPUT, RISING, FixedMemory, K, Reals
 from hystgen.plays.fixed import FixedPlayTables, over_slope
 from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN
@@ -17,11 +17,13 @@ Kink = tuple[Any, Any, int, int]
 FAR = 1 << 62
 
 
+@jit(inline=True)
 def along(m: FixedMemory, x: Any) -> Any:
     """x as the present move sees it: a falling move is a rising one with all signs changed."""
     return x if m.counts[RISING] else -x
 
 
+@jit
 def leave_corner(m: FixedMemory) -> None:
     """Leave a corner here."""
     c = m.counts[DEPTH]
@@ -32,6 +34,7 @@ def leave_corner(m: FixedMemory) -> None:
     m.counts[DEPTH] += 1
 
 
+@jit
 def turn_back(m: FixedMemory) -> None:
     """Turn; a corner stays where plays have followed."""
     if m.counts[K] > 0:
@@ -40,6 +43,7 @@ def turn_back(m: FixedMemory) -> None:
     m.counts[RISING] = 1 - m.counts[RISING]
 
 
+@jit
 def find(t: FixedPlayTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
     """The last place on the present move where another play begins to follow before the output, or the input, is x; or
     the present one."""
@@ -78,6 +82,7 @@ def find(t: FixedPlayTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
     return m.output[c] + along(m, t.reach[k]), m.input[c] + along(m, t.way[k]), k, left
 
 
+@jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
     """The same for any move to an input; turns, moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
@@ -85,6 +90,7 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
     return find(t, m, to, False)
 
 
+@jit
 def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
     """Move the plays on from a kink to an input at which the same ones follow; `moved` is the output between."""
     m.real[OUTPUT] = kink[0] + along(m, moved)
@@ -93,18 +99,21 @@ def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
     m.counts[DEPTH] = kink[3]
 
 
+@jit
 def gained(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """Output that is gained from a kink on until the input comes to `to`, which may lie before it."""
     way = along(m, to - kink[1])
     return -1 if way < 0 else t.slope[kink[2] + 1] * way
 
 
+@jit
 def move_to_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> None:
     """Move the plays to any input."""
     kink = find_input(t, m, to)
     go_on(m, kink, to, gained(t, m, kink, to))
 
 
+@jit
 def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
     """Input at which another play begins to follow the present move, or the last one there is."""
     x = INPUT_MOST
@@ -115,6 +124,7 @@ def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
     return along(m, x)
 
 
+@jit(inline=True)
 def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
     """The sum of the plays for the next input."""
     at = m.real[INPUT]
@@ -127,6 +137,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
     return m.real[OUTPUT]
 
 
+@jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
     """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing.
     Short of `following`, an output as the present move sees it, the same plays are known to follow."""
@@ -142,6 +153,7 @@ def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tu
     return along(m, most if x > most else x), kink
 
 
+@jit
 def next_output(t: FixedPlayTables, m: FixedMemory, depth: int, k: int) -> Any:
     """Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left."""
     if depth == 0:
@@ -150,6 +162,7 @@ def next_output(t: FixedPlayTables, m: FixedMemory, depth: int, k: int) -> Any:
     return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k + 1])
 
 
+@jit
 def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
     at which another one begins to follow."""
@@ -163,6 +176,7 @@ def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) ->
     return following
 
 
+@jit
 def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
     """Start memory: what each play holds, or all of them. Each is a block of its own, as if left by a move that ended
     where the play begins to follow."""
@@ -180,10 +194,3 @@ def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
     m.counts[RISING] = 1
     m.real[INPUT] = play[0]
     m.real[OUTPUT] = aside + play[0] * t.slope[1]
-
-
-COMPILED: list[Callable[..., Any]] = [
-    along, leave_corner, turn_back, find, find_input, go_on, gained, move_to_input, next_input, plays_step, solve,
-    next_output, move_to_solution, start,
-]  # fmt: skip  (callees before callers)
-INLINED: set[Callable[..., Any]] = {along, plays_step}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from hystgen.basics.jit import jit
 from hystgen.plays.corners.memory import (
     BASE,
     BEGIN,
@@ -32,11 +32,13 @@ from hystgen.plays.corners.memory import (
 )
 
 
+@jit(inline=True)
 def along(m: Memory, x: Any) -> Any:
     """x as the present move sees it: a falling move is a rising one with all signs changed."""
     return m.real[SIGN] * x
 
 
+@jit(inline=True)
 def forget_line(t: Curve, m: Memory) -> None:
     """There is no line to go on along: the next sample searches."""
     m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
@@ -44,6 +46,7 @@ def forget_line(t: Curve, m: Memory) -> None:
     m.real[CAP] = m.real[INPUT]
 
 
+@jit
 def leave_corner(t: Curve, m: Memory) -> None:
     """Leave a corner here. A block whose last play follows beyond the limit only is never passed."""
     rising = m.counts[RISING]
@@ -59,6 +62,7 @@ def leave_corner(t: Curve, m: Memory) -> None:
     m.counts[DEPTH] += 1
 
 
+@jit
 def turn_back(t: Curve, m: Memory) -> None:
     """Turn; a corner stays where plays have followed."""
     if m.counts[K] > 0:
@@ -69,6 +73,7 @@ def turn_back(t: Curve, m: Memory) -> None:
     m.real[SIGN] = -m.real[SIGN]
 
 
+@jit
 def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
     """The last of segments k .. last that begins before `way`; `step` are all ways, or all reaches."""
     while k < last:
@@ -80,6 +85,7 @@ def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
     return k
 
 
+@jit
 def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
     """Stop the present move inside the top corner's block: where the sum is `output`, or before that at `to`."""
     c = m.counts[DEPTH] - 1
@@ -98,6 +104,7 @@ def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
     forget_line(t, m)
 
 
+@jit
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     """Move the plays to where their sum is `output`, as nearly as floating point can tell."""
     if along(m, output) < along(m, m.real[OUTPUT]):
@@ -116,6 +123,7 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     stop_in_block(t, m, output, along(m, t.constant[MOST]))
 
 
+@jit
 def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
     x = along(m, to)
@@ -169,6 +177,7 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     return True
 
 
+@jit
 def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
     """Move on to an input short of CAP: more plays of the same block follow. False where a search is faster."""
     way = along(m, to - m.real[FROM])
@@ -190,6 +199,7 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
     return True
 
 
+@jit(inline=True)
 def plays_step(t: Curve, m: Memory, to: Any) -> Any:
     """The sum of the plays for the next input; a NaN moves nothing."""
     rising = m.counts[RISING]
@@ -205,6 +215,7 @@ def plays_step(t: Curve, m: Memory, to: Any) -> Any:
     return m.real[OUTPUT]
 
 
+@jit
 def start(t: Curve, m: Memory, s: Start) -> None:
     """Start memory. Each play is a block of its own."""
     m.output[0] = s.bottom[0]
@@ -226,10 +237,3 @@ def start(t: Curve, m: Memory, s: Start) -> None:
     m.real[INPUT] = s.center[0, 0]
     m.real[OUTPUT] = s.center[0, 1]
     forget_line(t, m)
-
-
-COMPILED: list[Callable[..., Any]] = [
-    along, forget_line, leave_corner, turn_back, find_segment, stop_in_block, move_to_output,
-    move_to_input, move_in_block, plays_step, start,
-]  # fmt: skip  (callees before callers)
-INLINED: set[Callable[..., Any]] = {along, forget_line, plays_step}
