@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import targets as bench
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import engines
 from hystgen.compensator.session import Session
 from hystgen.emission import module
@@ -64,7 +65,7 @@ def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict
     """Mean instructions of a sample on each core, for each operator."""
     one = model(n, DEAD_ZONE if kind == "gpi" else "")
     files = sources.write(folder, one, emit_options(one, "both", arithmetic, engine))
-    numbers, real = one.tables(arithmetic, engine), comparison.REALS[arithmetic]
+    numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     ends = numbers.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
     drive = bench.multisine(bench.SAMPLES) * float(min(abs(ends[0]), ends[1]))
     drive = np.rint(drive) if real.kind == "i" else drive
@@ -112,12 +113,12 @@ def main() -> None:
     costs: list[tuple[Any, ...]] = []
     sizes: list[tuple[Any, ...]] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-costs-") as place:
-        for arithmetic, kind, n, engine in itertools.product(comparison.REALS, KINDS, PLAYS, engines.ENGINES):
+        for arithmetic, kind, n, engine in itertools.product(ARITHMETICS, KINDS, PLAYS, engines.ENGINES):
             if arguments.only != "sizes":
                 found = means(Path(place) / f"{len(costs)}", n, kind, arithmetic, engine)
                 costs += [(op, arithmetic, kind, n, engine, *map(round, cores.values())) for op, cores in found.items()]
                 print(*costs[-1], flush=True)
-        for arithmetic, kind in itertools.product(comparison.REALS, FRONTS):
+        for arithmetic, kind in itertools.product(ARITHMETICS, FRONTS):
             told_apart = kind in ("pi", "dead_zone") or (kind == "dead_zone_branches") == (arithmetic in ("q31", "q15"))
             if arguments.only == "costs" or not told_apart:
                 continue

@@ -35,6 +35,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.session import Session
 from hystgen.emission.calls import emit_options
@@ -310,7 +311,7 @@ def lsbs(case: Case) -> tuple[float, float]:
 def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
     """What the operator takes so that the plays see `drive`, in its own numbers: codes, `coarser` times the finest."""
     x = from_drive(case, drive, call)
-    real = comparison.REALS[case.arithmetic]
+    real = ARITHMETICS[case.arithmetic].number
     if real.kind != "i":
         return x.astype(real)
     codes = np.rint(x / lsbs(case)[case.operator == "inverse"] / coarser)
@@ -324,7 +325,7 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
     What is no number; a commit of the drive that is jumped from, behind a step elsewhere; and both, where the answer of
     the step before the commit is asked for again, which leads where the trial jumps to, and a step from there.
     """
-    odd = [np.nan, np.inf, -np.inf] if comparison.REALS[case.arithmetic].kind == "f" else []
+    odd = [np.nan, np.inf, -np.inf] if ARITHMETICS[case.arithmetic].number.kind == "f" else []
     paths: list[Reals] = []  # what the plays see, to know what the inverse has to be asked for
     for trial in found:
         paths += [trial, np.append(trial[:-2], trial[-1])]
@@ -351,7 +352,7 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
             for x, (*_, last) in itertools.product(odd, on):
                 add(jump[:-2], (step, aside[-1]), (commit, applied), (step, x), (step, last))
         ends.append(len(operations))
-    real = comparison.REALS[case.arithmetic]
+    real = ARITHMETICS[case.arithmetic].number
     x = np.array(arguments)
     if real.kind == "i":
         x = np.clip(np.rint(x), np.iinfo(real).min, np.iinfo(real).max)
@@ -478,7 +479,7 @@ class Bench:
         steps, returns, calls = [], [], []
         best = self._worst_trials(case)
         forms: list[tuple[Form, bool]] = [(plain, False)]
-        odd, inverse = comparison.REALS[case.arithmetic].kind == "f", case.operator == "inverse"
+        odd, inverse = ARITHMETICS[case.arithmetic].number.kind == "f", case.operator == "inverse"
         if odd or inverse:
             forms.append((interrupted, False))
         if odd and inverse:
@@ -515,7 +516,7 @@ class Bench:
         """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
         numbers = case.model.tables(case.arithmetic, engine)
         calls = ("signal", np.full(len(x), slots.OP_STEP, dtype=np.uint8) if call is None else call, x)
-        real = comparison.REALS[case.arithmetic]
+        real = ARITHMETICS[case.arithmetic].number
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)
         run = functools.partial(core.run, "bench", case.operator, counted=counted)
@@ -528,7 +529,7 @@ class Bench:
         differ little. What is built is searched, then the neighbours of what is found for dearer ones."""
         case = self._searched(case)
         if case not in self._worst:
-            real = comparison.REALS[case.arithmetic]
+            real = ARITHMETICS[case.arithmetic].number
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
             most, rounds = self._most(case), 6
             if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
@@ -544,7 +545,7 @@ class Bench:
         are no number behind a commit, and by all others otherwise."""
         case = self._searched(case)
         if (case, behind) not in self._worst_odd:
-            real = comparison.REALS[case.arithmetic]
+            real = ARITHMETICS[case.arithmetic].number
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
             most = self._most(case) // 8  # each has several forms
             best = list(self._worst_trials(case))

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, signal
 
-from hystgen import arithmetic
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.checks import finite
 from hystgen.cascade import PI, Cascade, InverseCascade
 from hystgen.compensator import fixed_tables
@@ -332,12 +332,13 @@ class _InUnits:
     def __init__(self, operator: _Operator | Instance, model: Model, options: Options) -> None:
         self._operator = operator
         self._lsb: tuple[float, float] | None = None
-        if options.arithmetic not in arithmetic.FLOAT_ARITHMETICS:
+        chosen = ARITHMETICS[options.arithmetic]
+        if chosen.fixed:
             emit = model.parameters.emit
             lsbs = fixed_tables.lsbs(model.cascade, options.arithmetic, emit.drive_lsb, emit.output_lsb)
             drive, output = map(float, lsbs)
             self._lsb = (output, drive) if options.operator == "inverse" else (drive, output)
-            self._most = 2 ** fixed_tables.CODE_BITS[options.arithmetic] - 1
+            self._most = chosen.code_max
         self._code = 0
 
     def reset(self) -> None:

@@ -15,6 +15,7 @@ from elftools.elf.elffile import ELFFile
 from modelfiles import FILES
 
 import hystgen
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.engines import ENGINES, choose
 from hystgen.emission.calls import emit_options, emitted_files
@@ -24,7 +25,6 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, host, signals, sources
-from hystgen.verification.comparison import REALS
 
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = ("self-contained", "single-header", "shared-runtime")
@@ -135,7 +135,7 @@ OPERATIONS = {"step": slots.OP_STEP, "commit": slots.OP_COMMIT, "reset": slots.O
 
 def differing(one: Model, calls: signals.Calls, folder: Path) -> list[tuple[str, int, int]]:
     """Builds for this machine, samples of each and how many have other bits than the reference."""
-    real = REALS["float32"]
+    real = ARITHMETICS["float32"].number
     record = comparison.expected_record(one.tables("float32", "corners"), real, True, calls)
     files = sources.write(folder, one, emit_options(one, "inverse", "float32", "corners"))
     rows = host.rows(files, lambda _: [record], real, ["gcc"], folder, lambda _: None)
@@ -260,7 +260,7 @@ def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_pa
         pytest.skip("gcc and its sanitizers are not installed")
     one = model(name)
     hystgen.emit(one, tmp_path, operator="both", arithmetic=arithmetic, engine=engine)
-    numbers, real = one.tables(arithmetic, engine), REALS[arithmetic]
+    numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     for op in ("forward", "inverse"):
         commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
         (tmp_path / "main.c").write_text(SANITIZED.format(name=name, op=op, commit=commit))

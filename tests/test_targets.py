@@ -20,6 +20,7 @@ from click.testing import CliRunner
 from modelfiles import FILES, PLAYS
 
 import hystgen
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import extras
 from hystgen.cli import main
 from hystgen.emission import module
@@ -29,7 +30,6 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import Row, avr, compilers, cross, emulator, firmware, sources, targets
-from hystgen.verification.comparison import REALS
 
 CORES = tuple(target.name for target in targets.TARGETS)
 AVR_CXX = "avr-g++"
@@ -542,7 +542,7 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [
-        *((name, arithmetic, "corners") for name in ("plain", "two_branches") for arithmetic in REALS),
+        *((name, arithmetic, "corners") for name in ("plain", "two_branches") for arithmetic in ARITHMETICS),
         ("plain", "q15", "loop"),
         ("two_branches", "float64", "loop"),
     ],

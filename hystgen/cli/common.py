@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import console
 
 if TYPE_CHECKING:
     from hystgen.model import Model
 
 
-ARITHMETICS = ("float32", "float64", "q31", "q15")
 
 
 class Failed(click.ClickException):
@@ -83,7 +83,7 @@ params_argument = click.argument("params", type=click.Path())
 operator_option = click.option(
     "--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's"
 )
-arithmetic_option = click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="default: the file's")
+arithmetic_option = click.option("--arithmetic", type=click.Choice(list(ARITHMETICS)), help="default: the file's")
 engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
 optimize_option = click.option(
     "--optimize", type=click.Choice(["auto", "speed", "size"]), help="what engine auto chooses for; default: the file's"

@@ -9,9 +9,9 @@ from typing import Any
 
 import click
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import console
 from hystgen.cli.common import (
-    ARITHMETICS,
     Failed,
     effects_option,
     guarded,
@@ -36,7 +36,9 @@ def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> N
 @click.argument("data", nargs=-1, required=True, type=click.Path())
 @click.option("-o", "output", type=click.Path(), help="CSV file, or a folder for several; default: standard output")
 @click.option("--operator", type=click.Choice(["forward", "inverse"]), default="forward", show_default=True)
-@click.option("--arithmetic", type=click.Choice(ARITHMETICS), help="compute as the emitted C does; default: double")
+@click.option(
+    "--arithmetic", type=click.Choice(list(ARITHMETICS)), help="compute as the emitted C does; default: double"
+)
 @click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="with --arithmetic")
 @effects_option
 @record_options

@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.model import TanhEnvelope
 
@@ -50,7 +51,7 @@ def kind(cascade: StaticModel, arithmetic: str) -> str:
     if not cascade.stages:
         return "pi"
     tanh = [isinstance(stage, TanhEnvelope) for stage in cascade.stages]
-    front = "dead_zone" if arithmetic in ("q31", "q15") or not any(tanh) else "tanh" if all(tanh) else "mixed"
+    front = "dead_zone" if ARITHMETICS[arithmetic].fixed or not any(tanh) else "tanh" if all(tanh) else "mixed"
     return f"{front}_branches" if cascade.branches_differ else front
 
 

@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError, Path
 from hystgen.basics.words import counted
 from hystgen.chain.static import StaticModel
@@ -36,7 +37,6 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
 
-CODE_BITS = {"q31": 31, "q15": 15}
 PLAY_BITS = 30  # of the input of the plays, where it is not the drive code itself
 SUM_BITS = 62
 TABLE_MAX = 2**31 - 1
@@ -88,7 +88,7 @@ def lsbs(
 
     Raises FormatError for one that is too small, and for an output that stays 0.
     """
-    code_max = 2 ** CODE_BITS[arithmetic] - 1
+    code_max = ARITHMETICS[arithmetic].code_max
     found: list[Fraction] = []
     refused: list[tuple[Path, str]] = []
     for given, ends, what, key in (
@@ -131,7 +131,7 @@ class _Builder:
         self, cascade: StaticModel, arithmetic: str, engine: str, drive_lsb: float | None, output_lsb: float | None
     ) -> None:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
-        self.code_max = 2 ** CODE_BITS[arithmetic] - 1
+        self.code_max = ARITHMETICS[arithmetic].code_max
         self.drive_lsb, self.output_lsb = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
         self.given = {"drive_lsb": drive_lsb is not None, "output_lsb": output_lsb is not None}
         self.invertible = not cascade.inverse_problems()
@@ -188,7 +188,7 @@ class _Builder:
             self.step = Fraction(2) ** (math.ceil(math.log2(reach)) - PLAY_BITS)
         else:
             self.fine = 0
-            if self.arithmetic == "q15":
+            if ARITHMETICS[self.arithmetic].finer_plays:
                 self.fine = max(0, math.floor(math.log2((1 << PLAY_BITS) / (reach / self.drive_lsb))))
             self.step = self.drive_lsb / 2**self.fine
 
@@ -239,7 +239,7 @@ class _Builder:
             self.margin = 1 << self.fine
             return
         lsb, step = float(self.drive_lsb), float(self.step)
-        degree = 5 if self.arithmetic == "q31" else 3
+        degree = ARITHMETICS[self.arithmetic].degree
         # a curve's own error: a 64th of a code, or rounding where codes are as fine as that
         allowed = max(0.5 * step, lsb * c.front_slopes[0] / 64)
         breaks = _breaks(c)

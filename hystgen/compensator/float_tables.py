@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.static import UNBOUNDED, StaticModel
 from hystgen.compensator import corner_tables
@@ -91,7 +92,7 @@ def build_float(
     Without `clamp` the drive and output limits are those of the arithmetic. Raises FormatError when a number or an
     intermediate result of the model does not fit the arithmetic.
     """
-    dtype = np.dtype(arithmetic).type
+    dtype = ARITHMETICS[arithmetic].computed.type
     info = np.finfo(dtype)
     largest = float(info.max)
     pi = cascade.pi

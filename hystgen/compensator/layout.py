@@ -40,6 +40,16 @@ class Tables(NamedTuple):
     tanh: TanhTables
     atanh: AtanhTables
 
+    @property
+    def fixed(self) -> bool:
+        """Whether it is fixed point."""
+        return False
+
+    @property
+    def has_front(self) -> bool:
+        """Whether there is a memoryless part."""
+        return len(self.stage_kind) > 0
+
 
 class FixedTables(NamedTuple):
     """The constants of one model in fixed point; arrays of int64, however narrow they are in C."""
@@ -69,6 +79,16 @@ class FixedTables(NamedTuple):
     engine: int
     branches: int
     fronts: int
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is fixed point."""
+        return True
+
+    @property
+    def has_front(self) -> bool:
+        """Whether there is a memoryless part."""
+        return self.fronts > 0
 
 
 def first_moves(

@@ -31,12 +31,7 @@ from hystgen.plays.slots import LOOP
 
 def operations(t: Tables | FixedTables) -> Operations:
     """What the bit reference is made of for the arithmetic and the engine of these tables."""
-    return _operations(t.engine == LOOP, isinstance(t, FixedTables), has_front(t))
-
-
-def has_front(t: Tables | FixedTables) -> bool:
-    """Whether there is a memoryless part."""
-    return bool(t.fronts) if isinstance(t, FixedTables) else len(t.stage_kind) > 0
+    return _operations(t.engine == LOOP, t.fixed, t.has_front)
 
 
 @functools.cache
@@ -54,7 +49,7 @@ def new_state(t: Tables | FixedTables) -> Any:
     """Memory for one instance; `init` of its operations gives it its values."""
     if t.engine == LOOP:
         return loop.new_state(t)
-    memory = new_fixed_memory if isinstance(t, FixedTables) else new_memory
+    memory = new_fixed_memory if t.fixed else new_memory
     return memory(len(t.threshold) - 1, t.threshold.dtype)
 
 

@@ -59,7 +59,7 @@ class Session:
     @property
     def drive_range(self) -> tuple[float, float]:
         """`input_range` in what the operator takes: physical units, or codes in fixed point."""
-        if self.tables.threshold.dtype.kind == "i":
+        if self.tables.fixed:
             low, high = self.tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
             return float(low), float(high)
         return self._range
@@ -67,7 +67,7 @@ class Session:
     def visit(self, drives: Iterable[float]) -> None:
         """Let the actuator see these drive values, in range or not, after `init` and before what comes next."""
         seen = self._samples(list(drives))
-        if self.tables.threshold.dtype.kind == "f":
+        if not self.tables.fixed:
             inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
             self.tables = self._build(visited=[float(w) for w in inputs])
             self.init()
@@ -87,7 +87,7 @@ class Session:
         given = arguments.signal("u" if self._inverse else "v", x)
         with np.errstate(invalid="ignore"):  # what is no code is found below
             samples = np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
-        if samples.dtype.kind == "i":
+        if self.tables.fixed:
             most = int(self.tables.limits[slots.CODE_MAX])
             if np.any(given != samples) or np.any(samples < -most - 1) or np.any(samples > most):
                 raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")

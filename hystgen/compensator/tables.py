@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hystgen.arithmetic import FLOAT_ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.float_tables import build_float
@@ -30,6 +30,6 @@ def build(
     fixed point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises
     FormatError when the model does not fit the arithmetic.
     """
-    if arithmetic in FLOAT_ARITHMETICS:
+    if not ARITHMETICS[arithmetic].fixed:
         return build_float(cascade, arithmetic, engine, clamp, inverse, visited)
     return fixed_tables.build(cascade, arithmetic, engine, *lsb)[0]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen import arithmetic
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.names import comment_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
@@ -25,7 +25,7 @@ from hystgen.plays.corners.memory import BOTTOM, Curve, Start
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     """What the templates need to know of the numbers; `prefix` is that of the types of the run time."""
-    if options.arithmetic in arithmetic.FLOAT_ARITHMETICS:
+    if not ARITHMETICS[options.arithmetic].fixed:
         return _float_fields(parameters, cascade, options, prefix)
     return _fixed_fields(parameters, cascade, options, prefix)
 

@@ -14,14 +14,6 @@ from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.slots import Bytes
 from hystgen.verification import signals
 
-# What NAME_real_t is
-REALS: dict[str, np.dtype[Any]] = {
-    "float32": np.dtype("f4"),
-    "float64": np.dtype("f8"),
-    "q31": np.dtype("i4"),
-    "q15": np.dtype("i2"),
-}
-
 
 @dataclass(frozen=True)
 class Expected:

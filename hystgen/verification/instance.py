@@ -6,8 +6,8 @@ from typing import Any
 
 import cffi
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import extras, writing
-from hystgen.emission import runtime
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.verification import compilers, sources
@@ -30,7 +30,7 @@ class Instance:
             missing = f"{compiler} is not installed" if compiler else "no C compiler found"
             raise compilers.CompileError(f"{missing}; install gcc or clang, or: {extras.install('zig')}")
         name, op = model.name, options.operator
-        real = runtime.FAMILIES[options.arithmetic].real
+        real = ARITHMETICS[options.arithmetic].c_type
         self._ffi = cffi.FFI()
         self._ffi.cdef(
             f"size_t hystgen_harness_{op}_size(void); void {name}_{op}_init(void *);"

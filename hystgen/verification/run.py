@@ -6,12 +6,13 @@ import functools
 import os
 from collections.abc import Callable, Sequence
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, writing
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options
 from hystgen.model import Model, as_model
 from hystgen.verification import avr, cores, host, sources
-from hystgen.verification.comparison import REALS, Expected, expected_records
+from hystgen.verification.comparison import Expected, expected_records
 from hystgen.verification.report import Report
 from hystgen.verification.targets import AVR, HOST, Board, find
 
@@ -47,7 +48,7 @@ def verify(
     model = as_model(source)
     options = emit_options(model, operator, arithmetic, engine, layout, optimize)
     numbers = model.tables(options.arithmetic, options.engine)
-    real = REALS[options.arithmetic]
+    real = ARITHMETICS[options.arithmetic].number
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
     chosen = [known[name] if name in known else find(name) for name in targets]
