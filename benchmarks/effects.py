@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from hystgen import effects
-from hystgen.effects import Chain, Effect, Run
-from hystgen.models import PI, Cascade
+from hystgen.cascade import PI, Cascade
+from hystgen.chain.chain import Chain
+from hystgen.effects import Effect, Run
 
 SAMPLES, PLAYS = 60_000, 16
 LIMIT, LIMIT_WITH_EXPONENT = 50.0, 150.0

@@ -4,8 +4,8 @@
 
 Instructions are the mean over a decaying multisine, strict -O2 build of zig, for both operators, every arithmetic, with
 and without a memoryless part (a dead zone). Code is that of a module at -O2, of zig and gcc the larger one, for every
-kind that `hystgen.engines.kind` tells apart. Both on a Cortex-M0+ without and a Cortex-M4F with an FPU. The shipped
-tables are read by `hystgen.engines`, so that the same parameters give the same C everywhere.
+kind that `hystgen.compensator.engines.kind` tells apart. Both on a Cortex-M0+ without and a Cortex-M4F with an FPU. The
+shipped tables are read by `hystgen.compensator.engines`, so that the same parameters give the same C everywhere.
 """
 
 from __future__ import annotations
@@ -21,10 +21,15 @@ from typing import Any
 import numpy as np
 import targets as bench
 
-from hystgen import engines, reference, simulation
-from hystgen.api import Model, emit_options
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.compensator import engines
+from hystgen.compensator.session import Session
 from hystgen.emission import module
-from hystgen.params import parse_parameters
+from hystgen.emission.calls import emit_options
+from hystgen.emission.options import OPERATORS
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 PLAYS = (1, 2, 3, 4, 6, 8, 16)
@@ -42,7 +47,7 @@ FRONTS = {
     "mixed": f"[{DEAD_ZONE}, {TANH}]",
     "mixed_branches": f"[{DEAD_ZONE}, {BRANCHES}]",
 }
-SHIPPED = Path(__file__).resolve().parents[1] / "hystgen"
+SHIPPED = Path(__file__).resolve().parents[1] / "hystgen" / "compensator"
 
 
 @functools.cache
@@ -60,12 +65,12 @@ def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict
     """Mean instructions of a sample on each core, for each operator."""
     one = model(n, DEAD_ZONE if kind == "gpi" else "")
     files = sources.write(folder, one, emit_options(one, "both", arithmetic, engine))
-    numbers, real = one.tables(arithmetic, engine), comparison.REALS[arithmetic]
-    ends = numbers.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1]
+    numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
+    ends = numbers.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
     drive = bench.multisine(bench.SAMPLES) * float(min(abs(ends[0]), ends[1]))
     drive = np.rint(drive) if real.kind == "i" else drive
-    call = np.full(len(drive), reference.OP_STEP, dtype=np.uint8)
-    session = simulation.Session(one.cascade, "forward", arithmetic, engine)
+    call = np.full(len(drive), slots.OP_STEP, dtype=np.uint8)
+    session = Session(one.cascade, "forward", arithmetic, engine)
     signals: dict[str, Any] = {"forward": drive, "inverse": session.run(drive)[0].astype(float)}
     found: dict[str, dict[str, float]] = {op: {} for op in signals}
     for core in engines.CORES:
@@ -108,16 +113,16 @@ def main() -> None:
     costs: list[tuple[Any, ...]] = []
     sizes: list[tuple[Any, ...]] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-costs-") as place:
-        for arithmetic, kind, n, engine in itertools.product(comparison.REALS, KINDS, PLAYS, engines.ENGINES):
+        for arithmetic, kind, n, engine in itertools.product(ARITHMETICS, KINDS, PLAYS, engines.ENGINES):
             if arguments.only != "sizes":
                 found = means(Path(place) / f"{len(costs)}", n, kind, arithmetic, engine)
                 costs += [(op, arithmetic, kind, n, engine, *map(round, cores.values())) for op, cores in found.items()]
                 print(*costs[-1], flush=True)
-        for arithmetic, kind in itertools.product(comparison.REALS, FRONTS):
+        for arithmetic, kind in itertools.product(ARITHMETICS, FRONTS):
             told_apart = kind in ("pi", "dead_zone") or (kind == "dead_zone_branches") == (arithmetic in ("q31", "q15"))
             if arguments.only == "costs" or not told_apart:
                 continue
-            for operator, engine in itertools.product(module.OPERATORS, engines.ENGINES):
+            for operator, engine in itertools.product(OPERATORS, engines.ENGINES):
                 found_code = code(Path(place) / f"code-{len(sizes)}", kind, operator, arithmetic, engine)
                 sizes.append((operator, arithmetic, kind, engine, *found_code.values()))
                 print(*sizes[-1], flush=True)

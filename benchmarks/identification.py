@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 import hystgen
-from hystgen import operators
 from hystgen.identification import pi, reduction, weights
+from hystgen.plays import operators
 from hystgen.records import Record
 
 Array = NDArray[np.float64]

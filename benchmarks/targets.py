@@ -35,10 +35,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import fixed_tables, reference, simulation, tables
-from hystgen.api import Model, emit_options
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.compensator import fixed_tables, float_tables
+from hystgen.compensator.session import Session
+from hystgen.emission.calls import emit_options
 from hystgen.emission.text import operand, table
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 HERE = Path(__file__).resolve().parent
@@ -149,8 +153,8 @@ def walk(samples: int) -> Reals:
 def together(records: Sequence[Reals]) -> tuple[Any, Reals]:
     """Operations and arguments that run drive records one after another, each from a reset."""
     x = np.concatenate([np.append(record[0], record) for record in records])
-    call = np.full(len(x), reference.OP_STEP, dtype=np.uint8)
-    call[np.cumsum([0, *(len(record) + 1 for record in records[:-1])])] = reference.OP_RESET
+    call = np.full(len(x), slots.OP_STEP, dtype=np.uint8)
+    call[np.cumsum([0, *(len(record) + 1 for record in records[:-1])])] = slots.OP_RESET
     return call, x
 
 
@@ -163,7 +167,7 @@ def from_drive(case: Case, drive: Reals, call: Any = None) -> Reals:
     if case.operator == "forward":
         return drive
     cascade = case.model.cascade
-    session = simulation.Session(cascade, "forward")
+    session = Session(cascade, "forward")
     x = session.run(drive)[0] if call is None else session.operate(call, drive)[0]
     return np.asarray(x + cascade.pi.weights[0] * (drive - np.clip(drive, *cascade.input_range)) * bool(case.middle))
 
@@ -316,7 +320,7 @@ def lsbs(case: Case) -> tuple[float, float]:
 def given(case: Case, drive: Reals, coarser: int = 1, call: Any = None) -> Any:
     """What the operator takes so that the plays see `drive`, in its own numbers: codes, `coarser` times the finest."""
     x = from_drive(case, drive, call)
-    real = comparison.REALS[case.arithmetic]
+    real = ARITHMETICS[case.arithmetic].number
     if real.kind != "i":
         return x.astype(real)
     codes = np.rint(x / lsbs(case)[case.operator == "inverse"] / coarser)
@@ -330,20 +334,20 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
     What is no number; a commit of the drive that is jumped from, behind a step elsewhere; and both, where the answer of
     the step before the commit is asked for again, which leads where the trial jumps to, and a step from there.
     """
-    odd = [np.nan, np.inf, -np.inf] if comparison.REALS[case.arithmetic].kind == "f" else []
+    odd = [np.nan, np.inf, -np.inf] if ARITHMETICS[case.arithmetic].number.kind == "f" else []
     paths: list[Reals] = []  # what the plays see, to know what the inverse has to be asked for
     for trial in found:
         paths += [trial, np.append(trial[:-2], trial[-1])]
         paths += [np.append(trial, on) for on in (trial[-2], -trial[-1])]
     call, drive = together(paths)
     asked = iter(np.split(given(case, drive, call=call), np.cumsum([len(path) + 1 for path in paths[:-1]])))
-    step, commit = reference.OP_STEP, reference.OP_COMMIT
+    step, commit = slots.OP_STEP, slots.OP_COMMIT
     operations: list[int] = []
     arguments: list[Any] = []
     ends = []
 
     def add(head: Any, *tail: tuple[int, Any]) -> None:
-        operations.extend([reference.OP_RESET, *[step] * (len(head) - 1), *(op for op, _ in tail)])
+        operations.extend([slots.OP_RESET, *[step] * (len(head) - 1), *(op for op, _ in tail)])
         arguments.extend([*head, *(x for _, x in tail)])
 
     for trial in found:
@@ -357,7 +361,7 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
             for x, (*_, last) in itertools.product(odd, on):
                 add(jump[:-2], (step, aside[-1]), (commit, applied), (step, x), (step, last))
         ends.append(len(operations))
-    real = comparison.REALS[case.arithmetic]
+    real = ARITHMETICS[case.arithmetic].number
     x = np.array(arguments)
     if real.kind == "i":
         x = np.clip(np.rint(x), np.iinfo(real).min, np.iinfo(real).max)
@@ -370,14 +374,14 @@ def ties() -> tuple[Any, Any]:
     arguments: list[float] = []
     for trial in TIES:
         words = trial.replace("commit ", "commit=").split()
-        operations += [reference.OP_RESET, *(reference.OP_COMMIT if "=" in w else reference.OP_STEP for w in words)]
+        operations += [slots.OP_RESET, *(slots.OP_COMMIT if "=" in w else slots.OP_STEP for w in words)]
         arguments += [0.0, *(float(w.rpartition("=")[2]) for w in words)]
     return np.array(operations, dtype=np.uint8), np.array(arguments, dtype=np.float32)
 
 
 def behind_commit(call: Any, x: Any) -> Any:
     """Which operations are steps of what is no number right behind a commit."""
-    return (call == reference.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == reference.OP_COMMIT)
+    return (call == slots.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == slots.OP_COMMIT)
 
 
 def plain(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]]:
@@ -441,7 +445,7 @@ class Bench:
         else:
             dtype = np.dtype(case.arithmetic).type
             weights, thresholds = ([dtype(x) for x in numbers] for numbers in (pi.weights, pi.thresholds))
-            limits = [list(tables.inward(*pair, dtype)) for pair in ends]
+            limits = [list(float_tables.inward(*pair, dtype)) for pair in ends]
             sizes += f"#define TEXTBOOK_REAL_MAX {'FLT' if dtype is np.float32 else 'DBL'}_MAX\n"
             kind = "textbook_real_t"
         names = ("INPUT_MIN", "INPUT_MAX", "OUTPUT_MIN", "OUTPUT_MAX")
@@ -460,7 +464,7 @@ class Bench:
         image = self.image(case, "textbook")
         core = emulator.Core(case.target, image)
         x = given(case, drive, 2)
-        answer, _ = core.run("textbook", "forward", np.full(len(x), reference.OP_STEP, dtype=np.uint8), x)
+        answer, _ = core.run("textbook", "forward", np.full(len(x), slots.OP_STEP, dtype=np.uint8), x)
         cascade = case.model.cascade
         forward = case.operator == "forward"
         into, out = (2 * lsb for lsb in (lsbs(case) if forward else lsbs(case)[::-1]))
@@ -484,7 +488,7 @@ class Bench:
         steps, returns, calls = [], [], []
         best = self._worst_trials(case)
         forms: list[tuple[Form, bool]] = [(plain, False)]
-        odd, inverse = comparison.REALS[case.arithmetic].kind == "f", case.operator == "inverse"
+        odd, inverse = ARITHMETICS[case.arithmetic].number.kind == "f", case.operator == "inverse"
         if odd or inverse:
             forms.append((interrupted, False))
         if odd and inverse:
@@ -497,7 +501,7 @@ class Bench:
             calls.append(form(case, best)[:2])
         for call, x in calls:
             core = self.run(case, image, "corners", x, call)
-            returning = behind_commit(call, x)[call == reference.OP_STEP]
+            returning = behind_commit(call, x)[call == slots.OP_STEP]
             steps.append(core.counts[~returning])
             returns.append(core.counts[returning])
             stack = max(stack, core.stack)
@@ -520,8 +524,8 @@ class Bench:
     ) -> emulator.Core:
         """A core after the steps `x`, or the operations `call`, whose answers have been compared with the reference."""
         numbers = case.model.tables(case.arithmetic, engine)
-        calls = ("signal", np.full(len(x), reference.OP_STEP, dtype=np.uint8) if call is None else call, x)
-        real = comparison.REALS[case.arithmetic]
+        calls = ("signal", np.full(len(x), slots.OP_STEP, dtype=np.uint8) if call is None else call, x)
+        real = ARITHMETICS[case.arithmetic].number
         record = comparison.expected_record(numbers, real, case.operator == "inverse", calls)
         core = emulator.Core(case.target, image)
         run = functools.partial(core.run, "bench", case.operator, counted=counted)
@@ -534,7 +538,7 @@ class Bench:
         differ little. What is built is searched, then the neighbours of what is found for dearer ones."""
         case = self._searched(case)
         if case not in self._worst:
-            real = comparison.REALS[case.arithmetic]
+            real = ARITHMETICS[case.arithmetic].number
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
             most, rounds = self._most(case), 6
             if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
@@ -555,7 +559,7 @@ class Bench:
         are no number behind a commit, and by all others otherwise."""
         case = self._searched(case)
         if (case, behind) not in self._worst_odd:
-            real = comparison.REALS[case.arithmetic]
+            real = ARITHMETICS[case.arithmetic].number
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
             most = self._most(case) // 8  # each has several forms
             best = list(self._worst_trials(case))
@@ -596,7 +600,7 @@ class Bench:
         that jump from the same place."""
         call, x, ends = form(case, found)
         counts = np.zeros(len(call))
-        counts[call == reference.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
+        counts[call == slots.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts
         counts[behind_commit(call, x) != behind] = 0
         dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
         kept: dict[bytes, Reals] = {}

@@ -14,8 +14,8 @@ import numpy as np
 mpl.use("svg")
 import matplotlib.pyplot as plt
 
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 
 MODEL = """
 hystgen: 1

@@ -14,73 +14,87 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
-# Everything is imported when it is first used: `hystgen emit` must start fast.
-_PLACES = {
-    "Cascade": "models",
-    "DeadZone": "models",
-    "FormatError": "tables",
-    "InverseCascade": "models",
-    "InverseModel": "api",
-    "Model": "api",
-    "NotInvertibleError": "models",
-    "PI": "models",
-    "ParameterError": "params",
-    "Session": "simulation",
-    "TanhEnvelope": "models",
-    "diagnose": "api",
-    "differences": "api",
-    "emit": "api",
-    "identify": "api",
-    "identify_batch": "api",
-    "load": "api",
-    "plan": "api",
-    "report_fit": "api",
-    "schema": "params",
-    "verify": "api",
-}
-
-_SUBMODULES = ("closed_loop", "density", "effects", "elastoplastic", "operators", "plants", "records")
-
-__all__ = [*sorted(_PLACES), *_SUBMODULES, "__version__"]
+from hystgen.basics.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from hystgen import closed_loop as closed_loop
-    from hystgen import density as density
     from hystgen import effects as effects
-    from hystgen import elastoplastic as elastoplastic
-    from hystgen import operators as operators
     from hystgen import plants as plants
     from hystgen import records as records
-    from hystgen.api import InverseModel as InverseModel
-    from hystgen.api import Model as Model
-    from hystgen.api import diagnose as diagnose
-    from hystgen.api import differences as differences
-    from hystgen.api import emit as emit
-    from hystgen.api import identify as identify
-    from hystgen.api import identify_batch as identify_batch
-    from hystgen.api import load as load
-    from hystgen.api import plan as plan
-    from hystgen.api import report_fit as report_fit
-    from hystgen.api import verify as verify
-    from hystgen.models import PI as PI
-    from hystgen.models import Cascade as Cascade
-    from hystgen.models import DeadZone as DeadZone
-    from hystgen.models import InverseCascade as InverseCascade
-    from hystgen.models import NotInvertibleError as NotInvertibleError
-    from hystgen.models import TanhEnvelope as TanhEnvelope
-    from hystgen.params import ParameterError as ParameterError
-    from hystgen.params import schema as schema
-    from hystgen.simulation import Session as Session
-    from hystgen.tables import FormatError as FormatError
+    from hystgen.basics.problems import FormatError as FormatError
+    from hystgen.basics.problems import NotInvertibleError as NotInvertibleError
+    from hystgen.basics.problems import ParameterError as ParameterError
+    from hystgen.cascade import PI as PI
+    from hystgen.cascade import Cascade as Cascade
+    from hystgen.cascade import InverseCascade as InverseCascade
+    from hystgen.compensator.session import Session as Session
+    from hystgen.diagnosis import diagnose as diagnose
+    from hystgen.emission.calls import differences as differences
+    from hystgen.emission.calls import emit as emit
+    from hystgen.fleet.batch import identify_batch as identify_batch
+    from hystgen.front.dead_zone.model import DeadZone as DeadZone
+    from hystgen.front.tanh.model import TanhEnvelope as TanhEnvelope
+    from hystgen.identification import identify as identify
+    from hystgen.model import InverseModel as InverseModel
+    from hystgen.model import Model as Model
+    from hystgen.model import load as load
+    from hystgen.parameters.schema import schema as schema
+    from hystgen.plays import density as density
+    from hystgen.plays import elastoplastic as elastoplastic
+    from hystgen.plays import operators as operators
+    from hystgen.report.fit import report_fit as report_fit
+    from hystgen.report.planned import plan as plan
+    from hystgen.verification.run import verify as verify
+
+# Where each public name is, imported when it is first used: `hystgen emit` has to start fast. A test holds this to the
+# imports above, which are what type checkers read.
+_PLACES = {
+    "Cascade": "cascade",
+    "DeadZone": "front.dead_zone.model",
+    "FormatError": "basics.problems",
+    "InverseCascade": "cascade",
+    "InverseModel": "model",
+    "Model": "model",
+    "NotInvertibleError": "basics.problems",
+    "PI": "cascade",
+    "ParameterError": "basics.problems",
+    "Session": "compensator.session",
+    "TanhEnvelope": "front.tanh.model",
+    "diagnose": "diagnosis",
+    "differences": "emission.calls",
+    "emit": "emission.calls",
+    "identify": "identification",
+    "identify_batch": "fleet.batch",
+    "load": "model",
+    "plan": "report.planned",
+    "report_fit": "report.fit",
+    "schema": "parameters.schema",
+    "verify": "verification.run",
+}
+
+_MODULES = {
+    "closed_loop": "closed_loop",
+    "density": "plays.density",
+    "effects": "effects",
+    "elastoplastic": "plays.elastoplastic",
+    "operators": "plays.operators",
+    "plants": "plants",
+    "records": "records",
+}
+
+__all__ = [*sorted(_PLACES), *_MODULES, "__version__"]
 
 
 def __getattr__(name: str) -> Any:
-    if name in _SUBMODULES:
-        return importlib.import_module(f"hystgen.{name}")
-    if name not in _PLACES:
+    if name in _MODULES:
+        value: Any = importlib.import_module(f"hystgen.{_MODULES[name]}")
+    elif name in _PLACES:
+        value = getattr(importlib.import_module(f"hystgen.{_PLACES[name]}"), name)
+    else:
         raise AttributeError(f"module 'hystgen' has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"hystgen.{_PLACES[name]}"), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return [*(name for name in globals() if name.startswith("__")), *_PLACES, *_MODULES]

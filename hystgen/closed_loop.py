@@ -37,14 +37,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, signal
 
-from hystgen import fixed_tables, tables
-from hystgen.api import InverseModel, Model, as_model, emit_options
-from hystgen.checks import finite
-from hystgen.models import PI, Cascade, InverseCascade
-from hystgen.simulation import Session
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.checks import finite
+from hystgen.cascade import PI, Cascade, InverseCascade
+from hystgen.compensator import fixed_tables
+from hystgen.compensator.session import Session
+from hystgen.emission.calls import emit_options
+from hystgen.emission.options import Options
+from hystgen.model import InverseModel, Model, as_model
 
 if TYPE_CHECKING:
-    from hystgen.emission import module
     from hystgen.verification.instance import Instance
 
 Array = NDArray[np.float64]
@@ -327,15 +329,16 @@ class _InUnits:
     Fixed point gets the nearest code, ties away from zero, as far as codes go (the last one again for a NaN).
     """
 
-    def __init__(self, operator: _Operator | Instance, model: Model, options: module.Options) -> None:
+    def __init__(self, operator: _Operator | Instance, model: Model, options: Options) -> None:
         self._operator = operator
         self._lsb: tuple[float, float] | None = None
-        if options.arithmetic not in tables.FLOAT_ARITHMETICS:
+        chosen = ARITHMETICS[options.arithmetic]
+        if chosen.fixed:
             emit = model.parameters.emit
             lsbs = fixed_tables.lsbs(model.cascade, options.arithmetic, emit.drive_lsb, emit.output_lsb)
             drive, output = map(float, lsbs)
             self._lsb = (output, drive) if options.operator == "inverse" else (drive, output)
-            self._most = 2 ** fixed_tables.CODE_BITS[options.arithmetic] - 1
+            self._most = chosen.code_max
         self._code = 0
 
     def reset(self) -> None:
@@ -353,7 +356,7 @@ class _InUnits:
         return float(self._operator.step(self._code) * self._lsb[1])
 
 
-def _one_operator(model: Model, operator: str, arithmetic: str | None, engine: str | None) -> module.Options:
+def _one_operator(model: Model, operator: str, arithmetic: str | None, engine: str | None) -> Options:
     if operator not in ("inverse", "forward"):
         raise ValueError(f"operator {operator!r} is neither inverse nor forward")
     return emit_options(model, operator, arithmetic, engine)

@@ -16,16 +16,17 @@ import numpy as np
 from modelfiles import FILES
 
 import hystgen
-from hystgen import reference
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import comparison, compilers
 
 CALLS = {
-    "step": reference.OP_STEP,
-    "init": reference.OP_INIT,
-    "reset": reference.OP_RESET,
-    "commit": reference.OP_COMMIT,
+    "step": slots.OP_STEP,
+    "init": slots.OP_INIT,
+    "reset": slots.OP_RESET,
+    "commit": slots.OP_COMMIT,
 }
 SANITIZERS = "address,undefined,float-cast-overflow"
 FLAGS = ["-std=c99", "-g", "-O1", f"-fsanitize=fuzzer,{SANITIZERS}", "-fno-sanitize-recover=all"]
@@ -101,7 +102,7 @@ class Target:
         rows = [[int(number) for number in line.split()] for line in lines]
         table = np.array([row + [-1] * (4 - len(row)) for row in rows], dtype=object).reshape(-1, 4)
         call = table[:, 0].astype(np.uint8)
-        real = comparison.REALS[self.arithmetic]
+        real = ARITHMETICS[self.arithmetic].number
         x, answer = (table[:, i].astype(f"u{real.itemsize}").view(real) for i in (1, 2))
         with np.errstate(invalid="ignore"):  # a signalling NaN that changes its type
             expected = comparison.expected_record(self.numbers, real, inverse, (name, call, x))
@@ -109,7 +110,7 @@ class Target:
         wrong = answer.view(bits) != expected.answer.view(bits)
         gathered = 0
         for i, read in enumerate(table[:, 3]):
-            if call[i] in (reference.OP_INIT, reference.OP_RESET):
+            if call[i] in (slots.OP_INIT, slots.OP_RESET):
                 gathered = 0
             gathered |= int(expected.status[i])
             if read >= 0:
@@ -135,7 +136,7 @@ def build(
     """Emit a model, whose C `change` may alter, and build its fuzzer; in fixed point with both engines."""
     clang = compilers.find("clang")
     assert clang, "clang is not installed"
-    real = comparison.REALS[arithmetic]
+    real = ARITHMETICS[arithmetic].number
     fixed = real.kind == "i"
     model = Model(parse_parameters(FILES[name], f"{name}.yaml"))
     hystgen.emit(model, folder, operator="both", arithmetic=arithmetic, engine=engine)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import re
 
-from hystgen.api import Model
-from hystgen.fixed import PLAY_MAX, PLAY_MIN
-from hystgen.fixed_tables import build
+from hystgen.compensator.fixed_tables import build
+from hystgen.model import Model
+from hystgen.plays.slots import PLAY_MAX, PLAY_MIN
 
 BEFORE = """
 #include <stdint.h>

@@ -23,8 +23,8 @@ from modelfiles import FILES
 from ruamel.yaml import YAML
 
 import hystgen
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification.compilers import C_WARNINGS
 
 DEVIATIONS = Path(__file__).parent / "deviations.yaml"

@@ -13,9 +13,9 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen import arguments
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.basics import arguments
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.records import Record, read_record, read_records
 
 T = np.arange(60.0)

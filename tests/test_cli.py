@@ -26,8 +26,9 @@ from modelfiles import FILES, head
 from ruamel.yaml import YAML
 
 import hystgen
-from hystgen import cli, tables, verification
-from hystgen.bounds import error_bounds
+from hystgen import cli, verification
+from hystgen.compensator import tables
+from hystgen.compensator.bounds import error_bounds
 from hystgen.emission import banner, module
 from hystgen.emission.text import literal
 from hystgen.verification import compilers, run
@@ -508,7 +509,7 @@ def installed() -> str:
 @pytest.fixture
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Short verification records."""
-    monkeypatch.setattr(verification, "verify_model", partial(verification.verify_model, length=LENGTH))
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, length=LENGTH))
 
 
 LENGTH = 2000

@@ -23,10 +23,11 @@ from scipy import integrate, linalg, signal
 
 import hystgen
 from hystgen import PI, Cascade, DeadZone, Model, closed_loop
-from hystgen.bounds import error_bounds
+from hystgen.basics.problems import UnsupportedEffectsError
 from hystgen.closed_loop import BitReference, CompiledC, Loop, PIController, Response
-from hystgen.params import parse_parameters
-from hystgen.problems import UnsupportedEffectsError
+from hystgen.compensator.bounds import error_bounds
+from hystgen.emission.calls import emitted_files
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers
 
 Array = NDArray[np.float64]
@@ -483,7 +484,7 @@ def test_a_coarser_arithmetic_moves_the_drive_by_no_more_than_its_header_states(
     stage = model(NOTE)
     compiled = CompiledC(stage, arithmetic=arithmetic)
     response = Loop((NUMERATOR, DENOMINATOR), GAINS, T, stage, compiled).run(wanted, 1.0)
-    header = hystgen.api.emitted_files(stage, arithmetic=arithmetic)["note.h"]
+    header = emitted_files(stage, arithmetic=arithmetic)["note.h"]
     stated = {
         line.split()[1]: float(line.split()[2].strip("()f"))
         for line in header.splitlines()

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hystgen import api, compiled
+from hystgen import model
+from hystgen.basics import jit
 
 STAGE = """hystgen: 1
 name: stage
@@ -33,7 +34,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("stage.yaml").write_text(STAGE, encoding="utf-8")
     t = np.arange(600) * 1e-3
     v = np.sin(100.0 * t) * np.linspace(0.3, 1.0, len(t))
-    y = api.load("stage.yaml").simulate(v) + 1e-3 * np.cos(7.0 * np.arange(len(t)))
+    y = model.load("stage.yaml").simulate(v) + 1e-3 * np.cos(7.0 * np.arange(len(t)))
     rows = [f"{a!r},{b!r},{c!r}" for a, b, c in zip(t.tolist(), v.tolist(), y.tolist(), strict=True)]
     Path("record.csv").write_text("\n".join(["t,v [V],y [µm]", *rows, ""]), encoding="utf-8")
 
@@ -231,12 +232,12 @@ def doubled(x: float) -> float:
 def compiled_once() -> tuple[float, list[str]]:
     """What `doubled` gives as a fresh process compiles or loads it, and the words on that."""
     words: list[str] = []
-    compiled._listen()
-    compiled.announce = words.append
+    jit._listen()
+    jit.announce = words.append
     try:
-        return compiled.compile_together([doubled]).doubled(1.5), words
+        return jit.jit(doubled)(1.5), words
     finally:
-        compiled.announce = None
+        jit.announce = None
 
 
 def test_no_cache_of_compiled_code_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -249,7 +250,7 @@ def test_no_cache_of_compiled_code_is_needed(monkeypatch: pytest.MonkeyPatch) ->
     for each in (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator, caching.UserWideCacheLocator):
         monkeypatch.setattr(each, "ensure_cache_path", refused)
     for _ in range(2):
-        assert compiled_once() == (3.0, [compiled.EVERY_TIME])
+        assert compiled_once() == (3.0, [jit.EVERY_TIME])
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
@@ -260,11 +261,11 @@ def test_files_of_the_cache_that_are_cut_off_are_made_again(
     import numba
 
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
-    assert compiled_once() == (3.0, [compiled.ONCE])
+    assert compiled_once() == (3.0, [jit.ONCE])
     assert compiled_once() == (3.0, [])
     for path in (tmp_path / "cache").rglob(f"*.{ending}"):
         os.truncate(path, int(share * path.stat().st_size))
-    assert compiled_once() == (3.0, [compiled.ONCE])
+    assert compiled_once() == (3.0, [jit.ONCE])
     assert compiled_once() == (3.0, []), "it was repaired"
 
 

@@ -19,8 +19,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from hystgen.density import DensityError, Discretisation, from_formula, from_table, parse_formula
-from hystgen.params import parse_parameters
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays.density import DensityError, Discretisation, from_formula, from_table, parse_formula
 
 Curve = Callable[[float], float]
 U = 2.0**-53  # what one rounding may add, as a share of its result

@@ -22,7 +22,7 @@ from recordings import brute_output, noisy, part_of_file, record, wander, write_
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen import parallel
+from hystgen.basics import parallel
 from hystgen.diagnosis import (
     Diagnosis,
     _extended,
@@ -37,13 +37,13 @@ from hystgen.diagnosis import (
 )
 from hystgen.diagnosis.held_out import set_aside
 from hystgen.diagnosis.structure import Item
-from hystgen.effects.ageing import ExponentialAgeing
+from hystgen.effects.ageing.model import ExponentialAgeing
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
-from hystgen.effects.creep import ExponentialCreep
-from hystgen.effects.drift import LinearDrift
-from hystgen.effects.noncongruent import PlayFunctions
-from hystgen.effects.rate_dependence import RelaxingPlays
-from hystgen.effects.sensor_nonlinearity import SensorPolynomial
+from hystgen.effects.creep.model import ExponentialCreep
+from hystgen.effects.drift.model import LinearDrift
+from hystgen.effects.noncongruent.model import PlayFunctions
+from hystgen.effects.rate_dependence.model import RelaxingPlays
+from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
 from hystgen.identification.fronts import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record
 from hystgen.report import diagnosis as report
@@ -177,7 +177,7 @@ class TestSeveralProcesses:
     def test_an_interrupt_leaves_nothing(self, case: Path, forks: int, fits: int) -> None:
         program = (
             "import os, sys; from hystgen import cli, parallel; from hystgen.diagnosis import trials; "
-            "from hystgen.progress import Progress; tick = Progress.tick; "
+            "from hystgen.basics.progress import Progress; tick = Progress.tick; "
             "Progress.tick = lambda bar, n: (print('fitted', flush=True), tick(bar, n)); "
             "trials.LARGE = 0; parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"

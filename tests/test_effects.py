@@ -21,12 +21,15 @@ from numpy.typing import NDArray
 from scipy import integrate, interpolate, signal, special
 
 import hystgen
-from hystgen import effects, parallel
-from hystgen.effects import About, Chain, Effect, Place, Run, recursions
+from hystgen import effects
+from hystgen.basics import parallel
+from hystgen.basics.problems import EffectsError
+from hystgen.cascade import PI, Cascade
+from hystgen.chain.chain import VISIT, Chain, in_order, join
+from hystgen.effects import About, Effect, Place, Run, recursions
 from hystgen.effects.base import Compensated
-from hystgen.effects.chain import VISIT, in_order, join
-from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
-from hystgen.problems import EffectsError
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.tanh.model import TanhEnvelope
 
 Array = NDArray[np.float64]
 
@@ -587,7 +590,7 @@ def test_relaxing_plays_that_threads_share_are_those_computed_one_by_one(monkeyp
     assert len(shared) > 1
     for i in range(1, 12):
         expected = np.empty((1, 3000))
-        recursions.code().relaxing_plays(
+        recursions.relaxing_plays(
             w, np.diff(t), thresholds[i : i + 1], 4e-3, 1.4, float(thresholds[-1]), np.zeros(1), expected
         )
         assert np.array_equal(found[i], expected[0])
@@ -605,7 +608,7 @@ def test_a_relaxation_over_moves_of_some_roundings(exponent: float) -> None:
         state = x - side * (r + rng.integers(-3, 1000) * 1.8e-15)
         moves.append((x, x + rng.integers(-3, 4) * 1.8e-15, state))
     for x, target, state in moves:
-        left = float(recursions.code().relaxed(x, target, 0.01, r, tau, exponent, 2.0, state))
+        left = float(recursions.relaxed(x, target, 0.01, r, tau, exponent, 2.0, state))
         assert abs(target - left) <= max(r, abs(x - state)) + 2e-14
 
 
@@ -916,7 +919,7 @@ model:
 
 
 def model_of(text: str, head: str = FILE) -> hystgen.Model:
-    from hystgen.params import parse_parameters
+    from hystgen.parameters.files import parse_parameters
 
     return hystgen.Model(parse_parameters(head + text))
 
@@ -957,12 +960,12 @@ def test_what_effects_do_not_have_yet_is_refused_by_name(ask: Callable[[hystgen.
 
 def test_loading_a_plain_model_imports_no_effect() -> None:
     code = (
-        "import sys, hystgen.params as p; p.parse_parameters('hystgen: 1\\nname: a\\ninput_range: [0, 1]\\n"
+        "import sys, hystgen.parameters.files as p; p.parse_parameters('hystgen: 1\\nname: a\\ninput_range: [0, 1]\\n"
         "model: {pi: {thresholds: [0], weights: [1]}}'); print(*sys.modules)"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert "hystgen.effects" in loaded
-    assert not {"hystgen.effects.base", "hystgen.effects.lag", "numpy", "numba", "scipy"} & set(loaded)
+    assert not {"hystgen.effects.base", "hystgen.effects.lag.model", "numpy", "numba", "scipy"} & set(loaded)
 
 
 # Effects of the user's own --------------------------------------------------------------------------------
@@ -995,7 +998,8 @@ def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
     (candidate,) = neighbour.candidates(about)
     assert np.array_equal(candidate.build(candidate.none).added(Run(t, v)), np.zeros(len(t)))
     assert effects.load_user_effects(EXAMPLE) == (neighbour,), "loaded once"
-    from hystgen.params import ParameterError, dump_parameters, load_parameters, parse_parameters
+    from hystgen.basics.problems import ParameterError
+    from hystgen.parameters.files import dump_parameters, load_parameters, parse_parameters
 
     text = dump_parameters(model.parameters)
     assert parse_parameters(text, "f", [neighbour]) == model.parameters
@@ -1116,7 +1120,7 @@ def test_one_effect_says_how_the_plays_move(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(MOVER)
     path = tmp_path / "stage.yaml"
     path.write_text(FILE + "    - {name: rate_dependence, betas: [0.1, 0.1, 0.1]}\n    - {name: user:own}\n")
-    from hystgen.params import ParameterError
+    from hystgen.basics.problems import ParameterError
 
     with pytest.raises(ParameterError, match="user:own says how the plays move, as rate_dependence does") as caught:
         hystgen.load(path, effects=[tmp_path / "own.py"])

@@ -15,14 +15,16 @@ from elftools.elf.elffile import ELFFile
 from modelfiles import FILES
 
 import hystgen
-from hystgen import reference
-from hystgen.api import Model, emit_options
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.cascade import PI, Cascade
+from hystgen.compensator.engines import ENGINES, choose
+from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.text import literal
-from hystgen.engines import ENGINES, choose
-from hystgen.models import PI, Cascade, DeadZone
-from hystgen.params import parse_parameters
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, host, signals, sources
-from hystgen.verification.comparison import REALS
 
 GOLDEN = Path(__file__).parent / "golden"
 LAYOUTS = ("self-contained", "single-header", "shared-runtime")
@@ -128,12 +130,12 @@ TIES: dict[str, tuple[tuple[float, float], list[float], list[float], str, str]] 
         "reset 9.62220573425293 step 9.62220573425293 commit 6 commit 2.75 step 9.62220573425293",
     ),
 }
-OPERATIONS = {"step": reference.OP_STEP, "commit": reference.OP_COMMIT, "reset": reference.OP_RESET}
+OPERATIONS = {"step": slots.OP_STEP, "commit": slots.OP_COMMIT, "reset": slots.OP_RESET}
 
 
 def differing(one: Model, calls: signals.Calls, folder: Path) -> list[tuple[str, int, int]]:
     """Builds for this machine, samples of each and how many have other bits than the reference."""
-    real = REALS["float32"]
+    real = ARITHMETICS["float32"].number
     record = comparison.expected_record(one.tables("float32", "corners"), real, True, calls)
     files = sources.write(folder, one, emit_options(one, "inverse", "float32", "corners"))
     rows = host.rows(files, lambda _: [record], real, ["gcc"], folder, lambda _: None)
@@ -187,12 +189,12 @@ def beside_limits(one: Model, length: int) -> signals.Calls:
     rng = np.random.default_rng(17)
     low, high = one.parameters.input_range
     least, most = one.cascade.output_range
-    op = rng.choice([reference.OP_STEP, reference.OP_COMMIT, reference.OP_RESET], length, p=[0.88, 0.08, 0.04])
+    op = rng.choice([slots.OP_STEP, slots.OP_COMMIT, slots.OP_RESET], length, p=[0.88, 0.08, 0.04])
     x = np.empty(length, np.float32)
     for i in range(length):
         before = x[rng.integers(max(0, i - 20), i)] if i else np.float32(0)
         kind = rng.random()
-        if op[i] == reference.OP_COMMIT:
+        if op[i] == slots.OP_COMMIT:
             x[i] = rng.choice([low, high, rng.uniform(low, high)])
         elif kind < 0.4:
             x[i] = before + int(rng.integers(-16, 17)) * np.spacing(before)
@@ -258,7 +260,7 @@ def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_pa
         pytest.skip("gcc and its sanitizers are not installed")
     one = model(name)
     hystgen.emit(one, tmp_path, operator="both", arithmetic=arithmetic, engine=engine)
-    numbers, real = one.tables(arithmetic, engine), REALS[arithmetic]
+    numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     for op in ("forward", "inverse"):
         commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
         (tmp_path / "main.c").write_text(SANITIZED.format(name=name, op=op, commit=commit))
@@ -370,7 +372,7 @@ def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path
                     continue
                 with pytest.raises(compilers.CompileError, match="build without -f"):
                     run()
-    header = hystgen.api.emitted_files(model("curved"), arithmetic="float32")["curved.h"]
+    header = emitted_files(model("curved"), arithmetic="float32")["curved.h"]
     for words in ("flush denormal", "to nearest", "-fassociative-math", "-ffp-contract=fast"):
         assert words in header
 
@@ -435,7 +437,7 @@ def test_constant_tables_take_no_more_than_the_banner_says(
 
 @pytest.mark.parametrize("name", FILES)
 def test_nothing_forbidden_in_the_text(name: str) -> None:
-    for file, text in hystgen.api.emitted_files(model(name), operator="both", arithmetic="float32").items():
+    for file, text in emitted_files(model(name), operator="both", arithmetic="float32").items():
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
         assert not re.search(r"\b(double|malloc|printf|memcpy)\b", code), file
         assert " / " not in re.sub(r"\) / 2|middle\) / 2", "", code).replace("+ 1) / 2", ""), file
@@ -445,7 +447,7 @@ def test_nothing_forbidden_in_the_text(name: str) -> None:
 
 def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
     """A table of measured costs: rows by what stands before the two cores."""
-    with (Path(hystgen.__file__).parent / name).open() as file:
+    with (Path(hystgen.__file__).parent / "compensator" / name).open() as file:
         header, *rows = csv.reader(file)
     cores = header[-2:]
     return {tuple(row[:-2]): dict(zip(cores, map(int, row[-2:]), strict=True)) for row in rows}
@@ -508,7 +510,7 @@ def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("name", FILES)
 def test_error_bounds_hold(name: str, arithmetic: str, engine: str) -> None:
     """Against the double model, for drives and references inside the range."""
-    from hystgen.bounds import error_bounds
+    from hystgen.compensator.bounds import error_bounds
 
     one = model(name)
     bounds = error_bounds(one.cascade, arithmetic, engine)

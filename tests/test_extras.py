@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 import hystgen
-from hystgen import extras
+from hystgen.basics import extras
 
 ROOT = Path(hystgen.__file__).resolve().parents[1]
 
@@ -48,7 +48,7 @@ def test_else_from_where_it_was_installed(
 ) -> None:
     """As pip notes it in direct_url.json (PEP 610)."""
     text = None if url is None else json.dumps(url)
-    monkeypatch.setattr(extras, "__file__", str(tmp_path / "site-packages" / "hystgen" / "extras.py"))
+    monkeypatch.setattr(extras, "__file__", str(tmp_path / "site-packages" / "hystgen" / "basics" / "extras.py"))
     monkeypatch.setattr(importlib.metadata, "distribution", lambda _: SimpleNamespace(read_text=lambda _: text))
     assert words("plot") == expected
 

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from recordings import brute_output, columns, noisy, record, wander, write_csv, written
 
 import hystgen
+from hystgen.basics.problems import RecordError
 from hystgen.diagnosis import believed, intervals
+from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import IdentificationError, faults, pi, prepared
 from hystgen.identification.fronts import Tanh
-from hystgen.models import TanhEnvelope
-from hystgen.problems import RecordError
 from hystgen.records import Record, no_value, read_record
 
 Array = NDArray[np.float64]

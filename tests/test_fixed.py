@@ -15,15 +15,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
 
-import hystgen
-from hystgen import compiled, fixed, fixed_tables, reference
-from hystgen.api import Model, cascade_of
+from hystgen.basics.jit import plain
+from hystgen.basics.problems import FormatError
+from hystgen.cascade import PI, Cascade
 from hystgen.cli import main
-from hystgen.corners import memory
-from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
-from hystgen.params import parse_parameters
-from hystgen.simulation import Session
-from hystgen.tables import FormatError
+from hystgen.compensator import fixed_tables, reference
+from hystgen.compensator.layout import FixedTables
+from hystgen.compensator.session import Session
+from hystgen.emission.calls import emitted_files
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.model import Model, cascade_of
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import fixed, slots
+from hystgen.plays.corners import memory
 
 ARITHMETICS = ("q31", "q15")
 
@@ -65,7 +70,7 @@ def models(draw: st.DrawFn) -> Cascade:
     return Cascade(PI(r.tolist(), p.tolist()), stages, offset, (low * scale, scale))  # type: ignore[arg-type]
 
 
-def built(model: Cascade, arithmetic: str, engine: str = "corners") -> tuple[fixed.FixedTables, fixed_tables.Format]:
+def built(model: Cascade, arithmetic: str, engine: str = "corners") -> tuple[FixedTables, fixed_tables.Format]:
     return fixed_tables.build(model, arithmetic, engine)
 
 
@@ -86,12 +91,12 @@ def test_errors_stay_inside_the_bound_and_engines_agree(arithmetic: str, model: 
     except FormatError:
         return
     for operator, first, bound in (
-        ("forward", reference.DRIVE_MIN, form.forward_error),
-        ("inverse", reference.OUTPUT_MIN, form.inverse_error),
+        ("forward", slots.DRIVE_MIN, form.forward_error),
+        ("inverse", slots.OUTPUT_MIN, form.inverse_error),
     ):
         assert bound is not None
         codes = records(*(int(x) for x in tables.limits[first : first + 2]), seed)
-        most = 2 ** fixed_tables.CODE_BITS[arithmetic] - 1
+        most = 2 ** {"q31": 31, "q15": 15}[arithmetic] - 1
         codes = np.concatenate([codes, np.random.default_rng(seed).choice([-most - 1, *codes[:9], most], 60)])
         answers = Session(model, operator, arithmetic, "corners").run(codes)[0]
         assert (answers == Session(model, operator, arithmetic, "loop").run(codes)[0]).all()
@@ -103,7 +108,7 @@ def test_the_bound_covers_codes_beyond_a_range_that_ends_between_codes(arithmeti
     """They are limited to the last code inside, which is not where the double model goes."""
     model = Cascade(PI([0, 0.5, 2], [0.5, 0.7, 0.3], 1.0), (), 0.0, (2.0, 10.0))
     _, form = built(model, arithmetic)
-    most = 2 ** fixed_tables.CODE_BITS[arithmetic] - 1
+    most = 2 ** {"q31": 31, "q15": 15}[arithmetic] - 1
     codes = np.random.default_rng(2).choice([-most - 1, 0, most // 2, most], 200)
     error = np.abs(Session(model, "forward", arithmetic).run(codes)[0] - double(model, "forward", form, codes)).max()
     assert 0.5 < error <= form.forward_error
@@ -161,7 +166,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     model = load(name)
     tables, form = built(model, arithmetic)
     assert form.largest_sum < 2**62
-    plain = compiled.reference(tables, compiled=False)
+    operations = reference.operations(tables)
     whole = tables._replace(
         **{
             field: getattr(tables, field).astype(object)
@@ -171,17 +176,19 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         }
     )  # fmt: skip
     for inverse in (0, 1):
-        state = plain.new_state(whole)
-        plain.init(whole, state, inverse)
-        first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+        state = reference.new_state(whole)
+        with plain():
+            operations.init(whole, state, inverse)
+        first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
         codes = records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7]
         answers = []
         for code in codes.tolist():
-            answers.append((plain.inverse_step if inverse else plain.forward_step)(whole, state, code))
+            with plain():
+                answers.append((operations.inverse_step if inverse else operations.forward_step)(whole, state, code))
             assert max(map(abs, [state.real[memory.OUTPUT], *state.output])) <= form.largest_sum
             assert max(map(abs, [state.real[memory.INPUT], *state.input])) < 2**31
-        steps = np.full(len(codes), reference.OP_STEP)
-        assert answers == compiled.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
+        steps = np.full(len(codes), slots.OP_STEP)
+        assert answers == reference.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
 
 
 @given(
@@ -191,7 +198,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
 def test_nearest_rounds_ties_away_from_zero(x: int, bits: int) -> None:
     exact = Fraction(x, 2**bits)
     expected = math.floor(exact + Fraction(1, 2)) if exact >= 0 else -math.floor(-exact + Fraction(1, 2))
-    assert fixed.nearest(x, bits) == expected
+    assert fixed.nearest.py_func(x, bits) == expected
 
 
 @given(d=st.integers(0, 2**61), seed=st.integers(0, 1000))
@@ -201,7 +208,7 @@ def test_the_reciprocal_divides_to_the_nearest(d: int, seed: int) -> None:
         slope = int(tables.slope[k])
         if d // slope < 2**32:
             allowed = Fraction(1, 2) + Fraction(d, slope * 2**31) + Fraction(1, 2**8)
-            assert abs(int(fixed.over_slope(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
+            assert abs(int(fixed.over_slope.py_func(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
 
 
 @pytest.mark.parametrize("name", ["curved", "two_branches", "mixed", "bent", "behind"])
@@ -212,15 +219,15 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     tables, form = built(model, arithmetic)
     low, high = (int(x) for x in tables.limits[:2])
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
-    plain = compiled.reference(tables)
+    reference_code = reference.operations(tables)
     builder = fixed_tables._Builder(model, arithmetic, "corners", None, None)
     builder.build()
     for up in (1, 0) if tables.branches else (1,):
         exact = np.asarray(model.front(codes * float(form.drive_lsb), bool(up)))
-        w = np.array([plain.front_forward(tables, code, up) for code in codes])
+        w = np.array([reference_code.front_forward(tables, code, up) for code in codes])
         gap = np.abs(w * float(builder.step) - exact).max() / float(builder.step)
         assert gap <= builder.front[1 - up].error + 1e-4
-        back = np.array([plain.front_inverse(tables, x, up)[0] for x in w])
+        back = np.array([reference_code.front_inverse(tables, x, up)[0] for x in w])
         slopes = np.abs(np.diff(exact)) / float(form.drive_lsb)
         slack = (builder.front[3 - up].error / 2.0 ** int(tables.below[2])) + 0.5
         per_code = builder.front[1 - up].error * float(builder.step) / (slopes.min() * float(form.drive_lsb))
@@ -230,7 +237,7 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
 def test_converter_formats_are_honoured() -> None:
     text = FILES["plain"] + "\nemit: {arithmetic: q15, drive_lsb: 0.001, output_lsb: 0.002}\n"
     model = Model(parse_parameters(text, "plain.yaml"))
-    header = hystgen.api.emitted_files(model)["plain.h"]  # type: ignore[attr-defined]
+    header = emitted_files(model)["plain.h"]  # type: ignore[attr-defined]
     assert "PLAIN_DRIVE_LSB 0.001 " in header
     assert "PLAIN_OUTPUT_LSB 0.002" in header
     assert "PLAIN_DRIVE_MAX 4000" in header

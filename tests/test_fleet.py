@@ -22,10 +22,11 @@ import pytest
 from recordings import brute_output, noisy, wander, write_csv
 
 import hystgen
-from hystgen import extras, identification
-from hystgen.identification import outliers, workers
-from hystgen.identification.fleet import FIGURES, KEPT_IN
-from hystgen.identification.workers import Result, Task
+from hystgen import identification
+from hystgen.basics import extras
+from hystgen.fleet import batch, outliers, workers
+from hystgen.fleet.batch import FIGURES, KEPT_IN
+from hystgen.fleet.workers import Result, Task
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -321,7 +322,7 @@ def test_notes_that_cannot_be_read_are_one_warning(kind: str, few: Path, tmp_pat
 
 def test_another_version_of_the_tool_does_all_again(few: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hystgen.identify_batch(few, tmp_path / "params", jobs=1)
-    monkeypatch.setattr(hystgen, "__version__", "9")
+    monkeypatch.setattr(batch, "__version__", "9")
     done = hystgen.identify_batch(few, tmp_path / "params", jobs=1)
     assert not any(unit.kept for unit in done.units)
 

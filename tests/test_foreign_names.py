@@ -17,8 +17,9 @@ from foreign_names import NAMES, words
 from modelfiles import FILES
 
 import hystgen
-from hystgen.api import Model, emitted_files
-from hystgen.params import parse_parameters
+from hystgen.emission.calls import emitted_files
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers, targets
 
 REQUIRED = bool(os.environ.get("CI"))

@@ -22,7 +22,8 @@ from scipy.optimize import brentq
 
 import hystgen
 from hystgen import plants
-from hystgen.models import PI
+from hystgen.cascade import PI
+from hystgen.emission.calls import emitted_files
 from hystgen.plants import EverettTable, integration
 from hystgen.plants.jiles_atherton import langevin, langevin_slope
 from hystgen.records import Record
@@ -842,7 +843,7 @@ def test_friction_of_more_than_half_the_spring_has_no_inverse(example: Any) -> N
     assert fit.parameters.model.pi.weights[0] == 0.0
     assert any("p_0 is 0" in word for word in fit.warnings)
     with pytest.raises(hystgen.NotInvertibleError, match="p_0 > 0"):
-        hystgen.api.emitted_files(hystgen.Model(fit.parameters))
+        emitted_files(hystgen.Model(fit.parameters))
 
 
 def test_what_a_play_sum_cannot_do_is_told_apart(example: Any) -> None:

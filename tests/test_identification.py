@@ -30,8 +30,8 @@ from recordings import (
 from scipy.optimize import lsq_linear, minimize
 
 import hystgen
+from hystgen.basics.problems import NotInvertibleError
 from hystgen.identification import Fit, IdentificationError, identifier_from
-from hystgen.models import NotInvertibleError
 from hystgen.records import Record, RecordError
 from hystgen.verification import compilers
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
-from hystgen import extras
+from hystgen.basics import extras
 from hystgen.records import Record, RecordError, parse_columns, read_record
 
 N = 50

@@ -10,10 +10,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hystgen import memory
-from hystgen.bounds import error_bounds, largest_sum
-from hystgen.models import PI, Cascade, DeadZone, NotInvertibleError, TanhEnvelope
-from hystgen.simulation import Session
+from hystgen.basics.problems import NotInvertibleError
+from hystgen.cascade import PI, Cascade
+from hystgen.compensator.bounds import error_bounds, largest_sum
+from hystgen.compensator.session import Session
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.plays import memory
 
 U = 2.0**-53  # what one rounding may add, as a share of its result
 

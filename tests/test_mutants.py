@@ -13,9 +13,10 @@ import pytest
 from mutants import Mutant
 
 import hystgen
-from hystgen.api import Model
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.emission import module, runtime
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import comparison, host
 from hystgen.verification import run as verification
 from hystgen.verification.report import Report
@@ -30,7 +31,7 @@ SOURCES = {name: runtime.data_folder(name) for name in ("templates", "c_runtime"
 def expected(name: str, arithmetic: str, engine: str, inverse: bool) -> list[comparison.Expected]:
     """The records with the answers of the reference, which no mutant changes."""
     numbers = model(name).tables(arithmetic, engine)
-    return comparison.expected_records(numbers, comparison.REALS[arithmetic], inverse, LENGTH)
+    return comparison.expected_records(numbers, ARITHMETICS[arithmetic].number, inverse, LENGTH)
 
 
 @functools.cache

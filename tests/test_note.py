@@ -18,9 +18,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_models import DEAD_ZONE_4, ETA, EXAMPLE_1, PI_4, R4, RHO
 
-from hystgen import elastoplastic, operators
-from hystgen.bounds import error_bounds
-from hystgen.models import PI, Cascade, DeadZone, TanhEnvelope
+from hystgen.cascade import PI, Cascade
+from hystgen.compensator.bounds import error_bounds
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.plays import elastoplastic, operators
 
 ROOT = Path(__file__).resolve().parents[1]
 GALLERY = ROOT / "examples" / "note"

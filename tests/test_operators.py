@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import elastoplastic, memory, operators
+from hystgen.plays import elastoplastic, memory, operators
 
 U = 2.0**-53
 """What one rounding of a double changes at most, relatively."""

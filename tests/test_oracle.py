@@ -12,8 +12,8 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from tests.oracle import check, models
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*initial_state cannot have come:UserWarning")

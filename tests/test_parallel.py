@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from hystgen import parallel
+from hystgen.basics import parallel
 
 HERE = Path(__file__).resolve().parents[1]
 

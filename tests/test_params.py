@@ -20,11 +20,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from hystgen import param_checks, params, yaml_positions
-from hystgen.names import comment_text, name_problem
-from hystgen.params import (
-    ParameterError,
+from hystgen.basics.names import comment_text, name_problem
+from hystgen.basics.problems import ParameterError
+from hystgen.parameters import checks as param_checks
+from hystgen.parameters import yaml as yaml_positions
+from hystgen.parameters.files import (
+    DeadZoneParameters,
+    EmitDefaults,
     Parameters,
+    TanhParameters,
     canonical_json,
     dump_parameters,
     load_parameters,
@@ -656,7 +660,7 @@ def test_contract_example() -> None:
     assert parameters.model.pi.density is None
     assert parameters.model.pi.density_error is None
     (stage,) = parameters.model.memoryless
-    assert isinstance(stage, params.DeadZoneParameters)
+    assert isinstance(stage, DeadZoneParameters)
     assert stage.thresholds == (-1.0, -0.4, 0.0, 0.4, 1.0)
     assert parameters.emit.drive_lsb == 0.005
 
@@ -670,12 +674,12 @@ def test_values() -> None:
     zero = parse_parameters(ACCEPTED["negative_zero"]).model.pi
     assert str(zero.thresholds[0]) == "0.0"
     one, two = parse_parameters(ACCEPTED["stage_list"]).model.memoryless
-    assert isinstance(one, params.TanhParameters)
-    assert isinstance(two, params.DeadZoneParameters)
+    assert isinstance(one, TanhParameters)
+    assert isinstance(two, DeadZoneParameters)
     assert one.descending == one.ascending
     assert one.ascending.a0 == 6.0
     least = parse_parameters(H + M)
-    assert least.emit == params.EmitDefaults()
+    assert least.emit == EmitDefaults()
     assert (least.emit.operator, least.emit.arithmetic, least.emit.engine) == ("inverse", "float32", "auto")
     assert (least.model.pi.initial_state, least.model.output_offset, least.sample_time) == (0.0, 0.0, None)
 
@@ -1202,7 +1206,7 @@ def test_comment_text_is_harmless(text: str) -> None:
 
 
 def test_import_is_light() -> None:
-    code = "import sys, hystgen.params; print(*sorted({m.split('.')[0] for m in sys.modules}))"
+    code = "import sys, hystgen.parameters.files; print(*sorted({m.split('.')[0] for m in sys.modules}))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not {"mpmath", "numpy", "scipy", "numba", "jsonschema", "matplotlib", "jinja2"} & set(loaded)
 

@@ -16,9 +16,9 @@ from modelfiles import head
 
 import hystgen
 from hystgen import effects
-from hystgen.diagnosis import plan as plans
-from hystgen.diagnosis.plan import Plan
-from hystgen.problems import PlanError
+from hystgen.basics.problems import PlanError
+from hystgen.planning import plan as plans
+from hystgen.planning.plan import Plan
 from tests.plants.__main__ import main as plants
 from tests.plants.effects import catalogue
 

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hystgen.params import load_parameters
+from hystgen.parameters.files import load_parameters
 from hystgen.records import read_record
 from tests.plants import base, bench, case, effects, foreign, labels, refit, rivals, run, score, session
 from tests.plants.__main__ import main
@@ -62,7 +62,7 @@ class TestApart:
     """The generator knows nothing of the package, and the workflow nothing of the labels."""
 
     def test_names_are_the_catalogue(self) -> None:
-        from hystgen.params import EFFECT_NAMES
+        from hystgen.parameters.files import EFFECT_NAMES
 
         assert set(NAMES) == set(EFFECT_NAMES)
         assert set(rivals.RIVALS) == set(NAMES)

@@ -24,10 +24,10 @@ from granted import granted
 from modelfiles import FILES, head
 
 import hystgen
-from hystgen.api import Model
-from hystgen.params import parse_parameters
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers, signals
-from hystgen.verification.comparison import REALS
 
 THRESHOLDS = np.linspace(0.0, 9.0, 65)
 WEIGHTS = np.concatenate([[0.7], 0.0375 * np.exp(-THRESHOLDS[1:] / 5)])
@@ -237,7 +237,7 @@ def run(folder: Path, one: Model, arithmetic: str, op: str, sums: int = 1) -> st
     commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
     (folder / "main.c").write_text(RUN.format(name=name, op=op, commit=commit))
     gcc.run(["-std=c99", "-O2", "-I", folder, folder / "main.c", source, "-o", folder / "run"])
-    numbers, real = one.tables(arithmetic, "corners"), REALS[arithmetic]
+    numbers, real = one.tables(arithmetic, "corners"), ARITHMETICS[arithmetic].number
     said = ""
     for record, call, x in signals.suite(numbers, real, op == "inverse", 20_000):
         calls = np.rec.fromarrays([call, x.astype(real)], dtype=[("call", "u1"), ("x", real)])

@@ -28,18 +28,10 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
-from hystgen import cli, extras, identify
-from hystgen.progress import Progress
-from hystgen.records import (
-    LARGEST,
-    Record,
-    RecordError,
-    agreed_units,
-    hdf5,
-    parquet,
-    parse_columns,
-    read_record,
-)
+from hystgen import cli, identify
+from hystgen.basics import extras
+from hystgen.basics.progress import Progress
+from hystgen.records import LARGEST, Record, RecordError, agreed_units, hdf5, parquet, parse_columns, read_record
 from hystgen.records import headers as with_units
 from hystgen.records import text as record_text
 from hystgen.records.units import split_unit
@@ -1006,7 +998,7 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]
 
 # The bar ---------------------------------------------------------------------------------------------------
 
-PATIENT = "import sys, hystgen.progress as p; p.PATIENCE = {}; from hystgen import cli; cli.main(sys.argv[1:])"
+PATIENT = "import sys, hystgen.basics.progress as p; p.PATIENCE = {}; from hystgen import cli; cli.main(sys.argv[1:])"
 
 
 @every_format

@@ -25,7 +25,7 @@ from recordings import brute_output, brute_plays, noisy, wander, write_csv
 from scipy.stats import binned_statistic
 
 import hystgen
-from hystgen import extras
+from hystgen.basics import extras
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import drawing, fit_figures

@@ -12,7 +12,7 @@ import pytest
 
 import hystgen
 from hystgen import identification
-from hystgen.params import load_parameters
+from hystgen.parameters.files import load_parameters
 
 Run = Callable[..., tuple[int, str, str]]
 RECORDING = Path(__file__).resolve().parents[1] / "examples" / "stage_recording.csv"

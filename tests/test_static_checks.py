@@ -10,9 +10,9 @@ import static_checks
 from modelfiles import FILES
 from static_checks import MODULES, Finding, problems
 
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.compensator.engines import ENGINES
 from hystgen.emission.module import LAYOUTS
-from hystgen.engines import ENGINES
-from hystgen.tables import ARITHMETICS
 
 # A defect of each kind in C that compiles clean
 DEFECTS = {

@@ -11,10 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from modelfiles import FILES
 
-from hystgen import compiled, reference, tables
-from hystgen.api import Model, cascade_of
-from hystgen.models import Cascade, TanhEnvelope
-from hystgen.params import parse_parameters
+from hystgen.basics.jit import plain
+from hystgen.cascade import Cascade
+from hystgen.compensator import reference, tables
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.model import Model, cascade_of
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 
 CLOSE = 1e-7
 
@@ -103,17 +106,17 @@ class Compensator:
 
     def commit(self, v: float) -> int:
         if not math.isfinite(v):
-            return reference.HELD
+            return slots.HELD
         self.pending = min(max(v, self.plant.low), self.plant.high)
         self.asked = None
-        return reference.INPUT_CLAMPED if self.pending != v else 0
+        return slots.INPUT_CLAMPED if self.pending != v else 0
 
     def step(self, u: float) -> tuple[float, int, bool]:
         if self.pending is not None:
             self.plant.go(self.pending)
         sure, self.fresh = True, False
         if not math.isfinite(u):
-            bits = reference.HELD
+            bits = slots.HELD
             if not self.stepped:  # a committed first drive is where the actuator is
                 self.answer = self.held_before_any_step()
         elif self.asked is not None and u == self.asked:
@@ -129,7 +132,7 @@ class Compensator:
         bits = 0
         limited = min(max(u, self.out[0]), self.out[1])
         if limited != u:
-            bits |= reference.INPUT_CLAMPED
+            bits |= slots.INPUT_CLAMPED
         a = self.plant
         first = True if limited > self.level else False if limited < self.level else a.up
         self.level = limited
@@ -147,7 +150,7 @@ class Compensator:
             v = a.drive
         self.answer = min(max(v, a.low), a.high)
         if self.answer != v:
-            bits |= reference.OUTPUT_CLAMPED
+            bits |= slots.OUTPUT_CLAMPED
         return bits, min(abs(v - a.low), abs(v - a.high)) > CLOSE
 
 
@@ -164,7 +167,7 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
     made: list[tuple[int, float]] = []
     for _ in range(length):
         kind = rng.choice(
-            [reference.OP_STEP, reference.OP_COMMIT, reference.OP_RESET, reference.OP_INIT], p=[0.75, 0.2, 0.03, 0.02]
+            [slots.OP_STEP, slots.OP_COMMIT, slots.OP_RESET, slots.OP_INIT], p=[0.75, 0.2, 0.03, 0.02]
         )
         part = rng.uniform(-0.1, 1.1)
         if rng.random() < 0.08:
@@ -177,21 +180,21 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
-    code = compiled.reference(numbers, compiled=False)
-    state = code.new_state(numbers)
-    code.init(numbers, state, int(inverse))
-    first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+    code, state = reference.operations(numbers), reference.new_state(numbers)
+    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range
     op = np.array([kind for kind, _ in made], dtype=np.uint8)
     x = np.array(
         [
-            drive_low + part * (drive_high - drive_low) if kind == reference.OP_COMMIT else low + part * (high - low)
+            drive_low + part * (drive_high - drive_low) if kind == slots.OP_COMMIT else low + part * (high - low)
             for kind, part in made
         ]
     )
     answers, status = np.zeros(len(x)), np.zeros(len(x), np.int64)
-    code.run(numbers, state, int(inverse), op, x, answers, status)
+    with plain():
+        code.init(numbers, state, int(inverse))
+        code.run(numbers, state, int(inverse), op, x, answers, status)
     return x, answers, status, np.array([low, high])
 
 
@@ -205,21 +208,21 @@ def test_inverse_does_what_the_contract_says(name: str, engine: str, made: list[
     spec = Compensator(model, (float(out[0]), float(out[1])))
     for i, (kind, _) in enumerate(made):
         sure = True
-        if kind == reference.OP_COMMIT:
+        if kind == slots.OP_COMMIT:
             expected = spec.commit(x[i])
-        elif kind == reference.OP_INIT:
+        elif kind == slots.OP_INIT:
             spec.set(np.array(model.pi.start))
             expected = 0
         else:
-            if kind == reference.OP_RESET:
+            if kind == slots.OP_RESET:
                 spec.set(np.zeros(model.pi.n + 1))
             v, expected, sure = spec.step(x[i])
-            if kind == reference.OP_STEP:
+            if kind == slots.OP_STEP:
                 assert answers[i] == pytest.approx(v, abs=CLOSE, rel=0), (i, kind, x[i])
                 if spec.fresh:
                     # Go on from the same drive, or differences of rounding would add up
                     spec.answer = spec.pending = float(answers[i])
-        mask = ~reference.DOMAIN if sure else ~(reference.DOMAIN | reference.OUTPUT_CLAMPED)
+        mask = ~slots.DOMAIN if sure else ~(slots.DOMAIN | slots.OUTPUT_CLAMPED)
         assert status[i] & mask == expected & mask, (i, kind, x[i], status[i], expected)
 
 
@@ -229,24 +232,24 @@ def test_inverse_does_what_the_contract_says(name: str, engine: str, made: list[
 @given(made=calls())
 def test_forward_does_what_the_contract_says(name: str, engine: str, made: list[tuple[int, float]]) -> None:
     model = load(name)
-    made = [(kind, part) for kind, part in made if kind != reference.OP_COMMIT]
+    made = [(kind, part) for kind, part in made if kind != slots.OP_COMMIT]
     x, answers, status, out = run(model, engine, False, made)
     plant = Actuator(model)
     plant.set(np.array(model.pi.start))
     for i, (kind, _) in enumerate(made):
         expected = 0
-        if kind == reference.OP_INIT:
+        if kind == slots.OP_INIT:
             plant.set(np.array(model.pi.start))
         else:
-            if kind == reference.OP_RESET:
+            if kind == slots.OP_RESET:
                 plant.set(np.zeros(model.pi.n + 1))
             if math.isfinite(x[i]):
                 limited = min(max(x[i], out[0]), out[1])
-                expected = reference.INPUT_CLAMPED if limited != x[i] else 0
+                expected = slots.INPUT_CLAMPED if limited != x[i] else 0
                 plant.go(float(limited))
             else:
-                expected = reference.HELD
-            if kind == reference.OP_STEP:
+                expected = slots.HELD
+            if kind == slots.OP_STEP:
                 assert answers[i] == pytest.approx(plant.output(), abs=CLOSE, rel=0)
         assert status[i] == expected
 

@@ -20,13 +20,16 @@ from click.testing import CliRunner
 from modelfiles import FILES, PLAYS
 
 import hystgen
-from hystgen import extras, reference
-from hystgen.api import Model, emit_options, emitted_files
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import extras
 from hystgen.cli import main
 from hystgen.emission import module
-from hystgen.params import parse_parameters
+from hystgen.emission.calls import emit_options, emitted_files
+from hystgen.emission.options import LAYOUTS
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import Row, avr, compilers, cross, emulator, firmware, sources, targets
-from hystgen.verification.comparison import REALS
 
 CORES = tuple(target.name for target in targets.TARGETS)
 AVR_CXX = "avr-g++"
@@ -213,7 +216,7 @@ AVR_DIALECTS = (
 
 
 @pytest.mark.slow(one_in=3)
-@pytest.mark.parametrize("layout", module.LAYOUTS)
+@pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize(("name", "engine"), [("mixed", "corners"), ("listed", "loop")])
 def test_compiles_for_the_avr_in_every_dialect(
@@ -418,7 +421,7 @@ def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_pat
         cross.find(target, "zig").image(files, tmp_path / "build", flags, cross.Layout(), "hystgen_harness_forward")
     )
     core = emulator.Core(target, image)
-    call = np.array([reference.OP_STEP, reference.OP_RESET, reference.OP_INIT, reference.OP_STEP] * 5, dtype=np.uint8)
+    call = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT, slots.OP_STEP] * 5, dtype=np.uint8)
     core.run("naked", "forward", call, np.zeros(20, dtype=np.float32))
     assert core.counts.tolist() == [4] * 10
     assert 0 < core.stack <= 16  # the reset's, which calls a step that needs none
@@ -538,7 +541,7 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [
-        *((name, arithmetic, "corners") for name in ("plain", "two_branches") for arithmetic in REALS),
+        *((name, arithmetic, "corners") for name in ("plain", "two_branches") for arithmetic in ARITHMETICS),
         ("plain", "q15", "loop"),
         ("two_branches", "float64", "loop"),
     ],

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hystgen import operators
+from hystgen.chain import chain
 from hystgen.diagnosis import thinning
 from hystgen.diagnosis.structure import Item
-from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
-from hystgen.effects.delay import Delay
-from hystgen.effects.lag import Lag
-from hystgen.effects.slew_limit import SlewLimit
+from hystgen.effects.delay.model import Delay
+from hystgen.effects.lag.model import Lag
+from hystgen.effects.slew_limit.model import SlewLimit
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,14 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen import extras, fixed, reference, tables
-from hystgen.api import Model
+from hystgen.basics import extras
+from hystgen.compensator import tables
+from hystgen.compensator.layout import FixedTables
 from hystgen.emission import module
-from hystgen.fixed import FixedTables
-from hystgen.params import parse_parameters
+from hystgen.front.curve import FORWARD, INVERSE
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
 from hystgen.verification import compilers, host, loading, signals
 
 
@@ -80,7 +83,7 @@ def test_a_changed_entry_that_a_single_code_reads_is_found(curve: str, changed_c
     bent = model("bent")
     numbers = bent.tables("q31", "corners")
     assert isinstance(numbers, FixedTables)
-    which = fixed.FORWARD if curve == "front" else fixed.INVERSE
+    which = FORWARD if curve == "front" else INVERSE
     pieces = slice(int(numbers.first[which]), int(numbers.first[which] + numbers.pieces[which]))
     single = [int(c[0]) for c in numbers.coefficient[pieces][np.diff(numbers.knot[pieces], append=2**31) == 1]]
     assert len(single) == 4
@@ -256,5 +259,5 @@ def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) ->
     assert np.isposinf(odd).any()
     assert np.isneginf(odd).any()
     called = {int(call) for op, _ in records.values() for call in np.unique(op)}
-    expected = {reference.OP_STEP, reference.OP_RESET, reference.OP_INIT}
-    assert called == (expected | {reference.OP_COMMIT} if inverse else expected)
+    expected = {slots.OP_STEP, slots.OP_RESET, slots.OP_INIT}
+    assert called == (expected | {slots.OP_COMMIT} if inverse else expected)

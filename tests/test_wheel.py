@@ -18,8 +18,9 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
-from hystgen.api import Model, emitted_files
-from hystgen.params import parse_parameters
+from hystgen.emission.calls import emitted_files
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from hystgen import writing
+from hystgen.basics import writing
 from hystgen.emission import files
 
 

@@ -10,7 +10,9 @@ import models
 import numpy as np
 import printed as note
 
-from hystgen import DeadZone, kernels, operators
+from hystgen import DeadZone
+from hystgen.front.tanh import kernels
+from hystgen.plays import operators
 from hystgen.report import drawing
 
 

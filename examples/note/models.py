@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import printed as note
 
-from hystgen import PI, density, operators
+from hystgen import PI
+from hystgen.plays import density, operators
 from hystgen.report import drawing
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import printed as note
 
-from hystgen import elastoplastic, operators
+from hystgen.plays import elastoplastic, operators
 from hystgen.report import drawing
 
 

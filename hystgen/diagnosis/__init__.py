@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import arguments
+from hystgen.basics import arguments, threads
 from hystgen.diagnosis import believed, channels, disturbances, floor, intervals, selection, starts, structure, told
 from hystgen.diagnosis.content import content_of
 from hystgen.diagnosis.disturbances import Cleaned
@@ -28,7 +28,7 @@ from hystgen.diagnosis.selection import Outcome
 from hystgen.diagnosis.structure import Fitted, Item
 from hystgen.diagnosis.trials import Records
 from hystgen.effects.base import Place
-from hystgen.identification import P0_FLOOR, remarks, stage_content, threads
+from hystgen.identification import P0_FLOOR, remarks, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError
 from hystgen.identification.thresholds import rounded
@@ -36,9 +36,9 @@ from hystgen.identification.weights import Weights
 from hystgen.records import Source, read_records, several
 
 if TYPE_CHECKING:
+    from hystgen.chain.static import StaticModel
     from hystgen.effects.base import Effect
-    from hystgen.models import Cascade
-    from hystgen.params import Parameters
+    from hystgen.parameters.files import Parameters
 
 Array = NDArray[np.float64]
 
@@ -114,8 +114,9 @@ class Diagnosis:
 
     def not_emitted(self) -> str:
         """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
-        from hystgen.api import Model, emit_options
-        from hystgen.problems import UnsupportedEffectsError
+        from hystgen.basics.problems import UnsupportedEffectsError
+        from hystgen.emission.calls import emit_options
+        from hystgen.model import Model
 
         try:
             emit_options(Model(self.parameters))
@@ -138,7 +139,7 @@ class Diagnosis:
         Raises PlotError without matplotlib.
         """
         from hystgen.emission import files
-        from hystgen.params import dump_parameters
+        from hystgen.parameters.files import dump_parameters
         from hystgen.report import diagnosis as report
 
         said = [f"Diagnosed by hystgen. {self.sentence()}", *(f"Warning: {text}" for text in self.warnings)]
@@ -147,8 +148,9 @@ class Diagnosis:
         return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
 
 
+@arguments.checked
 def diagnose(
-    parameters: Any,
+    source: Any,
     records: Source | Iterable[Source],
     *,
     holdout: Source | Iterable[Source] = (),
@@ -162,7 +164,7 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a believed model is missing.
 
-    `parameters`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
+    `source`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
     waveforms that judge; without them, or where too little of them can be compared, every third record, or the end of
     one, is set aside. `history`: drive values visited before every record, which is left out where the starts of the
     records contradict it; `rest`: seconds of pause after them. `effects`: further effects that take part.
@@ -171,11 +173,11 @@ def diagnose(
     weights on the free-run error, and accepted when it removes a worthwhile part of the held-out error that chance does
     not explain. Raises RecordError, IdentificationError, ValueError.
     """
-    from hystgen.api import as_model
+    from hystgen.basics.progress import Progress
     from hystgen.effects import Effect
-    from hystgen.progress import Progress
+    from hystgen.model import as_model
 
-    model = as_model(parameters)
+    model = as_model(source)
     given = model.parameters.model.effects
     fitted, others = several(records), several(holdout)
     if not fitted:
@@ -257,7 +259,7 @@ def diagnose(
 
 def _about_inverse(extended: Parameters, made: Weights) -> dict[str, Any]:
     """Whether the static part of the model that is written has an inverse, and what the user should know about it."""
-    from hystgen.api import cascade_of
+    from hystgen.model import cascade_of
 
     problems = cascade_of(extended).inverse_problems()
     said = remarks.about_inverse(np.array(extended.model.pi.weights), made)
@@ -280,7 +282,7 @@ STEPS = 120
 
 def _extended(
     parameters: Parameters,
-    cascade: Cascade,
+    cascade: StaticModel,
     fitted: Fitted,
     ready: believed.Prepared,
     user: Sequence[type[Effect]],
@@ -289,7 +291,7 @@ def _extended(
 
     Raises IdentificationError where nothing is left of it.
     """
-    from hystgen.params import make_parameters
+    from hystgen.parameters.files import make_parameters
 
     p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
     p[p < DUST * float(np.sum(p))] = 0.0

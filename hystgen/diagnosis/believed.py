@@ -11,15 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.chain import chain
+from hystgen.chain.static import StaticModel
 from hystgen.diagnosis import bad_samples, held_out
 from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
-from hystgen.effects import chain
 from hystgen.effects.base import Candidate, Effect, Run
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.stage import Stage
+from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import faults, pi, prepared, thresholds
 from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
-from hystgen.models import Cascade, DeadZone, Stage, TanhEnvelope
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -196,7 +199,7 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
     return first, second
 
 
-def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
+def structure_of(cascade: StaticModel, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
     """The believed model with its weights, thresholds, front and effects' numbers free, and where a search starts."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
@@ -204,7 +207,7 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
     return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
 
 
-def believed_weights(cascade: Cascade, structure: Structure) -> Array | None:
+def believed_weights(cascade: StaticModel, structure: Structure) -> Array | None:
     """The believed weights at the structure's thresholds next to their own; None behind a front, which has a scale."""
     if cascade.stages:
         return None
@@ -266,6 +269,6 @@ def _through(places: Array, believed: Sequence[float]) -> Array:
     return np.asarray(np.unique(moved))
 
 
-def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:
+def as_given(cascade: StaticModel, given: Sequence[Effect]) -> tuple[Actuator, Array]:
     """The believed model unchanged, and its weights."""
     return Actuator(np.array(cascade.pi.thresholds), cascade.stages, tuple(given)), np.array(cascade.pi.weights)

@@ -25,7 +25,7 @@ from hystgen.diagnosis.selection import Found, Outcome
 from hystgen.diagnosis.structure import Array, Fitted
 
 if TYPE_CHECKING:
-    from hystgen.params import Parameters
+    from hystgen.parameters.files import Parameters
 
 STRUCTURE = 0.15
 """Share of the residual's variance that goes with a variable on unseen samples, beyond which it is no noise."""

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
 from hystgen.diagnosis.drives import reversals
 from hystgen.diagnosis.periodic import repetition
 from hystgen.diagnosis.structure import Item
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 

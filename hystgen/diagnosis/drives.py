@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
 from hystgen.diagnosis.structure import Item
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]

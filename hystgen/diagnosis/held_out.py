@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.words import counted
 from hystgen.diagnosis.structure import Item
 from hystgen.identification.reduction import Course
 from hystgen.records import Record
-from hystgen.words import counted
 
 ENOUGH = 100
 """More samples than this have to be left of some record, to fit and held out each."""

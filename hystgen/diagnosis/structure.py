@@ -14,15 +14,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
-from hystgen.effects import chain
+from hystgen.chain import chain
 from hystgen.effects.base import Candidate, Effect, Place, Run
+from hystgen.front.stage import Stage
 from hystgen.identification import joint, reduction, weights
 from hystgen.identification.constrained import root_mean_square
 from hystgen.identification.fronts import Front, Kept
 from hystgen.identification.joint import DIFFERENCE, Shaped
 from hystgen.identification.reduction import Reduced
-from hystgen.models import Stage
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]

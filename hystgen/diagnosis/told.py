@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from hystgen.basics.words import counted
 from hystgen.diagnosis import description
-from hystgen.words import counted
 
 REPAIRED = ("saturated", "drop_outs", "held_samples", "isolated_samples", "swapped_channels", "history")
 """Kinds that are left out of the comparison or put right: what remains of the records is as good as any."""

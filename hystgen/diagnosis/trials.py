@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import parallel
+from hystgen.basics import parallel
+from hystgen.basics.problems import EffectsError
 from hystgen.diagnosis import drives, periodic
 from hystgen.diagnosis import structure as fits
 from hystgen.diagnosis.options import Option, about, front_names, options
@@ -19,7 +20,6 @@ from hystgen.diagnosis.thinning import everything, needed, thinned
 from hystgen.effects import recursions
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
-from hystgen.problems import EffectsError
 
 Array = NDArray[np.float64]
 

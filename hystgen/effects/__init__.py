@@ -1,12 +1,13 @@
-"""The catalogue of effects beyond the static model: one file an effect, each a forward model with its parameters.
+"""The catalogue of effects beyond the static model: one folder an effect, each with a forward model and its parameters.
 
-An effect's file is imported when a parameter file names it, so that plain models stay quick to load.
+An effect's `model` is imported when a parameter file names it, so that plain models stay quick to load.
 """
 
 from __future__ import annotations
 
 import functools
 import importlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,10 +16,9 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect as Effect
     from hystgen.effects.base import Place as Place
     from hystgen.effects.base import Run as Run
-    from hystgen.effects.chain import Chain as Chain
     from hystgen.effects.user import load_user_effects as load_user_effects
 
-CATALOGUE = (
+_FIRST = (
     "creep",
     "rate_dependence",
     "resonance",
@@ -32,19 +32,27 @@ CATALOGUE = (
     "sensor_nonlinearity",
     "noncongruent",
 )
-"""Names of the effects, each a module of this package whose `SHAPES` are its classes, the default shape first."""
+"""The order in which messages and searches name effects; any others follow by the alphabet."""
+
+
+def _catalogue() -> tuple[str, ...]:
+    found = [path.parent.name for path in Path(__file__).parent.glob("*/model.py")]
+    return tuple(sorted(found, key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name)))
+
+
+CATALOGUE = _catalogue()
+"""Names of the effects: the folders here, each with a `model` whose `SHAPES` are its classes, the default one first."""
 
 _PLACES = {
     "About": "base",
     "Candidate": "base",
-    "Chain": "chain",
     "Effect": "base",
     "Place": "base",
     "Run": "base",
     "load_user_effects": "user",
 }
 
-__all__ = ["CATALOGUE", "About", "Candidate", "Chain", "Effect", "Place", "Run", "load_user_effects", "shapes"]
+__all__ = ["CATALOGUE", "About", "Candidate", "Effect", "Place", "Run", "load_user_effects", "shapes"]
 
 
 @functools.cache
@@ -52,7 +60,7 @@ def shapes(name: str) -> tuple[type[Effect], ...]:
     """The classes of a catalogue entry, its default shape first. Raises KeyError for a name that is none."""
     if name not in CATALOGUE:
         raise KeyError(name)
-    found: tuple[type[Effect], ...] = importlib.import_module(f"hystgen.effects.{name}").SHAPES
+    found: tuple[type[Effect], ...] = importlib.import_module(f"hystgen.effects.{name}.model").SHAPES
     return found
 
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from hystgen import operators
+from hystgen.basics.words import counted
 from hystgen.effects import watched
-from hystgen.words import counted
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 

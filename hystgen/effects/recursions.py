@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled
-from hystgen.operators import followed
+from hystgen.basics.jit import jit
+from hystgen.plays.operators import followed
 
 Array = NDArray[np.float64]
 
@@ -31,6 +28,7 @@ SLIGHT = 1e-4
 """Share of the speed that friction may take while what it takes is summed along the way without it."""
 
 
+@jit
 def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Array) -> None:
     """First-order filter from the state `x`: `x_(k+1) = decay_k x_k + early_k u_k + late_k u_(k+1)`."""
     out[0] = x
@@ -39,6 +37,7 @@ def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Arr
         out[k + 1] = x
 
 
+@jit
 def creep(
     u: Array, step: NDArray[np.intp], decay: Array, early: Array, late: Array, weights: Array, states: Array,
     total: Array,
@@ -70,6 +69,7 @@ def creep(
                 total[k + 1, i] += weight * x[i]
 
 
+@jit
 def limit(u: Array, up: Array, down: Array, out: Array) -> None:
     """`u`, straight between samples, followed at no more than `up_k` upwards and `down_k` downwards in a step.
 
@@ -91,6 +91,7 @@ def limit(u: Array, up: Array, down: Array, out: Array) -> None:
         out[k + 1] = x
 
 
+@jit
 def rung(
     y: float, rate: float, u: float, after: float, c: float, s: float, ramp: float, step: float, damping: float
 ) -> tuple[float, float]:
@@ -103,6 +104,7 @@ def rung(
     )
 
 
+@jit
 def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float, out: Array) -> None:
     """Second-order low pass of every row of `u` (R, N), from rest, over steps with straight `u`.
 
@@ -131,6 +133,7 @@ def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float,
             out[i, k + 1] = y
 
 
+@jit
 def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Array) -> None:
     """Add `weight` times `scale xi^2 (c_2 + c_3 xi + ..)`, `xi = u/scale`, to `total`."""
     for k in range(len(u)):
@@ -141,6 +144,7 @@ def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Arr
         total[k] += weight * (scale * xi * xi * value)
 
 
+@jit
 def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, out: Array) -> None:
     """Plays whose thresholds are `r + beta rate_k`, from `states`, into the rows of `out`."""
     # Four side by side, since each by itself waits for its own last sample
@@ -160,6 +164,7 @@ def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, o
             out[i, k] = state
 
 
+@jit
 def mean_decay(x: float) -> float:
     """`(1 - exp(-x))/x`."""
     if x < 0.1:  # the series is as exact and far quicker
@@ -167,6 +172,7 @@ def mean_decay(x: float) -> float:
     return -math.expm1(-x) / x
 
 
+@jit
 def bent_decay(x: float) -> float:
     """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, what a growing disturbance leaves of its square's sum; 1/6 at 0."""
     if x < 0.1:
@@ -175,6 +181,7 @@ def bent_decay(x: float) -> float:
     return (1.0 - decay * (2.0 * x + decay)) / (2.0 * x * x * x)
 
 
+@jit
 def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
     """What `e` gains over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
 
@@ -194,6 +201,7 @@ def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float
     return c1 + (c2 + (c3 + (c4 + (c5 + c6)))), c6
 
 
+@jit
 def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
     """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
 
@@ -271,6 +279,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
     return e, 0.0
 
 
+@jit
 def relaxed(
     x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
 ) -> float:
@@ -302,6 +311,7 @@ def relaxed(
     return state
 
 
+@jit
 def relaxing_plays(
     w: Array, steps: Array, r: Array, tau: float, exponent: float, scale: float, states: Array, out: Array
 ) -> None:
@@ -318,6 +328,7 @@ def relaxing_plays(
             out[i, k + 1] = states[i]
 
 
+@jit
 def rubbed(way: float, reach: float) -> float:
     """What plays of thresholds up to `reach` lose to friction on a way on which more and more of them follow.
 
@@ -327,6 +338,7 @@ def rubbed(way: float, reach: float) -> float:
     return rising * rising * (rising / 6.0 + 0.5 * (way - rising))
 
 
+@jit
 def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
     """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `v[0]`, lose in each step of `v`.
 
@@ -362,28 +374,17 @@ def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
                 depth -= min(depth, 2)
 
 
-COMPILED: list[Callable[..., Any]] = [
-    follow, creep, limit, rung, ring, curve, followed, dilated_plays, mean_decay, bent_decay, taylor, stretch, relaxed,
-    relaxing_plays, rubbed, lost,
-]  # fmt: skip
-
-
-@functools.cache
-def code() -> Any:
-    """The compiled recursions."""
-    return compiled.compile_together(COMPILED)
-
-
 def load() -> None:
     """Have them compiled, or read from the cache, by running each of them on two samples."""
     u, step = np.arange(2.0), np.ones(1)
-    run, out = code(), np.empty(2)
-    run.follow(u, step, step, step, 0.0, out)
+    out = np.empty(2)
+    follow(u, step, step, step, 0.0, out)
     first = np.zeros(1, dtype=np.intp)
-    run.creep(u[:, None], first, *np.ones((3, 1, 1)), step, np.ones((1, 1)), out[:, None])
-    run.limit(u, step, step, out)
-    run.ring(u[None, :], step, step, step, step, 1.0, out[None, :])
-    run.curve(u, 1.0, step, 1.0, out)
-    run.dilated_plays(u, u, step, step, np.zeros(1), out[None, :])
-    run.lost(u, 1.0, np.empty(2), np.empty(1))
-    run.relaxing_plays(u, step, step, 1.0, 1.0, 1.0, np.zeros(1), out[None, :])
+    one = np.ones((1, 1))
+    creep(u[:, None], first, one, one, one, step, np.ones((1, 1)), out[:, None])
+    limit(u, step, step, out)
+    ring(u[None, :], step, step, step, step, 1.0, out[None, :])
+    curve(u, 1.0, step, 1.0, out)
+    dilated_plays(u, u, step, step, np.zeros(1), out[None, :])
+    lost(u, 1.0, np.empty(2), np.empty(1))
+    relaxing_plays(u, step, step, 1.0, 1.0, 1.0, np.zeros(1), out[None, :])

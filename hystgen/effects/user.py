@@ -10,8 +10,8 @@ import sys
 import traceback
 from pathlib import Path
 
+from hystgen.basics.problems import EffectsError
 from hystgen.effects.base import USER, Effect, Place
-from hystgen.problems import EffectsError
 
 METHODS = {
     Place.DRIVE: ("drive",),

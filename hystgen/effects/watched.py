@@ -5,14 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from hystgen.problems import EffectsError
-
-if TYPE_CHECKING:
-    from hystgen.effects.base import Candidate, Effect
+from hystgen.basics.problems import EffectsError
 
 FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
     "drive": lambda a, *_: a.shape,
@@ -30,7 +27,7 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
 """Shape of what each method answers, by its arguments; -1 stands for any number."""
 
 
-def watch(effect: type[Effect], base: type[Effect], name: str) -> None:
+def watch(effect: type[Any], base: type[Any], name: str) -> None:
     """Make what a class, or one between it and `base`, defines raise EffectsError where it fails or is of no use."""
     own: dict[str, Any] = {}
     for each in reversed(effect.__mro__[: effect.__mro__.index(base)]):
@@ -39,12 +36,12 @@ def watch(effect: type[Effect], base: type[Effect], name: str) -> None:
         if method in own:
             setattr(effect, method, _method(own[method], name, method))
     if "candidates" in own:
-        effect.candidates = classmethod(_candidates(own["candidates"].__func__, name))  # type: ignore[assignment, method-assign]
+        effect.candidates = classmethod(_candidates(own["candidates"].__func__, name))
 
 
 def _method(own: Callable[..., Any], name: str, method: str) -> Callable[..., Any]:
     @functools.wraps(own)
-    def answer(self: Effect, *arguments: Any) -> Any:
+    def answer(self: Any, *arguments: Any) -> Any:
         try:
             found = np.asarray(own(self, *arguments))
         except Exception as error:
@@ -61,9 +58,9 @@ def _method(own: Callable[..., Any], name: str, method: str) -> Callable[..., An
     return answer
 
 
-def _candidates(own: Callable[..., Any], name: str) -> Callable[..., list[Candidate]]:
+def _candidates(own: Callable[..., Any], name: str) -> Callable[..., list[Any]]:
     @functools.wraps(own)
-    def candidates(cls: type[Effect], about: Any) -> list[Candidate]:
+    def candidates(cls: type[Any], about: Any) -> list[Any]:
         try:
             return [_candidate(each, cls, name) for each in own(cls, about)]
         except EffectsError:
@@ -74,8 +71,8 @@ def _candidates(own: Callable[..., Any], name: str) -> Callable[..., list[Candid
     return candidates
 
 
-def _candidate(each: Candidate, cls: type[Effect], name: str) -> Candidate:
-    def build(x: Any) -> Effect:
+def _candidate(each: Any, cls: type[Any], name: str) -> Any:
+    def build(x: Any) -> Any:
         try:
             made = each.build(x)
         except Exception as error:

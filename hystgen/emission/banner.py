@@ -6,7 +6,7 @@ import hashlib
 import re
 from dataclasses import dataclass
 
-from hystgen.problems import printable
+from hystgen.basics.problems import printable
 
 OPTIONS = {
     "operator": ("inverse", "forward", "both"),

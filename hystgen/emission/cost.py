@@ -6,14 +6,12 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from hystgen import engines, reference
-from hystgen.fixed import FixedTables
-from hystgen.models import Cascade
-
-if TYPE_CHECKING:
-    from hystgen.emission.module import Options
+from hystgen.chain.static import StaticModel
+from hystgen.compensator import engines
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.emission.options import Options
+from hystgen.plays import slots
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,9 @@ class Memory:
 
 @dataclass(frozen=True)
 class Cost:
-    """Code of the module by core (`hystgen.engines`), memory on a 32-bit target and on an 8-bit AVR, where tables lie
-    in RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each operator."""
+    """Code of the module by core (`hystgen.compensator.engines`), memory on a 32-bit target and on an 8-bit AVR, where
+    tables lie in RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each
+    operator."""
 
     code: Mapping[str, int]
     memory: Memory
@@ -126,7 +125,7 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1
 
 
 def estimate(
-    cascade: Cascade, options: Options, numbers: reference.Tables | FixedTables, text: str, plays: str
+    cascade: StaticModel, options: Options, numbers: Tables | FixedTables, text: str, plays: str
 ) -> Cost:
     """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs.
 
@@ -150,7 +149,7 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
     return samples * sample, max(size for _, size in memory.instances)
 
 
-def _memory(cascade: Cascade, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
+def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
     n = cascade.pi.n
     real = REAL_BYTES[options.arithmetic]
     play, reach = (4, 8 if options.arithmetic == "q31" else 4) if fixed else (real, real)
@@ -191,7 +190,7 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     return layout.struct(plays, *beside, (corners * corner, alignment))[0], corner
 
 
-def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTables) -> str:
+def _worst(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str:
     """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside.
 
     A search through the corner list bisects it, and that through a block bisects it too: at most 3 + 2 b comparisons in
@@ -213,10 +212,10 @@ def _worst(n: int, op: str, corners: bool, numbers: reference.Tables | FixedTabl
     if isinstance(numbers, FixedTables) and fronts:
         products += passes * numbers.coefficient.shape[1]
         compares += passes * (int(max(numbers.pieces)).bit_length() + 2)
-    envelopes = sum(kind == reference.TANH for kind, _ in stages)
+    envelopes = sum(kind == slots.TANH for kind, _ in stages)
     for kind, size in stages:
-        products += passes if kind == reference.DEAD_ZONE else 2 * passes
-        compares += passes * size.bit_length() if kind == reference.DEAD_ZONE else 2 * passes
+        products += passes if kind == slots.DEAD_ZONE else 2 * passes
+        compares += passes * size.bit_length() if kind == slots.DEAD_ZONE else 2 * passes
     if envelopes:
         kernels = f", {envelopes} tanh"
         if op == "inverse":

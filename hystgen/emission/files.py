@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from hystgen import writing
+from hystgen.basics import writing
 
 
 def check(folder: Path, names: Iterable[str]) -> None:

@@ -5,41 +5,21 @@ from __future__ import annotations
 import functools
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import jinja2
 
-import hystgen
+from hystgen.basics.names import comment_text
+from hystgen.basics.problems import NotInvertibleError
+from hystgen.basics.version import __version__
+from hystgen.chain.static import StaticModel
 from hystgen.emission import banner, cost, numbers, runtime, selftest
-from hystgen.models import Cascade, NotInvertibleError, TanhEnvelope
-from hystgen.names import comment_text
-from hystgen.params import Parameters, parameters_sha256
+from hystgen.emission.options import Options
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.parameters.files import Parameters, parameters_sha256
 
-LAYOUTS = banner.OPTIONS["layout"]
-OPERATORS = banner.OPTIONS["operator"]
 LICENCE_WIDTH = 100
-
-
-@dataclass(frozen=True)
-class Options:
-    """What to emit: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`."""
-
-    operator: str
-    arithmetic: str
-    engine: str
-    layout: str
-
-    @property
-    def forward(self) -> bool:
-        """Whether the forward operator is part of it."""
-        return self.operator in ("forward", "both")
-
-    @property
-    def inverse(self) -> bool:
-        """Whether the inverse operator is part of it."""
-        return self.operator in ("inverse", "both")
 
 
 @functools.cache
@@ -59,7 +39,7 @@ def render(template: str, values: SimpleNamespace, **more: object) -> str:
     return _environment().get_template(template).render({**vars(values), **more})
 
 
-def files(parameters: Parameters, cascade: Cascade, options: Options) -> dict[str, str]:
+def files(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, str]:
     """File names and their ASCII text. Raises NotInvertibleError and tables.FormatError."""
     if options.inverse and cascade.inverse_problems():
         raise NotInvertibleError(cascade.inverse_problems())
@@ -144,7 +124,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         **about,
         rt=prefix,
         RT=prefix.upper(),
-        version=hystgen.__version__,
+        version=__version__,
         command=f"hystgen emit PARAMS --arithmetic {arithmetic} --layout shared-runtime",
         sha256="does not depend on any",
     )
@@ -167,7 +147,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
     }
 
 
-def _values(parameters: Parameters, cascade: Cascade, options: Options) -> SimpleNamespace:
+def _values(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
     name = parameters.name
     about = _arithmetic(options.arithmetic)
     shared = options.layout == "shared-runtime"
@@ -183,7 +163,7 @@ def _values(parameters: Parameters, cascade: Cascade, options: Options) -> Simpl
         RT=prefix.upper(),
         shared=shared,
         single_header=options.layout == "single-header",
-        version=hystgen.__version__,
+        version=__version__,
         command=_command(name, options),
         sha256=parameters_sha256(parameters),
         units=_units(parameters),
@@ -301,13 +281,13 @@ def _kernels(values: SimpleNamespace, options: Options) -> str:
     return text + "\n" + runtime.render(pieces, values.rt, family, static=True)
 
 
-def cost_of(parameters: Parameters, cascade: Cascade, options: Options) -> cost.Cost:
+def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
     """What the emitted model costs, as its banner says."""
     found: cost.Cost = _values(parameters, cascade, options).cost
     return found
 
 
-def _cost(cascade: Cascade, options: Options, values: SimpleNamespace, kernels: str) -> cost.Cost:
+def _cost(cascade: StaticModel, options: Options, values: SimpleNamespace, kernels: str) -> cost.Cost:
     text = _implementation(values) + (kernels if values.shared else "")
     return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays))
 
@@ -321,7 +301,7 @@ def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str
     return lines
 
 
-def _details(parameters: Parameters, cascade: Cascade, options: Options, values: SimpleNamespace) -> list[str]:
+def _details(parameters: Parameters, cascade: StaticModel, options: Options, values: SimpleNamespace) -> list[str]:
     about = comment_text(parameters.description)
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in cascade.stages]
     model = f"{cascade.pi.n} plays" + (f" behind {', '.join(kinds)}" if kinds else "")

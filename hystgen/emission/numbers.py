@@ -5,27 +5,27 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from hystgen import fixed, fixed_tables, reference, tables
-from hystgen.bounds import error_bounds
-from hystgen.corners.memory import BOTTOM, Curve, Start
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.names import comment_text
+from hystgen.chain.static import StaticModel
+from hystgen.compensator import fixed_tables, float_tables
+from hystgen.compensator.bounds import error_bounds
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.emission.options import Options
 from hystgen.emission.text import literal, operand, structure, table
-from hystgen.fixed import FixedTables
-from hystgen.models import Cascade
-from hystgen.names import comment_text
-from hystgen.params import Parameters
-from hystgen.reference import Tables
-
-if TYPE_CHECKING:
-    from hystgen.emission.module import Options
+from hystgen.front.curve import FORWARD, INVERSE
+from hystgen.parameters.files import Parameters
+from hystgen.plays import slots
+from hystgen.plays.corners.memory import BOTTOM, Curve, Start
 
 
-def fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
+def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     """What the templates need to know of the numbers; `prefix` is that of the types of the run time."""
-    if options.arithmetic in tables.FLOAT_ARITHMETICS:
+    if not ARITHMETICS[options.arithmetic].fixed:
         return _float_fields(parameters, cascade, options, prefix)
     return _fixed_fields(parameters, cascade, options, prefix)
 
@@ -33,17 +33,17 @@ def fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: s
 def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
     """The places of `limits` that both kinds of arithmetic have."""
     limits = numbers.limits
-    largest = limits[fixed.CODE_MAX] if isinstance(numbers, FixedTables) else math.inf
+    largest = limits[slots.CODE_MAX] if isinstance(numbers, FixedTables) else math.inf
     return {
         "numbers": numbers,
         # no code of the type lies beyond: a comparison would be always false
-        "drive_can_exceed": limits[reference.DRIVE_MAX] < largest,
-        "output_can_exceed": limits[reference.OUTPUT_MAX] < largest,
-        "drive_min": operand(limits[reference.DRIVE_MIN]),
-        "drive_max": operand(limits[reference.DRIVE_MAX]),
-        "output_min": operand(limits[reference.OUTPUT_MIN]),
-        "output_max": operand(limits[reference.OUTPUT_MAX]),
-        "offset": operand(limits[reference.OFFSET]),
+        "drive_can_exceed": limits[slots.DRIVE_MAX] < largest,
+        "output_can_exceed": limits[slots.OUTPUT_MAX] < largest,
+        "drive_min": operand(limits[slots.DRIVE_MIN]),
+        "drive_max": operand(limits[slots.DRIVE_MAX]),
+        "output_min": operand(limits[slots.OUTPUT_MIN]),
+        "output_max": operand(limits[slots.OUTPUT_MAX]),
+        "offset": operand(limits[slots.OFFSET]),
         "start": literal(numbers.start[0]),
         "start_list": len(numbers.start) > 1,
         "first_moves": {
@@ -53,14 +53,14 @@ def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
             }
             for op, first in (("forward", 0), ("inverse", 2))
         },
-        "hold": operand(limits[reference.HOLD]),
+        "hold": operand(limits[slots.HOLD]),
     }
 
 
-def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
+def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     name, real_t = parameters.name, f"{prefix}_real_t"
     corners = options.engine == "corners"
-    numbers = tables.build_float(cascade, options.arithmetic, options.engine, True, True)
+    numbers = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
     dtype = numbers.threshold.dtype.type
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
@@ -71,9 +71,9 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "stages": stages,
         "fronts": bool(stages),
         "envelopes": any(stage["kind"] == "envelope" for stage in stages),
-        "forward_max_error": operand(tables.upward(bounds.forward, dtype)),
-        "inverse_max_error": operand(tables.upward(bounds.inverse, dtype)) if options.inverse else "",
-        "inverse_rounding_error": operand(tables.upward(bounds.rounding, dtype)) if options.inverse else "",
+        "forward_max_error": operand(float_tables.upward(bounds.forward, dtype)),
+        "inverse_max_error": operand(float_tables.upward(bounds.inverse, dtype)) if options.inverse else "",
+        "inverse_rounding_error": operand(float_tables.upward(bounds.rounding, dtype)) if options.inverse else "",
         "wide_t": f"{name}_real_t",
         "play_t": f"{name}_real_t",
         "saturates": False,
@@ -159,7 +159,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:
     data = numbers.stage_data[int(numbers.stage_first[j]) :]
     own = f"{name}_stage_{j + 1}"
-    if numbers.stage_kind[j] == reference.TANH:
+    if numbers.stage_kind[j] == slots.TANH:
         ascending, descending = data[:7], data[7:14]
         if np.array_equal(ascending, descending):
             branches = [{"name": own, "numbers": [literal(x) for x in ascending]}]
@@ -185,13 +185,13 @@ def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) ->
     return {"kind": "dead_zone", "name": own, "arrays": arrays, "pointers": pointers, "n": n, "table": f"&{own}"}
 
 
-def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, prefix: str) -> dict[str, Any]:
+def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     name, emit = parameters.name, parameters.emit
     corners = options.engine == "corners"
     numbers, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
     limits = numbers.limits
     engine = (_fixed_corner_fields if corners else _fixed_loop_fields)(numbers, name, prefix, options)
-    fine = int(limits[fixed.FINE])
+    fine = int(limits[slots.FINE])
     units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in units)
     precision = [
@@ -209,7 +209,7 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     precision += [
         f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 bits hold "
         "2^63),",
-        f"    inputs of plays between {limits[fixed.PLAY_MIN]} and {limits[fixed.PLAY_MAX]}, "
+        f"    inputs of plays between {limits[slots.PLAY_MIN]} and {limits[slots.PLAY_MAX]}, "
         f"{form.sum_bits} fraction bits of an output code",
     ]
     return {
@@ -219,16 +219,16 @@ def _fixed_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
         "fronts": bool(numbers.fronts),
         "fine": fine,
         "fine_factor": 2**fine,
-        "fraction": int(limits[fixed.FRACTION]),
-        "code_max": int(limits[fixed.CODE_MAX]),
-        "saturates": bool(limits[fixed.SATURATED] == limits[fixed.CODE_MAX]),
+        "fraction": int(limits[slots.FRACTION]),
+        "code_max": int(limits[slots.CODE_MAX]),
+        "saturates": bool(limits[slots.SATURATED] == limits[slots.CODE_MAX]),
         "curves": _curves(numbers, name, options) if numbers.fronts else {},
         "drive_lsb": _physical(form.drive_lsb),
         "output_lsb": _physical(form.output_lsb),
         "forward_max_error": _decimal(form.forward_error),
         "inverse_max_error": _decimal(form.inverse_error) if options.inverse and form.inverse_error else "",
         "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
-        "shy": int(limits[fixed.SHY]),
+        "shy": int(limits[slots.SHY]),
         "half_code": 2**fine // 2,
         "wide_t": f"{prefix}_reach_t",
         "play_t": f"{prefix}_play_t",
@@ -248,8 +248,8 @@ def _fixed_loop_fields(numbers: FixedTables, name: str, prefix: str, options: Op
     arrays = [table(kind, f"{name}_{field}", list(getattr(numbers, field))) for field, kind, used in columns if used]
     if len(numbers.start) > 1:
         arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
-    margin = numbers.limits[fixed.MARGIN]
-    ends = (numbers.limits[fixed.PLAY_MIN] - margin, numbers.limits[fixed.PLAY_MAX] + margin)
+    margin = numbers.limits[slots.MARGIN]
+    ends = (numbers.limits[slots.PLAY_MIN] - margin, numbers.limits[slots.PLAY_MAX] + margin)
     pointers = [f"{name}_{field}" if used else "NULL" for field, _, used in columns]
     return {"arrays": arrays, "pointers": [*pointers, *map(literal, ends)]}
 
@@ -260,9 +260,9 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
     never = (numbers.reach[-1], numbers.way[-1], 0, 0, 1)
     plays = (numbers.reach[:-1], numbers.way[:-1], numbers.slope[1:], numbers.reciprocal[1:], numbers.shift[1:])
     rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in [*zip(*plays, strict=True), never])
-    most = (limits[fixed.MARGIN] - limits[fixed.PLAY_MIN], limits[fixed.PLAY_MAX] + limits[fixed.MARGIN])
+    most = (limits[slots.MARGIN] - limits[slots.PLAY_MIN], limits[slots.PLAY_MAX] + limits[slots.MARGIN])
     ends = f"{{{', '.join(map(literal, most))}}}"
-    parts = f"{literal(limits[reference.OFFSET])}, {ends}, {len(numbers.threshold) - 1}"
+    parts = f"{literal(limits[slots.OFFSET])}, {ends}, {len(numbers.threshold) - 1}"
     arrays = [
         f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
         f"static const {prefix}_curve_t {name}_model_curve = {{\n    {name}_model_segment, {parts}\n}};\n",
@@ -293,7 +293,7 @@ def _curves(numbers: FixedTables, name: str, options: Options) -> dict[str, dict
     """The curves of the memoryless part that are used: forward, and back where there is an inverse."""
     found = {}
     directions = (("_ascending", 0), ("_descending", 1)) if numbers.branches else (("", 0),)
-    kinds = (("front", fixed.FORWARD), ("back", fixed.INVERSE)) if options.inverse else (("front", fixed.FORWARD),)
+    kinds = (("front", FORWARD), ("back", INVERSE)) if options.inverse else (("front", FORWARD),)
     for kind, first in kinds:
         for direction, branch in directions:
             which = first + branch

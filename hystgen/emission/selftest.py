@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from hystgen import compiled, fixed, reference
+from hystgen.compensator import reference
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.emission.options import Options
 from hystgen.emission.text import literal
-from hystgen.fixed import FixedTables
+from hystgen.plays import slots
 
-if TYPE_CHECKING:
-    from hystgen.emission.module import Options
-
-CALLS = {reference.OP_STEP: "s", reference.OP_COMMIT: "c", reference.OP_RESET: "r"}
+CALLS = {slots.OP_STEP: "s", slots.OP_COMMIT: "c", slots.OP_RESET: "r"}
 
 
 def _fractions(length: int) -> list[float]:
@@ -32,7 +31,7 @@ def _fractions(length: int) -> list[float]:
     return path
 
 
-def operators(numbers: reference.Tables | FixedTables, options: Options) -> list[dict[str, Any]]:
+def operators(numbers: Tables | FixedTables, options: Options) -> list[dict[str, Any]]:
     """One entry an operator: its name and its samples as C text."""
     found = []
     for name in ("forward", "inverse"):
@@ -41,30 +40,30 @@ def operators(numbers: reference.Tables | FixedTables, options: Options) -> list
     return found
 
 
-def _samples(numbers: reference.Tables | FixedTables, inverse: bool) -> list[dict[str, Any]]:
+def _samples(numbers: Tables | FixedTables, inverse: bool) -> list[dict[str, Any]]:
     def at(low: Any, high: Any, part: float) -> Any:
         """The argument that far along a range: in the arithmetic's own operations, or the nearest code there is."""
         if isinstance(numbers, FixedTables):
-            most = int(numbers.limits[fixed.CODE_MAX])
+            most = int(numbers.limits[slots.CODE_MAX])
             return min(max(round(int(low) + (int(high) - int(low)) * part), -most - 1), most)
         real = numbers.threshold.dtype.type
         return low + (high - low) * real(part)
 
-    first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first], numbers.limits[first + 1]
-    drive_low, drive_high = numbers.limits[reference.DRIVE_MIN], numbers.limits[reference.DRIVE_MAX]
+    drive_low, drive_high = numbers.limits[slots.DRIVE_MIN], numbers.limits[slots.DRIVE_MAX]
     calls, arguments = [], []
     for i, part in enumerate(_fractions(180)):
-        calls.append(reference.OP_STEP)
+        calls.append(slots.OP_STEP)
         arguments.append(at(low, high, part))
         if inverse and i % 23 == 22:
-            calls.append(reference.OP_COMMIT)
+            calls.append(slots.OP_COMMIT)
             arguments.append(at(drive_low, drive_high, 0.3 + i / 1000.0))
         if i == 120:
-            calls.append(reference.OP_RESET)
+            calls.append(slots.OP_RESET)
             arguments.append(at(low, high, 0.25))
     x = np.array(arguments, dtype=numbers.threshold.dtype)
-    answers, status = compiled.answers(numbers, inverse, calls, x, compiled=False)
+    answers, status = reference.answers(numbers, inverse, calls, x, compiled=False)
     return [
         {"call": CALLS[c], "argument": literal(a), "answer": literal(y), "status": int(s)}
         for c, a, y, s in zip(calls, x, answers, status, strict=True)

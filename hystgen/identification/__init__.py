@@ -17,8 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import arguments, memory
-from hystgen.identification import gpi, pi, prepared, reduction, remarks, threads, uncertainty, used
+from hystgen.basics import arguments, threads
+from hystgen.basics.progress import Progress
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.stage import Stage
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.identification import gpi, pi, prepared, reduction, remarks, uncertainty, used
 from hystgen.identification.fit import HELD_OUT, Fit, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError
@@ -26,12 +30,11 @@ from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
 from hystgen.identification.thresholds import rounded
 from hystgen.identification.used import Used
-from hystgen.models import DeadZone, Stage, TanhEnvelope
-from hystgen.progress import Progress
+from hystgen.plays import memory
 from hystgen.records import SHORTEST, Record, Source, agreed_units, read_records, several
 
 if TYPE_CHECKING:
-    from hystgen.params import Parameters
+    from hystgen.parameters.files import Parameters
 
 MODELS = (*gpi.KINDS, "auto")
 """Names of the contract."""
@@ -51,6 +54,7 @@ PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
 
+@arguments.checked
 def identify(
     records: Source | Iterable[Source],
     *,
@@ -301,7 +305,7 @@ def _parameters(
     offset: float,
     first: Course,
 ) -> Parameters:
-    from hystgen.params import make_parameters
+    from hystgen.parameters.files import make_parameters
 
     r, p = fitted.solution.thresholds, fitted.solution.weights
     content: dict[str, object] = {"hystgen": 1, "name": name}
@@ -345,7 +349,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 def identifier_from(text: str) -> str:
     """A C identifier made from any text, such as a file's stem: `stage` where nothing is left of it."""
-    from hystgen.names import name_problem
+    from hystgen.basics.names import name_problem
 
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:

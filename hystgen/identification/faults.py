@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.words import counted
 from hystgen.identification.stretches import runs_of
 from hystgen.records import Record, no_value
-from hystgen.words import counted
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

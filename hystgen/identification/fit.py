@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import arguments
+from hystgen.basics import arguments
+from hystgen.basics.words import counted
 from hystgen.identification import faults, joint, reduction, remarks
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row, table
 from hystgen.identification.uncertainty import Intervals
 from hystgen.identification.used import Used
 from hystgen.records import Record, Source, read_record, write_atomically
-from hystgen.words import counted
 
 if TYPE_CHECKING:
-    from hystgen.params import Parameters
+    from hystgen.parameters.files import Parameters
 
 HELD_OUT = 0.25
 """Share of each record, its end, that is held out for the figures when no record is given for that."""
@@ -101,7 +101,7 @@ class Fit:
 
     def _inner(self, record: Record, history: tuple[float, ...] | None) -> Course:
         """The record's drive as the plays see it."""
-        from hystgen.api import cascade_of
+        from hystgen.model import cascade_of
 
         v = np.ascontiguousarray(record.v, dtype=np.float64)
         course = Course(record.name, v, v, history, 0, len(v))
@@ -109,7 +109,7 @@ class Fit:
 
     def text(self) -> str:
         """The parameter file: what was fitted on what as comments, then the parameters."""
-        from hystgen.params import dump_parameters
+        from hystgen.parameters.files import dump_parameters
 
         lines = ["Identified by hystgen; errors have a free offset a record."]
         lines += [row.sentence() for row in self.rows]

@@ -16,8 +16,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.stage import Stage
+from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification.thresholds import rounded
-from hystgen.models import DeadZone, Stage, TanhEnvelope
 
 Array = NDArray[np.float64]
 

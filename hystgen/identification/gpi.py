@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
+from hystgen.front.stage import Stage
 from hystgen.identification import constrained, faults, joint, pi, reduction, thresholds, weights
 from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
-from hystgen.models import Stage
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 Tick = Callable[[int], None] | None

@@ -16,12 +16,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
+from hystgen.chain.static import directions, through_stages
+from hystgen.front.stage import Stage
 from hystgen.identification import constrained, reduction, weights
 from hystgen.identification.constrained import root_mean_square
 from hystgen.identification.fronts import Front
 from hystgen.identification.reduction import Course, Reduced, Source
-from hystgen.models import Stage, directions, through_stages
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import arguments
+from hystgen.basics import arguments
 from hystgen.identification import faults, reduction, thresholds, weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row

@@ -13,11 +13,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.words import counted
 from hystgen.identification import faults, pi, stretches
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.records import SHORTEST, Record
-from hystgen.words import counted
 
 Array = NDArray[np.float64]
 

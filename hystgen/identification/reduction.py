@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import operators
 from hystgen.identification import segments
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 

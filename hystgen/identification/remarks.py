@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.words import counted
 from hystgen.identification import pi, reduction
 from hystgen.identification.pi import Solution
 from hystgen.identification.reduction import Course
 from hystgen.identification.report import Row
 from hystgen.identification.weights import Weights
 from hystgen.records import Record
-from hystgen.words import counted
 
 AMPLIFIES = 100.0
 """Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""

@@ -7,18 +7,15 @@ squares can learn of its plays, and one number the part of y that no play can fo
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled
+from hystgen.basics.jit import jit
 
 Array = NDArray[np.float64]
 
 
+@jit
 def _close_segment(
     thresholds: Array, states: Array, k: int, rising: bool, sums: Array, out: Array, row: int
 ) -> int:
@@ -45,6 +42,7 @@ def _close_segment(
     return row
 
 
+@jit
 def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Array, out: Array) -> int:
     """Rows of the samples whose y is a number into `out`, none where it has no room, and how many they are.
 
@@ -92,15 +90,7 @@ def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Ar
     return row
 
 
-COMPILED: list[Callable[..., Any]] = [_close_segment, _segment_rows]
-
-
-@functools.cache
-def _compiled() -> Any:
-    return compiled.compile_together(COMPILED)
-
-
 def rows(v: Array, y: Array, thresholds: Array, states: Array, wanted: bool) -> Array:
     """Rows `[1, plays.., y]` for the samples, none unless `wanted`; `states` of the plays run on."""
     out = np.empty((len(v) + 1 if wanted else 0, len(thresholds) + 2))
-    return out[: _compiled()._segment_rows(v, y, thresholds, states, np.empty(7), out)]
+    return out[: _segment_rows(v, y, thresholds, states, np.empty(7), out)]

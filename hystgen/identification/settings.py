@@ -31,7 +31,7 @@ class Settings:
 
     def on(self, fit: Fit) -> Fit:
         """The fit with these settings in its parameters."""
-        from hystgen.params import make_parameters
+        from hystgen.parameters.files import make_parameters
 
         data = {**fit.parameters.model_dump(), **self.values}
         if self._gives_units(fit):
@@ -64,7 +64,8 @@ class Settings:
 
 def of(path: str | os.PathLike[str]) -> Settings:
     """The settings of the file at `path`; none where there is no file, or an empty one."""
-    from hystgen.params import ParameterError, make_parameters, parameter_data
+    from hystgen.basics.problems import ParameterError
+    from hystgen.parameters.files import make_parameters, parameter_data
 
     file = os.fspath(path)
     if not Path(path).is_file() or not Path(path).stat().st_size:

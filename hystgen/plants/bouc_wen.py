@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import functools
 import math
-import types
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, positive, signal
+from hystgen.basics.checks import Array, finite, positive, signal
+from hystgen.basics.jit import jit
 from hystgen.plants import integration
 
 
+@jit
 def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tuple[float, float]:
     """The part of a move that undoes |z| = m > 0, `dm/ds = -A + c m^n`, c <= 0: |z| after it, and what is left of s.
 
@@ -35,6 +35,7 @@ def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tu
     return 0.0, s - angle / root
 
 
+@jit
 def _on(x: float, s: float, amplitude: float, c: float, exponent: float) -> float:
     """|z| >= 0 after a move that builds it up, `dx/ds = A - c x^n` with c > 0; n = 1 and 2 only."""
     if exponent == 1.0:
@@ -44,6 +45,7 @@ def _on(x: float, s: float, amplitude: float, c: float, exponent: float) -> floa
     return limit * (x + limit * t) / (limit + x * t)
 
 
+@jit
 def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -> None:
     amplitude, beta, gamma, exponent, distance = p
     z = z0
@@ -61,11 +63,6 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
             z = sign * x
             last = v[k]
         out[k] = z
-
-
-@functools.cache
-def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_back, _on, _exactly])
 
 
 @dataclass(frozen=True)
@@ -118,7 +115,7 @@ class BoucWen:
         z = np.empty_like(samples)
         p = tuple(float(x) for x in (self.A, self.beta, self.gamma, self.n, self.D))
         if self.n in (1.0, 2.0):
-            _compiled()._exactly(samples, 0.0, float(self.start), p, z)
+            _exactly(samples, 0.0, float(self.start), p, z)
             return z
         up, down = (functools.partial(self._slope, sign) for sign in (1.0, -1.0))
         z = integration.integrate(samples, float(self.start), up, down, self.bound)

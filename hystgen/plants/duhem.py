@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import math
-import types
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, positive, signal
+from hystgen.basics.checks import Array, finite, positive, signal
+from hystgen.basics.jit import jit
 from hystgen.plants import integration
 from hystgen.plants.integration import Slope
 
@@ -63,6 +61,7 @@ class Duhem:
         return integration.integrate(signal(v), float(self.start), self.rising, self.falling, float(self.scale))
 
 
+@jit
 def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponent: float, out: Array) -> None:
     force = start
     last = v0
@@ -84,11 +83,6 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
             force = sign * limit * (1.0 - rest)
             last = v[k]
         out[k] = force
-
-
-@functools.cache
-def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_dahl])
 
 
 @dataclass(frozen=True)
@@ -119,6 +113,6 @@ class Dahl:
         """Friction force (N,) at the displacements `v` (N,); needs no time."""
         samples = signal(v)
         out = np.empty_like(samples)
-        given = (self.start, self.sigma, self.limit, self.exponent)
-        _compiled()._dahl(samples, 0.0, *map(float, given), out)
+        start, sigma, limit, exponent = map(float, (self.start, self.sigma, self.limit, self.exponent))
+        _dahl(samples, 0.0, start, sigma, limit, exponent, out)
         return out

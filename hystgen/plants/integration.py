@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hystgen.checks import Array
+from hystgen.basics.checks import Array
 
 Slope = Callable[[float, float], float]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from hystgen.checks import Array, finite, positive, signal
+from hystgen.basics.checks import Array, finite, positive, signal
 from hystgen.plants import integration
 
 

@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import functools
-import types
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, numbers, positive, signal, whole
+from hystgen.basics.checks import Array, finite, numbers, positive, signal, whole
+from hystgen.basics.jit import jit
 
 
+@jit
 def _add_kernel(v: Array, p1: float, p2: float, ramp: float, weight: float, state: float, out: Array) -> None:
     for k in range(len(v)):
         high = min(max(2.0 * (v[k] - p1) / ramp - 1.0, -1.0), 1.0)
         low = min(max(2.0 * (v[k] - p2) / ramp - 1.0, -1.0), 1.0)
         state = max(low, min(high, state))
         out[k] += weight * state
-
-
-@functools.cache
-def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_add_kernel])
 
 
 @dataclass(frozen=True)
@@ -81,7 +75,6 @@ class KrasnoselskiiPokrovskii:
         """Output (N,) at the inputs `v` (N,); needs no time."""
         samples = signal(v)
         out = np.zeros_like(samples)
-        add = _compiled()._add_kernel
         for p1, p2, weight in zip(self.lower, self.upper, self.weights, strict=True):
-            add(samples, p1, p2, float(self.ramp), weight, float(self.start), out)
+            _add_kernel(samples, p1, p2, float(self.ramp), weight, float(self.start), out)
         return out

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
-import types
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen import compiled
-from hystgen.checks import Array, finite, numbers, signal
+from hystgen.basics.checks import Array, finite, numbers, signal
+from hystgen.basics.jit import jit
 
 Places = NDArray[np.int64]
 Everett = Callable[[Array, Array], Array]
 
 
+@jit
 def _staircase(v: Array, stack: Places, corner: Places) -> None:
     """The corner that each sample's move began at, as a place in v, negative for a fall.
 
@@ -46,14 +45,10 @@ def _staircase(v: Array, stack: Places, corner: Places) -> None:
         corner[k] = stack[depth - 1] if depth % 2 == 1 else -stack[depth - 1]
 
 
+@jit
 def _add_up(corner: Places, change: Array, out: Array) -> None:
     for k in range(1, len(out)):
         out[k] = out[abs(corner[k])] + change[k]
-
-
-@functools.cache
-def _compiled() -> types.SimpleNamespace:
-    return compiled.compile_together([_staircase, _add_up])
 
 
 @dataclass(frozen=True)
@@ -155,11 +150,10 @@ class Preisach:
         before = [self.low, *self.history]
         path = np.clip(np.concatenate([before, samples]), self.low, self.high)
         corner, change, out = np.empty(len(path), dtype=np.int64), np.zeros(len(path)), np.empty(len(path))
-        code = _compiled()
-        code._staircase(path, np.empty(len(path) + 1, dtype=np.int64), corner)
+        _staircase(path, np.empty(len(path) + 1, dtype=np.int64), corner)
         begun = path[np.abs(corner)]
         sign = np.where(corner >= 0, 1.0, -1.0)
         change = sign * self.everett(np.maximum(path, begun), np.minimum(path, begun))
         out[0] = self.offset
-        code._add_up(corner, change, out)
+        _add_up(corner, change, out)
         return out[len(before) :]

@@ -19,9 +19,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
-from hystgen import arguments, console
-from hystgen.problems import RecordError, printable
-from hystgen.progress import Progress
+from hystgen.basics import arguments, console
+from hystgen.basics.problems import RecordError, printable
+from hystgen.basics.progress import Progress
+from hystgen.basics.writing import write_atomically
 from hystgen.records.array_files import read_mat, read_npz
 from hystgen.records.columns import LISTED, parse_columns
 from hystgen.records.csv_file import read_csv
@@ -34,7 +35,6 @@ from hystgen.records.repair import SHORTEST, repaired
 from hystgen.records.tdms import read_tdms
 from hystgen.records.units import agreed_units, headers
 from hystgen.records.writing import columns_text, write_columns
-from hystgen.writing import write_atomically
 
 Source = Record | str | os.PathLike[str]
 """A record, or the path of a data file."""

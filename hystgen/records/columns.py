@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from hystgen.problems import printable
+from hystgen.basics.problems import printable
 from hystgen.records.sampling import Step
 from hystgen.records.units import is_time_unit, split_unit
 

@@ -16,7 +16,8 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.problems import printable
+from hystgen.basics.problems import printable
+from hystgen.basics.words import counted
 from hystgen.records import layout, lvm, pi_gcs, tektronix
 from hystgen.records.cells import BLANKS, COMMENT, MISSING, Dialect, is_comment, shape
 from hystgen.records.clock import Clock
@@ -25,7 +26,6 @@ from hystgen.records.layout import Layout
 from hystgen.records.reading import Lines, Reading, Table
 from hystgen.records.record import Array
 from hystgen.records.text import texts
-from hystgen.words import counted
 
 SAMPLE = 1 << 16
 """Characters at the start of a file, in whole lines, that show its layout."""

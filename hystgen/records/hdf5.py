@@ -12,7 +12,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import extras
+from hystgen.basics import extras
 from hystgen.records.array_files import MATLAB_NUMBERS
 from hystgen.records.columns import Column, column
 from hystgen.records.reading import Reading, Table, one_dimension

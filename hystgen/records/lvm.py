@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hystgen.problems import printable
+from hystgen.basics.problems import printable
 from hystgen.records.cells import Dialect
 from hystgen.records.layout import Layout
 from hystgen.records.reading import Reading

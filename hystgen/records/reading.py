@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.problems import RecordError, printable
+from hystgen.basics.problems import RecordError, printable
 from hystgen.records.columns import LISTED, STANDARD, Column, Finder, further_names
 from hystgen.records.no_value import no_value
 from hystgen.records.record import Array

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.words import counted
 from hystgen.records.reading import Reading, Table
 from hystgen.records.record import Array, Record
-from hystgen.words import counted
 
 SHORTEST = 16
 """Fewest samples of a record that a model is fitted to."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from hystgen.problems import printable
+from hystgen.basics.problems import printable
 from hystgen.records.units import TIMES, split_unit
 
 RATES = {

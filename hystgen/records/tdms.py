@@ -8,7 +8,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import extras
+from hystgen.basics import extras
 from hystgen.records.columns import Column, column
 from hystgen.records.reading import Reading, Table
 from hystgen.records.sampling import Step

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from hystgen.problems import printable
+from hystgen.basics.problems import printable
 from hystgen.records.record import Array, Record
 
 MAX_UNIT = 40

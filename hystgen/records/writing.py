@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.writing import write_atomically
+from hystgen.basics.writing import write_atomically
 
 
 def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:

@@ -6,7 +6,8 @@ import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from hystgen import __version__, parallel
+from hystgen.basics import parallel
+from hystgen.basics.version import __version__
 from hystgen.diagnosis import description, told
 from hystgen.report import drawing
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE

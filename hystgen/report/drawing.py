@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import extras
+from hystgen.basics import extras
 
 Array = NDArray[np.float64]
 

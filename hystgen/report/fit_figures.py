@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.api import cascade_of
 from hystgen.identification import faults
+from hystgen.model import cascade_of
 from hystgen.report import drawing
 from hystgen.report.drawing import label
 

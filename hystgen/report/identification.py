@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hystgen import __version__
-from hystgen.api import Model, cascade_of
+from hystgen.basics.version import __version__
+from hystgen.basics.words import counted
 from hystgen.emission import files
+from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import PARSIMONY
 from hystgen.identification.fit import HELD_OUT
 from hystgen.identification.report import LEFT, cells
-from hystgen.models import DeadZone
-from hystgen.params import parameters_sha256
+from hystgen.model import Model, cascade_of
+from hystgen.parameters.files import parameters_sha256
 from hystgen.report import drawing, fit_figures, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
-from hystgen.words import counted
 
 if TYPE_CHECKING:
     from hystgen.identification import Fit, Row

@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from hystgen import __version__
-from hystgen.diagnosis.plan import EDGE, MEASURED, lasting
+from hystgen.basics.version import __version__
+from hystgen.planning.plan import EDGE, MEASURED, lasting
 from hystgen.report import drawing
 from hystgen.report.drawing import label
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 if TYPE_CHECKING:
-    from hystgen.diagnosis.plan import Drive, Plan
+    from hystgen.planning.plan import Drive, Plan
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
 """Width in inches and panels side by side."""

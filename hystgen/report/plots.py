@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hystgen.api import Model
+from hystgen.basics.writing import write_atomically
+from hystgen.model import Model
 from hystgen.report import drawing, fit_figures
 from hystgen.report.drawing import PlotError, label
-from hystgen.writing import write_atomically
 
 if TYPE_CHECKING:
     from hystgen.identification import Fit

@@ -5,11 +5,12 @@ from __future__ import annotations
 import decimal
 from typing import Any
 
-from hystgen import fixed_tables
-from hystgen.api import Model, emit_options
-from hystgen.bounds import error_bounds
-from hystgen.models import DeadZone
-from hystgen.tables import FormatError
+from hystgen.basics.problems import FormatError
+from hystgen.compensator import fixed_tables
+from hystgen.compensator.bounds import error_bounds
+from hystgen.emission.calls import emit_options
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.model import Model
 
 HARD_RATIO = 1e6
 

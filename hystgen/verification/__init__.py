@@ -3,10 +3,11 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hystgen.verification.report import Report, Row
-    from hystgen.verification.run import verify_model
+    from hystgen.verification.report import Report as Report
+    from hystgen.verification.report import Row as Row
+    from hystgen.verification.run import verify as verify
 
-__all__ = ["Report", "Row", "verify_model"]
+__all__ = ["Report", "Row", "verify"]
 
 
 def __getattr__(name: str) -> Any:
@@ -15,4 +16,4 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from hystgen.verification import report, run
 
-    return getattr(run if name == "verify_model" else report, name)
+    return getattr(run if name == "verify" else report, name)

@@ -9,18 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled, reference
-from hystgen.fixed import FixedTables
-from hystgen.reference import Bytes
+from hystgen.compensator import reference
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.plays.slots import Bytes
 from hystgen.verification import signals
-
-# What NAME_real_t is
-REALS: dict[str, np.dtype[Any]] = {
-    "float32": np.dtype("f4"),
-    "float64": np.dtype("f8"),
-    "q31": np.dtype("i4"),
-    "q15": np.dtype("i2"),
-}
 
 
 @dataclass(frozen=True)
@@ -45,17 +37,17 @@ class Difference:
 
 
 def expected_record(
-    numbers: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
+    numbers: Tables | FixedTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
 ) -> Expected:
     """A record of calls, in numbers of type `real`, with the answers of the bit reference."""
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
-    answer, status = compiled.answers(numbers, inverse, op, x)
+    answer, status = reference.answers(numbers, inverse, op, x)
     return Expected(name, op, x.astype(real), answer.astype(real), status)
 
 
 def expected_records(
-    numbers: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int
+    numbers: Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int
 ) -> list[Expected]:
     """The verification records of an operator with the answers of the bit reference."""
     suite = signals.suite(numbers, real, inverse, length)

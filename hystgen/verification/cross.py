@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-from hystgen import extras
+from hystgen.basics import extras
 from hystgen.emission import module
 from hystgen.verification import compilers
 from hystgen.verification.sources import Sources

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import extras, reference, writing
+from hystgen.basics import extras, writing
 from hystgen.emission import runtime
-from hystgen.reference import Bytes
+from hystgen.plays import slots
+from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.cross import Layout
 from hystgen.verification.loading import LoadError, load
@@ -205,7 +206,7 @@ class Core:
             self._records = needed
         self._uc.mem_write(places[0], call.tobytes())
         self._uc.mem_write(places[1], x.tobytes())
-        code = reference.OP_STEP if counted == "step" else reference.OP_COMMIT
+        code = slots.OP_STEP if counted == "step" else slots.OP_COMMIT
         with_counter = self._counting(f"{name}_{op}_{counted}", op, int(np.count_nonzero(call == code)))
         with_counter(lambda: self.call(f"hystgen_harness_{op}", *places, len(x)))
         answer = np.frombuffer(bytes(self._uc.mem_read(places[2], x.nbytes)), dtype=x.dtype)

@@ -11,8 +11,9 @@ import cffi
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import extras
-from hystgen.reference import Bytes
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import extras
+from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.comparison import Expected, compare
 from hystgen.verification.loading import LoadError, load
@@ -21,7 +22,7 @@ from hystgen.verification.sources import Sources
 from hystgen.verification.targets import HOST
 
 BUILDS = (("strict", compilers.STRICT), ("defaults", compilers.DEFAULTS))
-C_TYPES = {"float32": "float", "float64": "double", "int32": "int32_t", "int16": "int16_t"}
+C_TYPES = {each.number: each.c_type for each in ARITHMETICS.values()}
 
 
 class _Library:
@@ -29,7 +30,7 @@ class _Library:
 
     def __init__(self, path: Path, sources: Sources, dtype: np.dtype[Any]) -> None:
         self._ffi = cffi.FFI()
-        self._real = C_TYPES[dtype.name]
+        self._real = C_TYPES[dtype]
         self._selftest = f"{sources.name}_selftest"
         self._ffi.cdef(f"int {self._selftest}(void);")
         for op in sources.operators:

@@ -6,9 +6,10 @@ from typing import Any
 
 import cffi
 
-from hystgen import extras, writing
-from hystgen.api import Model
-from hystgen.emission import module, runtime
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import extras, writing
+from hystgen.emission.options import Options
+from hystgen.model import Model
 from hystgen.verification import compilers, sources
 from hystgen.verification.loading import load
 
@@ -21,7 +22,7 @@ class Instance:
     is no compiler, LoadError, and ValueError for another name.
     """
 
-    def __init__(self, model: Model, options: module.Options, compiler: str | None = None) -> None:
+    def __init__(self, model: Model, options: Options, compiler: str | None = None) -> None:
         if compiler is not None and compiler not in compilers.NAMES:
             raise ValueError(f"compiler {compiler!r} is none of {', '.join(compilers.NAMES)}")
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
@@ -29,7 +30,7 @@ class Instance:
             missing = f"{compiler} is not installed" if compiler else "no C compiler found"
             raise compilers.CompileError(f"{missing}; install gcc or clang, or: {extras.install('zig')}")
         name, op = model.name, options.operator
-        real = runtime.FAMILIES[options.arithmetic].real
+        real = ARITHMETICS[options.arithmetic].c_type
         self._ffi = cffi.FFI()
         self._ffi.cdef(
             f"size_t hystgen_harness_{op}_size(void); void {name}_{op}_init(void *);"

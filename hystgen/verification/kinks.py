@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled, reference
-from hystgen.fixed import FixedTables
-from hystgen.reference import Bytes
+from hystgen.basics.jit import plain
+from hystgen.compensator import reference
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.plays import slots
+from hystgen.plays.slots import Bytes
 
 POINTS = 2000
 """Points of a path; to follow the plays one by one in Python takes about 0.1 s for as many."""
@@ -38,46 +40,48 @@ class Path:
 class _Textbook:
     """The plays of a model one by one, in double precision."""
 
-    def __init__(self, tables: reference.Tables | FixedTables) -> None:
+    def __init__(self, tables: Tables | FixedTables) -> None:
         self.tables = tables
-        self.code = compiled.reference(tables, compiled=False)
+        self.code = reference.operations(tables)
         self.kind = tables.threshold.dtype.type
         self.r = tables.threshold[1:].astype(float)
-        self.begin(reference.OP_INIT)
+        self.begin(slots.OP_INIT)
 
     def begin(self, op: int) -> None:
         """The memory of init, or that of reset."""
-        start = self.tables.start.astype(float) if op == reference.OP_INIT else np.zeros(1)
+        start = self.tables.start.astype(float) if op == slots.OP_INIT else np.zeros(1)
         states = np.broadcast_to(start, len(self.r) + 1)
         self.w, self.s = float(states[0]), states[1:].copy()
         self.drive, self.rising = np.nan, 1
 
     def drive_at(self, w: float, branch: int) -> float:
         """The drive that gives the input w of the plays, or one beyond the range."""
-        return float(self.code.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
+        with plain():
+            return float(self.code.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
 
     def move(self, drive: float) -> None:
         """The drive goes there."""
         if drive != self.drive and not np.isnan(self.drive):
             self.rising = int(drive > self.drive)
         self.drive = drive
-        self.w = float(self.code.front_forward(self.tables, self.kind(drive), self.rising))
+        with plain():
+            self.w = float(self.code.front_forward(self.tables, self.kind(drive), self.rising))
         self.s = np.clip(self.s, self.w - self.r, self.w + self.r)
 
 
-def path(tables: reference.Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
+def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
     """A path of kinks, give or take a last bit, of the memory as it is there and of that of init and reset."""
     whole = real.kind == "i"
-    low, high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
+    low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     memory = _Textbook(tables)
-    kinds = np.array([reference.OP_STEP, reference.OP_RESET, reference.OP_INIT], dtype=np.uint8)
+    kinds = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT], dtype=np.uint8)
     op = rng.choice(kinds, length, p=[0.9, 0.06, 0.04])
     point = rng.choice(4, length, p=SHARES)
     play, branch = rng.integers(0, max(len(memory.r), 1), length), rng.integers(0, 2, length)
     way, bits = rng.choice([-1, 1], length), rng.integers(-1, 2, length)
     drive = rng.uniform(low, high, length)
     for i in range(length):
-        if op[i] != reference.OP_STEP:
+        if op[i] != slots.OP_STEP:
             memory.begin(int(op[i]))
         to = float(drive[i])
         if point[i] == LIMIT:
@@ -90,19 +94,19 @@ def path(tables: reference.Tables | FixedTables, real: np.dtype[Any], length: in
         to = float(real.type(np.rint(to) if whole else to))
         to += bits[i] * (1.0 if whole else float(np.spacing(np.abs(real.type(to)))))
         drive[i] = min(max(to, low), high)
-        if op[i] != reference.OP_INIT:
+        if op[i] != slots.OP_INIT:
             memory.move(float(drive[i]))
     output = _outputs(tables, op, drive)
     return Path(op, drive, output, np.diff(output, prepend=output[0]) >= 0)
 
 
-def _outputs(tables: reference.Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]) -> NDArray[np.float64]:
+def _outputs(tables: Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]) -> NDArray[np.float64]:
     """Behind every call; reset answers with nothing, but the same drive once more does."""
-    times = np.where(op == reference.OP_RESET, 2, 1)
+    times = np.where(op == slots.OP_RESET, 2, 1)
     last = np.cumsum(times) - 1
-    calls = np.full(int(times.sum()), reference.OP_STEP, dtype=np.uint8)
+    calls = np.full(int(times.sum()), slots.OP_STEP, dtype=np.uint8)
     calls[last - times + 1] = op
-    answers: NDArray[np.float64] = compiled.answers(tables, False, calls, np.repeat(drive, times))[0][last]
+    answers: NDArray[np.float64] = reference.answers(tables, False, calls, np.repeat(drive, times))[0][last]
     return answers.astype(float)
 
 
@@ -123,24 +127,24 @@ def along(
     while len(calls) < length:
         at, op, drive = float(argument[i]), int(path.op[i]), float(path.drive[i])
         first, committed, again, which, there, crept = rng.random(6)
-        if op == reference.OP_INIT:
+        if op == slots.OP_INIT:
             calls.append((op, at))
             if inverse and committed < 0.4:
-                calls.append((reference.OP_COMMIT, drive))
+                calls.append((slots.OP_COMMIT, drive))
             if first < 0.4:
-                calls.append((reference.OP_STEP, float(rng.choice(special))))
+                calls.append((slots.OP_STEP, float(rng.choice(special))))
         else:
             bit = float(least(at)) * (1 if crept < 0.6 else 2 ** int(rng.integers(1, 10)))
             steps = [int(rng.integers(-2, 3))] if first < 0.7 else list(range(-3, 4))
             for k in steps if path.risen[i] else steps[::-1]:
                 calls.append((op, at + k * bit))
-                op = reference.OP_STEP
+                op = slots.OP_STEP
             if again < 0.1:
                 beyond = at + float(rng.choice([-1.0, 1.0])) * span
                 calls.append((op, calls[-1][1] if which < 0.5 else beyond))
             if inverse and committed < COMMITTED:
                 near = drive + float(rng.choice([-1.0, 1.0])) * room * 10.0 ** rng.uniform(-6, 0)
-                calls.append((reference.OP_COMMIT, drive if there < THERE else near))
+                calls.append((slots.OP_COMMIT, drive if there < THERE else near))
         i = (i + 1) % len(argument)
     ops, x = zip(*calls[:length], strict=True)
     return np.array(ops, dtype=np.uint8), np.array(x)

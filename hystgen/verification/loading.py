@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TypeVar
 
-from hystgen import writing
+from hystgen.basics import writing
 
 Loaded = TypeVar("Loaded")
 

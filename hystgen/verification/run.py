@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Sequence
 
-from hystgen import arguments, writing
-from hystgen.api import Model, emit_options
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import arguments, writing
 from hystgen.emission import module
+from hystgen.emission.calls import emit_options
+from hystgen.model import Model, as_model
 from hystgen.verification import avr, cores, host, sources
-from hystgen.verification.comparison import REALS, Expected, expected_records
+from hystgen.verification.comparison import Expected, expected_records
 from hystgen.verification.report import Report
 from hystgen.verification.targets import AVR, HOST, Board, find
 
 
-def verify_model(
-    model: Model,
+@arguments.checked
+def verify(
+    source: Model | str | os.PathLike[str],
     arithmetic: str | None = None,
     operator: str | None = None,
     engine: str | None = None,
@@ -41,9 +45,10 @@ def verify_model(
     arguments.whole("length", length, "calls", 1)
     if target_length is not None:
         arguments.whole("target_length", target_length, "calls", 1)
+    model = as_model(source)
     options = emit_options(model, operator, arithmetic, engine, layout, optimize)
     numbers = model.tables(options.arithmetic, options.engine)
-    real = REALS[options.arithmetic]
+    real = ARITHMETICS[options.arithmetic].number
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
     chosen = [known[name] if name in known else find(name) for name in targets]

@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen import compiled, fixed, reference
-from hystgen.fixed import FixedTables
-from hystgen.reference import Bytes
+from hystgen.compensator import reference
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.front import curve
+from hystgen.plays import slots
+from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
 
 
 def _steps(x: NDArray[np.float64]) -> Bytes:
-    return np.full(len(x), reference.OP_STEP, dtype=np.uint8)
+    return np.full(len(x), slots.OP_STEP, dtype=np.uint8)
 
 
 def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
@@ -48,7 +50,7 @@ def _onto_the_plays(
 
 
 def _coincidences(
-    tables: reference.Tables | FixedTables, inverse: bool, low: float, high: float, length: int,
+    tables: Tables | FixedTables, inverse: bool, low: float, high: float, length: int,
     rng: np.random.Generator,
 ) -> tuple[Bytes, NDArray[np.float64]]:  # fmt: skip
     """Turns right where plays start to follow, from other such turns and from the ends of the range.
@@ -56,8 +58,8 @@ def _coincidences(
     With round thresholds several corners end at the same drive, to the last bit or but for it: no search may depend on
     what it looks at first.
     """
-    drive_low, drive_high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
-    finer = 2.0 ** int(tables.limits[fixed.FINE]) if isinstance(tables, FixedTables) else 1.0
+    drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
+    finer = 2.0 ** int(tables.limits[slots.FINE]) if isinstance(tables, FixedTables) else 1.0
     ways = np.append(tables.threshold[1:].astype(float) / finer, drive_high - drive_low)
     drive = np.empty(400)
     at = drive_low
@@ -66,49 +68,49 @@ def _coincidences(
         drive[i] = at = min(max(at, drive_low), drive_high)
     if not inverse:
         return _steps(np.empty(length)), rng.choice(drive, length)
-    outputs = compiled.answers(tables, False, _steps(drive), drive)[0].astype(float)
+    outputs = reference.answers(tables, False, _steps(drive), drive)[0].astype(float)
     beyond = 0.1 * (high - low) * np.array([-1.0, 0.0, 0.0, 1.0]) + [low, low, high, high]
     near = low + (high - low) * np.array([0.004, 0.04, 0.5, 0.96, 0.996])
     asked = np.where(rng.random(length) < 0.6, rng.choice(outputs, length), rng.choice([*beyond, *near], length))
-    op = np.where(rng.random(length) < 0.35, reference.OP_COMMIT, reference.OP_STEP).astype(np.uint8)
-    op[rng.random(length) < 0.005] = reference.OP_RESET
-    return op, np.where(op == reference.OP_COMMIT, rng.choice(drive, length), asked)
+    op = np.where(rng.random(length) < 0.35, slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
+    op[rng.random(length) < 0.005] = slots.OP_RESET
+    return op, np.where(op == slots.OP_COMMIT, rng.choice(drive, length), asked)
 
 
-def _bends(tables: reference.Tables | FixedTables) -> NDArray[np.float64]:
+def _bends(tables: Tables | FixedTables) -> NDArray[np.float64]:
     """Drives at which another piece of the memoryless part begins."""
     if not isinstance(tables, FixedTables):
-        bent = len(tables.stage_kind) > 0 and tables.stage_kind[0] == reference.DEAD_ZONE
+        bent = len(tables.stage_kind) > 0 and tables.stage_kind[0] == slots.DEAD_ZONE
         return np.array(tables.stage_data[: tables.stage_size[0] if bent else 0], dtype=float)
-    back = compiled.reference(tables).front_inverse
+    back = reference.operations(tables).front_inverse
     found: list[float] = []
     for which, (first, count) in enumerate(zip(tables.first, tables.pieces, strict=True)):
         knots = tables.knot[first : first + count]
-        branch = fixed.INVERSE + 1 - which
-        found += knots.tolist() if which < fixed.INVERSE else [back(tables, w, branch)[0] for w in knots]
+        branch = curve.INVERSE + 1 - which
+        found += knots.tolist() if which < curve.INVERSE else [back(tables, w, branch)[0] for w in knots]
     return np.array(found, dtype=float)
 
 
 def _onto_the_bends(
-    bends: NDArray[np.float64], least: Any, tables: reference.Tables | FixedTables, inverse: bool, length: int,
+    bends: NDArray[np.float64], least: Any, tables: Tables | FixedTables, inverse: bool, length: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:  # fmt: skip
     """Drives at bends of the memoryless part, or references that lead there, give or take last bits.
 
     A piece between two bends can be as short as one code.
     """
-    low, high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
+    low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     drive: NDArray[np.float64] = rng.choice(bends, length)
     drive = np.clip(drive + least(drive) * rng.integers(-1, 2, length), low, high)
     if not inverse:
         return drive
-    outputs: NDArray[np.float64] = compiled.answers(tables, False, _steps(drive), drive)[0].astype(float)
+    outputs: NDArray[np.float64] = reference.answers(tables, False, _steps(drive), drive)[0].astype(float)
     outputs += least(outputs) * rng.integers(-8, 9, length)
     return outputs
 
 
 def suite(
-    tables: reference.Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
+    tables: Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
 ) -> Iterator[Calls]:
     """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same ones every time."""
     for name, op, x in _suite(tables, real, inverse, length):
@@ -119,9 +121,9 @@ def suite(
 
 
 def _suite(
-    tables: reference.Tables | FixedTables, real_type: np.dtype[Any], inverse: bool, length: int
+    tables: Tables | FixedTables, real_type: np.dtype[Any], inverse: bool, length: int
 ) -> Iterator[Calls]:
-    first = reference.OUTPUT_MIN if inverse else reference.DRIVE_MIN
+    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = (float(x) for x in tables.limits[first : first + 2])
     middle, half = (low + high) / 2, (high - low) / 2
     whole = real_type.kind == "i"
@@ -157,7 +159,7 @@ def _suite(
 
     levels = (tables.start_level if inverse else tables.threshold)[1:].astype(float)
     if isinstance(tables, FixedTables):
-        levels = levels / 2.0 ** int(tables.limits[fixed.FRACTION] if inverse else tables.limits[fixed.FINE])
+        levels = levels / 2.0 ** int(tables.limits[slots.FRACTION] if inverse else tables.limits[slots.FINE])
     bit = (lambda _: 1.0) if whole else (lambda at: np.spacing(np.abs(at).astype(real)))
     if len(levels) > 0:
         yield record("onto the plays", _onto_the_plays(levels, bit, low, high, length, rng))
@@ -185,19 +187,19 @@ def _suite(
     x[places] = rng.choice(special, int(places.sum()))
     yield record("extremes" if whole else "NaN, infinities, extremes", x)
 
-    kinds = np.array([reference.OP_STEP, reference.OP_RESET, reference.OP_INIT], dtype=np.uint8)
+    kinds = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT], dtype=np.uint8)
     chances = [0.995, 0.004, 0.001]
     x = middle + 1.1 * half * np.sin(walk * 2)
     x[places] = rng.choice(special, int(places.sum()))
     yield "resets", rng.choice(kinds, length, p=chances), x
     if inverse:
-        drive_low, drive_high = (float(a) for a in tables.limits[reference.DRIVE_MIN : reference.DRIVE_MAX + 1])
+        drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
         for name, chance in (("commits", 0.3), ("rare commits", 0.01)):
-            op = np.where(rng.random(length) < chance, reference.OP_COMMIT, reference.OP_STEP).astype(np.uint8)
+            op = np.where(rng.random(length) < chance, slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
             spread = drive_high - drive_low
             drives = rng.uniform(drive_low - 0.05 * spread, drive_high + 0.05 * spread, length)
             odd = rng.random(length) < 0.02
             drives[odd] = rng.choice(special, int(odd.sum()))
             smooth = middle + half * np.sin(walk)
             smooth[odd] = rng.choice(special, int(odd.sum()))
-            yield name, op, np.where(op == reference.OP_COMMIT, drives, smooth)
+            yield name, op, np.where(op == slots.OP_COMMIT, drives, smooth)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
-from hystgen import reference
-from hystgen.api import Model
 from hystgen.emission import files, module
+from hystgen.emission.options import Options
+from hystgen.model import Model
+from hystgen.plays import slots
 
-CALLS = {"init": reference.OP_INIT, "reset": reference.OP_RESET, "commit": reference.OP_COMMIT}
+CALLS = {"init": slots.OP_INIT, "reset": slots.OP_RESET, "commit": slots.OP_COMMIT}
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def harness(name: str, operators: tuple[str, ...]) -> str:
     return module.render("harness.c.j2", SimpleNamespace(name=name, operators=operators, calls=CALLS))
 
 
-def write(folder: Path, model: Model, options: module.Options) -> Sources:
+def write(folder: Path, model: Model, options: Options) -> Sources:
     """Write the emitted files and the harness into `folder`."""
     name = model.name
     texts = module.files(model.parameters, model.cascade, options)

@@ -18,8 +18,8 @@ import numpy as np
 from ruamel.yaml import YAML
 
 import hystgen
-from hystgen.api import NotInvertibleError
-from hystgen.tables import FormatError
+from hystgen.basics.problems import FormatError
+from hystgen.model import NotInvertibleError
 from tests.oracle import models
 
 HERE = Path(__file__).parent

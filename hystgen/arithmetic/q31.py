@@ -1,0 +1,5 @@
+"""Fixed point in 32 bits."""
+
+from hystgen.arithmetic.description import Arithmetic
+
+Q31 = Arithmetic("q31", "q31", "int32_t", "int32", "int64", 4, finer="float64", fixed=True, code_bits=31, degree=5)

@@ -1,0 +1,1 @@
+"""Leaves that every room uses: words, messages, files, progress, threads and processes, compiling."""

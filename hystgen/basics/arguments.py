@@ -1,0 +1,177 @@
+"""Arguments of the public calls: what is wrong with one, and what to give instead."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import inspect
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics.problems import printable
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def kind(value: object) -> str:
+    """A value as a message names it: its type, of an array with its shape."""
+    name = "array" if isinstance(value, np.ndarray) else type(value).__name__
+    if isinstance(value, str | int | float | None):
+        return f"{printable(repr(value))}"
+    shape = getattr(value, "shape", None)
+    return f"{_article(name)} of shape {shape}" if isinstance(shape, tuple) else _article(name)
+
+
+def _article(name: str) -> str:
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+def known_options(call: str, function: Callable[..., Any], given: Iterable[str]) -> None:
+    """Raise TypeError for an option that `function`, which does the work of `call`, does not have."""
+    parameters = inspect.signature(function).parameters.values()
+    options = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY or each.default is not each.empty]
+    for name in given:
+        if name not in options:
+            close = difflib.get_close_matches(name, options, 1)
+            hint = f"did you mean {close[0]}?" if close else f"its options are {', '.join(options)}"
+            raise TypeError(f"{call}() has no option {printable(name)}; {hint}")
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """The public call with a TypeError that says what was meant where it is given an option that it does not have."""
+    needed = [each.name for each in inspect.signature(function).parameters.values() if each.default is each.empty]
+
+    @functools.wraps(function)
+    def call(*given: P.args, **options: P.kwargs) -> R:
+        known_options(function.__name__, function, [name for name in options if name not in needed])
+        return function(*given, **options)
+
+    return call
+
+
+def taking(options_of: Callable[..., Any], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """The same for a call that hands its `**options` on to `options_of`: its signature shows them; `name` is said."""
+    handed = [
+        each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        for each in inspect.signature(options_of).parameters.values()
+        if each.default is not each.empty
+    ]
+
+    def make(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+        own = [each for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]
+
+        @functools.wraps(function)
+        def call(*given: P.args, **options: P.kwargs) -> R:
+            named = {each.name for each in own}
+            known_options(name, options_of, [option for option in options if option not in named])
+            return function(*given, **options)
+
+        call.__signature__ = signature.replace(parameters=[*own, *handed])  # type: ignore[attr-defined]
+        return call
+
+    return make
+
+
+def path(name: str, value: object) -> str:
+    """A path as text. Raises TypeError."""
+    if isinstance(value, str | os.PathLike):
+        found = os.fspath(value)
+        if isinstance(found, str):
+            return found
+    raise TypeError(f"{name} has to be a path, as text or pathlib.Path, not {kind(value)}")
+
+
+def choice(name: str, value: object, known: Sequence[str]) -> None:
+    """Raise ValueError for what is none of the known words."""
+    if not (isinstance(value, str) and value in known):
+        raise ValueError(f"{name} {printable(repr(value))} is none of {', '.join(known)}")
+
+
+def words(name: str, value: object, example: str) -> tuple[str, ...]:
+    """A list of words. Raises TypeError; one word alone is no list."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping):
+        found = tuple(value)
+        if all(isinstance(word, str) for word in found):
+            return found
+    raise TypeError(f"{name} is a list of names, not {kind(value)}; give [{example!r}]")
+
+
+def real(name: str, value: object, unit: str) -> float:
+    """A number, whatever its value. Raises TypeError."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise TypeError(f"{name} is a number of {unit}, not {kind(value)}")
+    return float(value)
+
+
+def number(name: str, value: object, unit: str, least: float = -math.inf) -> float:
+    """A finite number from `least` on. Raises TypeError and ValueError."""
+    found = real(name, value, unit)
+    if not (math.isfinite(found) and found >= least):
+        raise ValueError(f"{name} is a number of {unit}{', not negative' if least == 0 else ''}, not {found:g}")
+    return found
+
+
+def whole(name: str, value: object, unit: str, least: int) -> int:
+    """A whole number from `least` on. Raises TypeError and ValueError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise TypeError(f"{name} is a whole number of {unit}, not {kind(value)}")
+    if value < least:
+        raise ValueError(f"{name} is a whole number of {unit} from {least} on, not {value}")
+    return int(value)
+
+
+def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
+    """A list of finite numbers. Raises TypeError and ValueError."""
+    hint = f"give a list of numbers such as {example}"
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise TypeError(f"{name} is a list of finite numbers, not {kind(value)}; {hint}")
+    try:
+        found = tuple(float(x) for x in value)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{name} is a list of finite numbers, and an entry is none; {hint}") from None
+    if not all(map(math.isfinite, found)):
+        raise ValueError(f"{name} is a list of finite numbers, and an entry is not finite; {hint}")
+    return found
+
+
+def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[str, str]:
+    """A mapping of some of `keys` to text, all of them text. Raises TypeError and ValueError."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{name} is a mapping of text to text, not {kind(value)}; give {example}")
+    strange = [x for entry in value.items() for x in entry if not isinstance(x, str)]
+    if strange:
+        raise TypeError(f"{name} is a mapping of text to text, and {kind(strange[0])} is in it; give {example}")
+    unknown = [key for key in value if key not in keys] if keys else []
+    if unknown:
+        raise ValueError(f"{name} has no {printable(unknown[0])}; its keys are {', '.join(keys)}, as in {example}")
+    return dict(value)
+
+
+def signal(name: str, value: object) -> NDArray[Any]:
+    """Samples (N,) of real numbers, of whatever type they have. Raises TypeError, and ValueError for another shape."""
+    try:
+        found = np.atleast_1d(np.asarray(value))
+    except ValueError:  # lists of different lengths
+        raise ValueError(f"{name} has one number a sample, and rows of different lengths are given") from None
+    if found.ndim != 1:
+        hint = ""
+        if found.ndim == 2:
+            hint = "; give .ravel() of it" if 1 in found.shape else "; give one of its columns"
+        raise ValueError(f"{name} has one number a sample, shape (N,), not shape {found.shape}{hint}")
+    if found.dtype.kind == "O":
+        try:
+            if any(x is None for x in found):
+                raise TypeError
+            found = found.astype(np.float64)
+        except (TypeError, ValueError):
+            raise TypeError(f"{name} is an array of real numbers (N,), not {kind(value)}") from None
+    if found.dtype.kind not in "fiub":
+        raise TypeError(f"{name} is an array of real numbers (N,), not {kind(value)} of {found.dtype}")
+    return found

@@ -1,0 +1,165 @@
+"""Functions that numba compiles when they are first called, or first needed by another one.
+
+    @jit
+    def followed(state, x, r): ...
+
+`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python that
+stands there, as `followed.py_func` is anywhere. Numba is imported with the first call that needs it.
+
+Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
+in a helper can never leave a stale caller behind. The cache saves time and is never needed: where no folder can be
+written to there is none, and files of it that cannot be read are made again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import functools
+import hashlib
+import inspect
+import types
+from collections.abc import Callable, Iterator
+from typing import Any, Generic, ParamSpec, TypeVar, overload
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# Called once, before the first function is compiled that is not in the cache, with a word to the user
+announce: Callable[[str], None] | None = None
+
+ONCE = "compiling for this machine, once: about 20 s"
+EVERY_TIME = (
+    "compiling for this machine: about 20 s, every time, since no folder for the result can be written to; set "
+    "NUMBA_CACHE_DIR to one that can"
+)
+
+# The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
+OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
+
+_plain = contextvars.ContextVar("plain", default=False)
+
+
+@contextlib.contextmanager
+def plain() -> Iterator[None]:
+    """Inside, functions run as plain Python, for short signals: there is nothing to compile or to load."""
+    before = _plain.set(True)
+    try:
+        yield
+    finally:
+        _plain.reset(before)
+
+
+class Jit(Generic[P, R]):
+    """A function that runs compiled; `py_func` is its Python."""
+
+    def __init__(self, function: Callable[P, R], inline: bool) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self.targetoptions = {**OPTIONS, "inline": "always" if inline else "never"}
+        """options of numba, which looks here for those of a function that others call"""
+
+    def __call__(self, *given: P.args, **named: P.kwargs) -> R:
+        function = self.py_func if _plain.get() else self.dispatcher
+        return function(*given, **named)
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of it."""
+        import numba
+
+        _listen()
+        function = self.py_func
+        assert isinstance(function, types.FunctionType)
+        twin = types.FunctionType(
+            function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+        )
+        twin.__module__ = function.__module__
+        twin.__qualname__ = f"{function.__name__}_{self.mark}"
+        made = numba.njit(**self.targetoptions)(twin)
+        with contextlib.suppress(RuntimeError):  # no folder that can be written to
+            made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
+        return made
+
+    @property
+    def _numba_type_(self) -> Any:
+        """Numba's type of the function where another one calls it."""
+        return self.dispatcher._numba_type_
+
+    @functools.cached_property
+    def mark(self) -> str:
+        """What its compiled code depends on, as a word: its source and that of all that it calls, and constants."""
+        text, functions = repr(OPTIONS), [self]
+        for function in functions:
+            text += inspect.getsource(function.py_func) + repr(function.targetoptions)
+            names = inspect.getclosurevars(function.py_func)
+            for name, value in sorted({**names.globals, **names.nonlocals}.items()):
+                if isinstance(value, int | float | tuple):  # numba freezes them into the compiled code
+                    text += f"{name} = {value!r}\n"
+                elif isinstance(value, Jit) and not any(value is each for each in functions):
+                    functions.append(value)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+@overload
+def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
+@overload
+def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
+def jit(function: Callable[..., Any] | None = None, /, *, inline: bool = False) -> Any:
+    """Have a function compiled; `inline` makes it part of its callers, since handing over a model's many tables costs
+    more than a short function computes."""
+    if function is None:
+        return functools.partial(Jit, inline=inline)
+    return Jit(function, inline)
+
+
+@functools.cache
+def _cache_class() -> Any:
+    """Numba's cache of a function, which takes a file that it cannot read or write for one that is not there."""
+    from numba.core.caching import FunctionCache
+
+    class Cache(FunctionCache):
+        def _index_key(self, sig: Any, codegen: Any) -> Any:
+            # The name holds the mark of everything that the code depends on; numba would pickle what a closure holds
+            return sig, codegen.magic_tuple(), self._py_func.__qualname__
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            try:
+                return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            except Exception:  # whatever unpickling half a file ends in
+                with contextlib.suppress(OSError):
+                    self.flush()  # type: ignore[no-untyped-call]
+                return None
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            with contextlib.suppress(OSError):
+                super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+
+    return Cache
+
+
+def _cache_folder() -> str | None:
+    """Where compiled code of this package is kept; None where no folder can be written to."""
+    try:
+        return str(_cache_class()(_cache_folder).cache_path)
+    except RuntimeError:
+        return None
+
+
+@functools.cache
+def _listen() -> None:
+    """Have `announce` called when numba starts to compile."""
+    from numba.core import event
+
+    class FirstCompilation(event.Listener):
+        def on_start(self, _: Any) -> None:
+            global announce
+            if announce:
+                announce(ONCE if _cache_folder() else EVERY_TIME)
+                announce = None
+
+        def on_end(self, _: Any) -> None:
+            pass
+
+    register: Callable[[str, event.Listener], None] = event.register
+    register("numba:compile", FirstCompilation())

@@ -1,0 +1,139 @@
+"""What a user's words may become in C: the model's name and the text of comments."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from hystgen.basics.problems import printable
+
+MAX_NAME = 40
+NAME_PATTERN = "^[A-Za-z](_?[A-Za-z0-9])*$"
+"""Letters, digits and single underscores between them, starting with a letter."""
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_NAME = re.compile(NAME_PATTERN.rstrip("$") + r"\Z")
+
+# C up to C23 and C++ up to C++23; keywords with a leading underscore are no names anyway.
+_KEYWORDS = _words(
+    """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class
+    co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype
+    default delete do double dynamic_cast else enum explicit export extern false float for friend goto if inline
+    int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected public register
+    reinterpret_cast requires restrict return short signed sizeof static static_assert static_cast struct switch
+    template this thread_local throw true try typedef typeid typename typeof typeof_unqual union unsigned using
+    virtual void volatile wchar_t while xor xor_eq
+    """
+)
+
+# NAME.h may lie on an include path, where it would be found in place of the system's header.
+_HEADERS = _words(
+    """
+    aio alloca arduino assert complex cpio ctype dirent dlfcn endian errno fcntl fenv float fmtmsg fnmatch ftw
+    getopt glob grp iconv ifaddrs inttypes io iso646 langinfo libgen libintl limits locale malloc math memory
+    monetary mqueue ndbm netdb nl_types poll pthread pwd regex sched search semaphore setjmp signal spawn stdalign
+    stdarg stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string strings syslog tar
+    termios tgmath threads time uchar ulimit unistd utime utmpx wchar wctype windows winsock wordexp
+    """
+)
+
+_DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))])
+
+# Macros UPPER_... of a model with one of these names would mix with the macros of a standard header:
+# the first group is reserved whatever follows, of the second only names that the header forms itself.
+_MACRO_FAMILIES = dict.fromkeys(_words("dbl dec dec32 dec64 dec128 flt ldbl"), "float")
+_MACRO_NAMES = (
+    dict.fromkeys(_words("ptrdiff sig_atomic size wchar wint intptr uintptr intmax uintmax"), "stdint")
+    | {f"{u}int{k}{bits}": "stdint" for u in ("", "u") for k in ("", "_least", "_fast") for bits in (8, 16, 32, 64)}
+    | dict.fromkeys(_words("char schar uchar shrt ushrt int uint long ulong llong ullong bool mb mb_len"), "limits")
+    | {"fe": "fenv", "fp": "math", "lc": "locale", "sig": "signal", "pri": "inttypes", "scn": "inttypes"}
+    | {"atomic": "stdatomic", "clocks": "time", "exit": "stdlib", "rand": "stdlib"}
+)
+
+
+def name_problem(name: str) -> str | None:
+    """What is wrong with a model's name, and what to do; None if it can be used.
+
+    A name is the prefix of every emitted symbol (`NAME_...`) and, in upper case, of every macro, and it names
+    the files `NAME.h`, `NAME.c` and `NAME_selftest.h/.c`. Case is ignored in every comparison, because macros
+    are in upper case and some file systems do not tell cases apart.
+    """
+    if not name:
+        return "is empty; give a name such as stage_x"
+    if len(name) > MAX_NAME:
+        return f"has {len(name)} characters, more than {MAX_NAME}; shorten it"
+    if not _NAME.match(name):
+        rule = "use letters, digits and single underscores between them, starting with a letter"
+        return f'"{printable(name)}" is not a usable C prefix; {rule}'
+    word = name.lower()
+    other = f"choose another name, such as axis_{word}" if len(name) + 5 <= MAX_NAME else "choose another name"
+    if word in _KEYWORDS:
+        return f"{name} is a keyword of C or C++; {other}"
+    if word == "main":
+        return "main would write main.h and main.c, which are the firmware's own; choose another name"
+    if word in _HEADERS:
+        return f"{name}.h would hide the system's header <{word}.h>; {other}"
+    if word in _DEVICES:
+        return f"{name} is a device name on Windows, where {name}.h cannot be written; {other}"
+    if word == "hystgen" or word.startswith("hystgen_"):
+        return f"{name} begins with hystgen, the prefix of the shared run time; choose another name"
+    if word.endswith("_selftest"):
+        return f"{name}.h is the self-test of a model named {name[:-9]}; choose another name"
+    family = next((f for f in _MACRO_FAMILIES if word == f or word.startswith(f + "_")), None)
+    header = _MACRO_FAMILIES[family] if family else _MACRO_NAMES.get(word)
+    if header:
+        return f"the macros {(family or word).upper()}_... belong to <{header}.h>; {other}"
+    return None
+
+
+# Accented letters by their decomposition (Latin-1 and Extended-A only: those never change with Python's Unicode).
+_ASCII = {code: unicodedata.normalize("NFD", chr(code))[0] for code in range(0xC0, 0x180)} | {
+    ord(sign): plain
+    for sign, plain in (
+        ("\N{MICRO SIGN}", "u"),
+        ("\N{GREEK SMALL LETTER MU}", "u"),
+        ("\N{DEGREE SIGN}", "deg"),
+        ("\N{OHM SIGN}", "Ohm"),
+        ("\N{GREEK CAPITAL LETTER OMEGA}", "Ohm"),
+        ("\N{PLUS-MINUS SIGN}", "+/-"),
+        ("\N{MULTIPLICATION SIGN}", "x"),
+        ("\N{MIDDLE DOT}", "."),
+        ("\N{SUPERSCRIPT ONE}", "^1"),
+        ("\N{SUPERSCRIPT TWO}", "^2"),
+        ("\N{SUPERSCRIPT THREE}", "^3"),
+        ("\N{SUPERSCRIPT MINUS}", "^-"),
+        ("\N{EN DASH}", "-"),
+        ("\N{EM DASH}", "-"),
+        ("\N{MINUS SIGN}", "-"),
+        ("\N{LEFT SINGLE QUOTATION MARK}", "'"),
+        ("\N{RIGHT SINGLE QUOTATION MARK}", "'"),
+        ("\N{LEFT DOUBLE QUOTATION MARK}", '"'),
+        ("\N{RIGHT DOUBLE QUOTATION MARK}", '"'),
+        ("\N{HORIZONTAL ELLIPSIS}", "..."),
+        ("\N{LATIN SMALL LETTER SHARP S}", "ss"),
+        ("\N{LATIN SMALL LETTER AE}", "ae"),
+        ("\N{LATIN CAPITAL LETTER AE}", "AE"),
+        ("\N{LATIN SMALL LETTER O WITH STROKE}", "o"),
+        ("\N{LATIN CAPITAL LETTER O WITH STROKE}", "O"),
+        ("\N{LATIN SMALL LETTER L WITH STROKE}", "l"),
+        ("\N{LATIN CAPITAL LETTER L WITH STROKE}", "L"),
+    )
+}
+
+
+def comment_text(text: str) -> str:
+    """Any text as one line of printable ASCII that is harmless inside a C comment of either kind.
+
+    Common letters and signs beyond ASCII are spelt out, others become `?`; white space becomes single blanks.
+    Nothing in the result opens or closes a comment, forms a trigraph or continues a line, and it neither
+    starts nor ends in a blank.
+    """
+    text = re.sub(r"[^ -~]", "?", " ".join(text.translate(_ASCII).split())).replace("\\", "/")
+    text = re.sub(r"\*(?=/)", "* ", text)
+    text = re.sub(r"/(?=\*)", "/ ", text)
+    return re.sub(r"\?(?=\?)", "? ", text)

@@ -1,0 +1,131 @@
+"""Problems of an input file: what is wrong, where, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+Path = tuple[str | int, ...]
+"""Place of a value in the file: keys and list indices from the top level down."""
+
+SHOWN = 60
+"""Longest piece of a user's text repeated in a message."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with a file.
+
+    `path` is dotted (`model.pi.weights[2]`, empty for the file as a whole); `message` says what is wrong
+    and, after a semicolon, what to do; `line` and `column` count from 1 and are None where there is none.
+    """
+
+    path: str
+    message: str
+    line: int | None = None
+    column: int | None = None
+
+    @property
+    def named(self) -> str:
+        """`PATH: MESSAGE`."""
+        return f"{self.path}{': ' if self.path else ''}{self.message}"
+
+    def text(self, file: str) -> str:
+        """The line printed for this problem: `FILE:LINE:COL: error: PATH: MESSAGE`."""
+        place = file if self.line is None else f"{file}:{self.line}:{self.column}"
+        return f"{place}: error: {self.named}"
+
+
+class ParameterError(ValueError):
+    """A parameter file that is refused, with every problem found in it.
+
+    `problems` is sorted by position, `file` is the name as the user gave it; `str()` gives a line a problem.
+    """
+
+    def __init__(self, file: str, problems: Iterable[Problem]) -> None:
+        self.file = file
+        self.problems = sorted(problems, key=lambda p: (p.line or 0, p.column or 0))
+        super().__init__("\n".join(problem.text(file) for problem in self.problems))
+
+
+def printable(text: str) -> str:
+    """A user's text as it is repeated in a message: at most 60 characters, unprintable ones escaped."""
+    if len(text) > SHOWN:
+        text = text[: SHOWN - 3] + "..."
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def shown(value: object) -> str:
+    """A value as a message names it: numbers as they are, text in quotes, lists and mappings by kind."""
+    if isinstance(value, str):
+        return f'the text "{printable(value)}"'
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int) and abs(value) >= 10**17:
+        value = float(value) if abs(value) < 1 << 1023 else float("inf" if value > 0 else "-inf")
+    if isinstance(value, int | float):
+        return int.__repr__(value) if isinstance(value, int) else float.__repr__(value)
+    if isinstance(value, tuple | list):
+        return "a list"
+    return "a mapping" if isinstance(value, dict) else printable(type(value).__name__)
+
+
+def path_text(path: Path) -> str:
+    """A path as a message names it: `model.pi.weights[2]`; keys that are no plain words are quoted."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+            continue
+        plain = part.isascii() and part.replace("_", "a").replace("-", "a").isalnum() and len(part) <= SHOWN
+        text += ("." if text else "") + (part if plain else f'"{printable(part)}"')
+    return text
+
+
+class RecordError(ValueError):
+    """A data file that is refused, with every problem found in it.
+
+    `problems` has one line a problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` where there is no
+    line); `str()` joins them.
+    """
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = list(problems)
+        super().__init__("\n".join(self.problems))
+
+
+class PlanError(ValueError):
+    """A plan that cannot be made, with every reason in `problems`; `str()` gives a line a problem."""
+
+    def __init__(self, problems: Iterable[str]) -> None:
+        self.problems = list(problems)
+        super().__init__("\n".join(f"error: {problem}" for problem in self.problems))
+
+
+class EffectsError(ValueError):
+    """An effect that cannot be used, or not with these records."""
+
+
+class UnsupportedEffectsError(EffectsError):
+    """Something that cannot be done yet for a model with effects; it names them."""
+
+
+class NotInvertibleError(ValueError):
+    """A well-formed model whose inverse was asked for and does not exist; `reasons` says why, one line each."""
+
+    def __init__(self, reasons: Sequence[str]) -> None:
+        super().__init__("the model has no inverse: " + "; ".join(reasons))
+        self.reasons = list(reasons)
+
+
+class FormatError(ValueError):
+    """A model whose numbers do not fit the arithmetic.
+
+    `problems`: where the value stands in a parameter file, `()` for none, and what is wrong; `str()` gives a line each.
+    """
+
+    def __init__(self, *problems: str | tuple[Path, str]) -> None:
+        self.problems = [((), problem) if isinstance(problem, str) else problem for problem in problems]
+        super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))

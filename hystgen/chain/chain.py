@@ -1,0 +1,218 @@
+"""The whole actuator: static model and effects in the order of the chain, over the records of a session."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics.problems import EffectsError
+from hystgen.chain.static import StaticModel, directions, through_stages
+from hystgen.effects.base import Effect, Place, Run
+from hystgen.plays import operators
+
+Array = NDArray[np.float64]
+
+VISIT = 10.0
+"""Seconds of the straight move to each value of a history."""
+
+VISIT_SAMPLES = 200
+
+GAP = 10.0
+"""Between two records of a session the drive holds if that many median steps lie between them, else it is straight."""
+
+_BEHIND_OFFSET = 6
+
+
+def _rank(effect: Effect) -> int:
+    """Position in the chain: gains lie between linear filters of order 0 and others, the offset between outputs."""
+    return {
+        Place.DRIVE: 0,
+        Place.PLAYS: 1,
+        Place.LINEAR: 2 if effect.order == 0 else 4,
+        Place.GAIN: 3,
+        Place.OUTPUT: 5 if effect.order == 0 else _BEHIND_OFFSET,
+        Place.ADDED: 7,
+    }[effect.place]
+
+
+def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """The effects as the chain meets them; those of one place and order as they were given."""
+    return tuple(sorted(effects, key=lambda effect: (_rank(effect), effect.order)))
+
+
+@dataclass(frozen=True)
+class Session:
+    """Records that follow one another as one run, with the slice of it that each record is."""
+
+    run: Run
+    parts: tuple[slice, ...]
+
+
+def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session:
+    """The runs of a session on one time axis.
+
+    A record whose times lie behind those before it keeps them (session time), unless a rest would not fit between; any
+    other starts one median step after the record before and its rest. In rests and in gaps of more than `GAP` steps the
+    drive holds, until one step before the next record. The values of `history` are visited before the first record,
+    each on a straight move of `VISIT` seconds from the one before, and the last is held for its rest. Raises ValueError
+    for records of no samples.
+    """
+    if not runs or any(len(run.t) == 0 for run in runs):
+        raise ValueError("a session has records, and each of them samples")
+    names = set.intersection(*(set(run.extra) for run in runs))
+    t: list[Array] = []
+    v: list[Array] = []
+    extra: dict[str, list[Array]] = {name: [] for name in names}
+    parts = []
+    count = 0
+
+    def put(times: Array, drives: Array, columns: dict[str, Array]) -> None:
+        nonlocal count
+        t.append(np.asarray(times, dtype=np.float64))
+        v.append(np.asarray(drives, dtype=np.float64))
+        for name in names:
+            extra[name].append(np.asarray(columns[name], dtype=np.float64))
+        count += len(times)
+
+    for i, run in enumerate(runs):
+        step = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
+        times = np.asarray(run.t, dtype=np.float64)
+        if i == 0 and history:
+            end = float(times[0]) - step - run.rest
+            visits = [float(x) for x in history]
+            ramps = [np.linspace(a, b, VISIT_SAMPLES + 1)[1:] for a, b in itertools.pairwise(visits)]
+            drives = np.concatenate([visits[:1], *ramps])
+            since = np.arange(len(drives)) * (VISIT / VISIT_SAMPLES)
+            first = {name: np.full(len(drives), float(run.extra[name][0])) for name in names}
+            put(np.asarray(end - since[::-1], dtype=np.float64), drives, first)
+        elif i:
+            end = float(t[-1][-1])
+            wanted = end + run.rest + step
+            if times[0] <= end or (run.rest > 0.0 and times[0] < wanted):
+                times = times + (wanted - times[0])
+        pause = float(times[0] - t[-1][-1]) if count else 0.0
+        if pause > GAP * step or (run.rest > 0.0 and pause > 1.5 * step):
+            held = {name: extra[name][-1][-1:] for name in names}
+            put(np.array([times[0] - step]), v[-1][-1:], held)
+        parts.append(slice(count, count + len(times)))
+        put(times, run.v, {name: run.extra[name] for name in names})
+    whole = Run(np.concatenate(t), np.concatenate(v), {name: np.concatenate(extra[name]) for name in names})
+    return Session(whole, tuple(parts))
+
+
+class Chain:
+    """Static model and effects as one forward model.
+
+    Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation behind,
+    output offset, sensor nonlinearity, drift. Raises EffectsError for two effects that say how the plays move.
+    """
+
+    def __init__(self, cascade: StaticModel, effects: Sequence[Effect]) -> None:
+        movers = [effect.name for effect in effects if effect.moves_plays()]
+        if len(movers) > 1:
+            raise EffectsError(f"one effect says how the plays move, not {' and '.join(movers)}")
+        self.cascade = cascade
+        self.effects = in_order(effects)
+
+    def simulate(self, runs: Sequence[Run], history: Sequence[float] | None = None) -> list[Array]:
+        """Outputs (N,) of each run of a session, from the start memory and at rest; see `join`.
+
+        Raises EffectsError where a column is missing or an effect's answer has the wrong form.
+        """
+        for name in sorted({column for effect in self.effects for column in effect.columns}):
+            if any(name not in run.extra for run in runs):
+                who = next(effect.name for effect in self.effects if name in effect.columns)
+                raise EffectsError(f"the effect {who} needs the column {name}, which a record does not have")
+        session = join(runs, history)
+        y = self.output(session.run)
+        if not np.isfinite(y).all() and np.isfinite(session.run.v).all():
+            names = ", ".join(effect.name for effect in self.effects) or "no effects"
+            raise EffectsError(f"the output is not finite; what do the parameters of {names} come to?")
+        return [y[part] for part in session.parts]
+
+    def output(self, run: Run) -> Array:
+        """Output (N,) of one run, from the start memory and at rest at its first sample."""
+        y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
+        behind = [effect for effect in self.effects if effect.place not in (Place.DRIVE, Place.PLAYS)]
+        offset = self.cascade.output_offset
+        for effect in behind:
+            if _rank(effect) >= _BEHIND_OFFSET:
+                y, offset = y + offset, 0.0
+            if effect.place is Place.LINEAR:
+                y = effect.filtered(y, run)
+            elif effect.place is Place.GAIN:
+                y = effect.gain(run) * y + effect.offset(run)
+            elif effect.place is Place.OUTPUT:
+                y = effect.mapped(y, run)
+            else:
+                y = y + effect.added(run)
+        return y + offset
+
+    def play_input(self, run: Run) -> Array:
+        """Input `w` (N,) of the plays: the drive behind delay, slew limit, lag and front."""
+        a = np.ascontiguousarray(run.v, dtype=np.float64)
+        for effect in self._of(Place.DRIVE):
+            a = effect.drive(a, run)
+        if not self.cascade.branches_differ:
+            return through_stages(self.cascade.stages, a, None)
+        before = float(self.cascade.front_inverse(self.cascade.pi.start[0])) if self.cascade.start_is_defined else 0.0
+        rising = directions(np.concatenate([[before], a]), True)[1:]
+        return through_stages(self.cascade.stages, a, rising)
+
+    def plays(self, w: Array, run: Run) -> Array:
+        """Rows (n+1, N) that the weights sum, from the start memory."""
+        pi = self.cascade.pi
+        return plays(self._of(Place.PLAYS), w, run, np.asarray(pi.thresholds), np.asarray(pi.start))
+
+    def _of(self, place: Place) -> list[Effect]:
+        return [effect for effect in self.effects if effect.place is place]
+
+
+def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+    """Rows (n+1, N) that the weights sum: the plays as the one effect that moves them says, behind all that bend them.
+
+    `effects`: those of Place.PLAYS, in order.
+    """
+    return bent(effects, moved(effects, w, run, thresholds, start), thresholds)
+
+
+def moved(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+    """Rows (n+1, N) of the plays before an effect bends them."""
+    mover = _mover(effects)
+    if mover is None:
+        return operators.plays(w, thresholds, start)
+    return mover.plays(w, run, thresholds, start)
+
+
+def bent(effects: Sequence[Effect], rows: Array, thresholds: Array) -> Array:
+    """The rows behind all effects that bend them."""
+    for effect in effects:
+        if effect.bends_plays():
+            rows = effect.bent(rows, thresholds)
+    return rows
+
+
+def bent_sum(effects: Sequence[Effect], p: Array, rows: Array, thresholds: Array) -> Array:
+    """The weighted sum (N,) of the rows of `bent`."""
+    *first, last = (effect for effect in effects if effect.bends_plays())
+    if type(last).bent_sum is Effect.bent_sum:
+        return np.asarray(p @ bent(effects, rows, thresholds))
+    return last.bent_sum(p, bent(first, rows, thresholds), thresholds)
+
+
+def summed(effects: Sequence[Effect], p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+    """The weighted sum (N,) of the rows of `moved`."""
+    mover = _mover(effects)
+    if mover is None:
+        return operators.play_sum(w, thresholds, start, p)
+    if type(mover).summed is Effect.summed:
+        return operators.weighted_sum(p, moved(effects, w, run, thresholds, start))
+    return mover.summed(p, w, run, thresholds, start)
+
+
+def _mover(effects: Sequence[Effect]) -> Effect | None:
+    return next((effect for effect in effects if effect.moves_plays()), None)

@@ -1,0 +1,169 @@
+"""What the commands have in common: arguments, options, and errors as messages with an exit code."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import console
+
+if TYPE_CHECKING:
+    from hystgen.model import Model
+
+
+
+
+class Failed(click.ClickException):
+    """A check that failed (exit code 1) or input that cannot be used (2); the message says everything."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.exit_code = code  # type: ignore[misc]  # click declares it on the class and reads it on the instance
+
+    def show(self, file: Any = None) -> None:
+        """Print the message alone: it already says that it is an error."""
+        console.note(self.message, file)
+
+
+def guarded(path: str, action: Callable[[], Any]) -> Any:
+    """Run `action` and turn what it may raise into a message and an exit code."""
+    from hystgen.basics.problems import (
+        FormatError,
+        NotInvertibleError,
+        ParameterError,
+        PlanError,
+        RecordError,
+        UnsupportedEffectsError,
+    )
+    from hystgen.parameters.files import located
+
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", UserWarning)
+            result = action()
+        for warning in caught:
+            console.note(f"warning: {warning.message}")
+        return result
+    except (ParameterError, PlanError, RecordError) as error:
+        raise Failed(str(error), 2) from None
+    except NotInvertibleError as error:
+        raise Failed("\n".join(f"{path}: error: no inverse: {reason}" for reason in error.reasons), 1) from None
+    except UnsupportedEffectsError as error:
+        raise Failed(f"{path}: error: {error}", 1) from None
+    except FormatError as error:
+        raise Failed(str(located(path, error.problems)), 2) from None
+    except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
+        raise
+    except (ValueError, OSError) as error:
+        raise Failed(f"error: {_reason(error)}", 2) from None
+
+
+def _reason(error: ValueError | OSError) -> str:
+    """What an error says; of the system's own the file and what is wrong with it."""
+    if not isinstance(error, OSError) or not error.strerror:
+        return str(error)
+    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+
+
+def load_model(path: str, effects: Sequence[str] = ()) -> Model:
+    from hystgen.model import load
+
+    model: Model = guarded(path, lambda: load(path, effects))
+    return model
+
+
+params_argument = click.argument("params", type=click.Path())
+operator_option = click.option(
+    "--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's"
+)
+arithmetic_option = click.option("--arithmetic", type=click.Choice(list(ARITHMETICS)), help="default: the file's")
+engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
+optimize_option = click.option(
+    "--optimize", type=click.Choice(["auto", "speed", "size"]), help="what engine auto chooses for; default: the file's"
+)
+effects_option = click.option(
+    "--effects", multiple=True, type=click.Path(), metavar="FILE.py", help="effects of your own (user:..); repeatable"
+)
+layout_option = click.option(
+    "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
+    show_default=True,
+)  # fmt: skip
+T = TypeVar("T")
+U = TypeVar("U")
+
+
+def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
+    """What `action` gives for every item. Raises Failed with all messages and the higher one of the exit codes."""
+    made, failures = [], []
+    for item in items:
+        try:
+            made.append(action(item))
+        except Failed as failure:
+            failures.append(failure)
+    if failures:
+        messages = dict.fromkeys(failure.message for failure in failures)
+        raise Failed("\n".join(messages), max(failure.exit_code for failure in failures))
+    return made
+
+
+def keep_inputs(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
+    """Refuse to write over what is read."""
+    read = {os.path.realpath(path) for path in inputs}
+    for path in outputs:
+        if path and os.path.realpath(path) in read:
+            raise Failed(f"error: {path} is an input and would be overwritten; choose another name", 2)
+
+
+def history_values(text: str | None) -> list[float] | None:
+    if text is None:
+        return None
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = [math.nan]
+    if not all(map(math.isfinite, numbers)):
+        raise Failed(f"error: --history {text!r} is not a list of numbers; write --history 100,-100", 2)
+    return numbers
+
+
+def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
+    if not 0 <= value < math.inf:
+        raise click.BadParameter("give seconds, 0 or more")
+    return value
+
+
+def reading_options(columns: str | None, sample_time: float | None, delimiter: str | None) -> dict[str, Any]:
+    from hystgen import records
+
+    mapping = guarded("--columns", lambda: records.parse_columns(columns)) if columns else None
+    return {"columns": mapping, "sample_time": sample_time, "delimiter": delimiter, "progress": True}
+
+
+_RECORD_OPTIONS = [
+    click.option(
+        "--columns",
+        metavar="t=Time,v=U,y=Pos",
+        help="our names for the file's columns; in HDF5 v=run1/drive, of a MATLAB struct v=data.v; in text also by "
+        "their numbers, 1,2,3 for t, v, y",
+    ),
+    click.option("--sample-time", type=float, help="seconds, for files without time"),
+    click.option("--delimiter", help="default: what the file shows"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before"),
+    click.option(
+        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, seen by effects alone"
+    ),
+]
+
+
+def record_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of every command that takes records."""
+    for option in reversed(_RECORD_OPTIONS):
+        command = option(command)
+    return command

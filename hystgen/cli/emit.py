@@ -1,0 +1,85 @@
+"""`hystgen emit`: the C files of models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hystgen.basics import console
+from hystgen.cli.common import (
+    Failed,
+    arithmetic_option,
+    engine_option,
+    for_each,
+    guarded,
+    layout_option,
+    load_model,
+    operator_option,
+    optimize_option,
+)
+
+if TYPE_CHECKING:
+    from hystgen.model import Model
+
+
+@click.command()
+@click.argument("params", nargs=-1, required=True, type=click.Path())
+@click.option("-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to")
+@operator_option
+@arithmetic_option
+@engine_option
+@optimize_option
+@layout_option
+@click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
+@click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
+def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, **options: str | None) -> None:
+    """Write the C files of models.
+
+    Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
+    """
+    from hystgen.emission import calls, files
+
+    params = tuple(dict.fromkeys(params))
+    models = for_each(params, load_model)
+    guarded(output, lambda: calls.check_names(models))
+    named = list(zip(params, models, strict=True))
+    texts = for_each(named, lambda one: guarded(one[0], lambda: calls.emitted_files(one[1], **options)))
+    made = {name: text for each in texts for name, text in each.items()}
+    if check:
+        _check(named, output, options)
+    elif list_outputs:
+        for name in made:
+            console.say(str(Path(output) / name))
+    else:
+        for path in guarded(output, lambda: files.write(Path(output), made)):
+            console.say(str(path))
+
+
+def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, str | None]) -> None:
+    """Exit code 1 with the differences of files on disk, and the commands that fit."""
+    from dataclasses import asdict
+
+    from hystgen.emission import calls, stale
+
+    problems, advice = [], []
+    for path, model in models:
+        found = guarded(path, partial(calls.stale_files, model, output, **options))
+        if not found:
+            continue
+        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
+        wanted = asdict(calls.emit_options(model, **options))  # type: ignore[arg-type]
+        problems += [f"error: {each.sentence()}" for each in found]
+
+        def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
+            try:
+                return calls.stale_files(model, output, **other)
+            except ValueError:  # no such model any more
+                return list(found)
+
+        advice += stale.advice(found, path, output, given, wanted, again)
+    if problems:
+        raise Failed("\n".join(dict.fromkeys([*problems, *advice])), 1)

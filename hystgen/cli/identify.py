@@ -1,0 +1,136 @@
+"""`hystgen identify`: models from measured records."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hystgen.basics import console
+from hystgen.cli.common import Failed, guarded, history_values, keep_inputs, reading_options, record_options
+
+
+@click.command()
+@click.argument("data", nargs=-1, type=click.Path())
+@click.option("-o", "output", required=True, type=click.Path(), help="parameter file to write; with --batch a folder")
+@click.option("--batch", multiple=True, metavar="PATTERN", help="'units/*.csv', a file or a folder: one unit a file")
+@click.option("--emit/--no-emit", default=None, help="with --batch: write the C of every unit too  [default: emit]")
+@click.option("--jobs", type=click.IntRange(min=1), help="with --batch: processes; default: all cores")
+@click.option("--scheduler", metavar="ADDRESS", help="with --batch: Dask scheduler, as in tcp://host:8786")
+@click.option("--model", type=click.Choice(["pi", "gpi-deadzone", "gpi-tanh", "auto"]), default="pi", show_default=True)
+@click.option("--thresholds", type=int, help="number of plays without r_0; default: chosen on held-out error")
+@click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
+@click.option(
+    "--holdout", multiple=True, type=click.Path(),
+    help="record that takes no part in the fit; with --batch for example 'holdout/{unit}.csv'",
+)  # fmt: skip
+@click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
+@click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
+@click.option("--name", help="C identifier of the model; default: from the output file")
+@click.option("--units", metavar="V,um", help="units of drive and output; default: the records'")
+@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
+@click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
+@record_options
+def identify(
+    data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
+    holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None, units: str | None, plot: str | None,
+    report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None, jobs: int | None,
+    scheduler: str | None, **reading: Any,
+) -> None:
+    """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
+
+    Example: hystgen identify sweep.csv --holdout other.csv -o stage_x.yaml --units V,um
+
+    Example: hystgen identify --batch 'units/*.csv' -o params/
+    """
+    from hystgen import identification
+    from hystgen.basics import writing
+    from hystgen.report import identification as pages
+
+    drive, _, displacement = (units or "").partition(",")
+    how = reading_options(**reading)
+    options: dict[str, Any] = {
+        "model": model,
+        "thresholds": thresholds,
+        "breaks": breaks,
+        "history": history_values(history),
+        "rest": rest,
+        "units": {"input": drive.strip(), "output": displacement.strip()} if units else None,
+        "skip": skip,
+        "loading_curve": loading_curve,
+    }
+    only_batch: dict[str, Any] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}
+    if batch:
+        for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
+            if value is not None:
+                raise click.UsageError(f"{option} is for one model; leave it out with --batch")
+        # An unquoted pattern comes expanded by the shell: its first file with the option, the rest as arguments
+        _identify_batch(
+            (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
+            **options, **how,
+        )  # fmt: skip
+        return
+    for option, given in only_batch.items():
+        if given is not None:
+            raise click.UsageError(f"{option} is for many units; give --batch with it")
+    if not data:
+        raise click.UsageError("Missing argument 'DATA...'.")
+    if Path(output).is_dir():
+        raise click.BadParameter(f"File '{output}' is a directory.", param_hint="'-o'")
+    made = [str(Path(report) / name) for name in pages.names()] if report else []
+    keep_inputs((output, plot, *made), (*data, *holdout))
+
+    def run() -> None:
+        from hystgen import records
+        from hystgen.emission import files
+        from hystgen.identification import settings
+        from hystgen.report import plots
+
+        for file in (output, plot):
+            if file:
+                writing.check_writable(file)
+        if plot:
+            plots.check_path(plot)
+        if report:
+            pages.check_folder(report)
+            files.check(Path(report), pages.names())
+        older = settings.of(output)
+        read = records.read_records([*data, *holdout], **how)
+        fit = identification.identify(
+            read[: len(data)],
+            holdout=read[len(data) :],
+            name=name or older.name or identification.identifier_from(Path(output).stem),
+            progress=True,
+            **options,
+        )
+        for warning in fit.warnings:
+            console.note(f"warning: {warning}")
+        for sentence in older.sentences(fit):
+            console.note(sentence)
+        fit = older.on(fit)
+        fit.write(output)
+        console.say(fit.table())
+        console.say(output)
+        if plot:
+            plots.show_fit(fit, read, plot)
+            console.say(plot)
+        if report:
+            console.say(str(pages.write(fit, read, report, Path(output).name)))
+
+    guarded(data[0], run)
+
+
+def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> None:
+    """Print what became of a fleet; exit code 1 if a unit failed, 130 if the user stopped it."""
+    from hystgen.fleet import batch as fleet
+
+    try:
+        done = guarded(output, partial(fleet.identify_batch, sources, output, **options))
+    except KeyboardInterrupt:
+        raise Failed("interrupted; what is done is kept, and the same command goes on from there", 130) from None
+    console.note(done.table().rstrip("\n"))
+    console.say(str(Path(output) / "summary.csv"))
+    if done.failed:
+        raise Failed(f"error: {len(done.failed)} of {len(done.units)} units failed", 1)

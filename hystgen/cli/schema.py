@@ -1,0 +1,20 @@
+"""`hystgen schema`: the JSON Schema of the parameter file."""
+
+from __future__ import annotations
+
+import click
+
+from hystgen.basics import console
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON Schema of the parameter file.
+
+    Example: hystgen schema > hystgen.schema.json
+    """
+    import json
+
+    from hystgen.parameters import files
+
+    console.say(json.dumps(files.schema(), indent=2))

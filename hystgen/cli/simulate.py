@@ -1,0 +1,91 @@
+"""`hystgen simulate`: a model or its inverse over records."""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import console
+from hystgen.cli.common import (
+    Failed,
+    effects_option,
+    guarded,
+    history_values,
+    keep_inputs,
+    load_model,
+    params_argument,
+    reading_options,
+    record_options,
+)
+
+
+def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> None:
+    from hystgen import records
+
+    target.parent.mkdir(parents=True, exist_ok=True)
+    records.write_columns(target, header, list(columns.values()))
+
+
+@click.command()
+@params_argument
+@click.argument("data", nargs=-1, required=True, type=click.Path())
+@click.option("-o", "output", type=click.Path(), help="CSV file, or a folder for several; default: standard output")
+@click.option("--operator", type=click.Choice(["forward", "inverse"]), default="forward", show_default=True)
+@click.option(
+    "--arithmetic", type=click.Choice(list(ARITHMETICS)), help="compute as the emitted C does; default: double"
+)
+@click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="with --arithmetic")
+@effects_option
+@record_options
+def simulate(
+    params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
+    effects: tuple[str, ...], history: str | None, rest: float, **reading: Any,
+) -> None:
+    """Run the model (column v) or its inverse (column u) over records; several files are one session.
+
+    Example: hystgen simulate stage_x.yaml drive.csv -o predicted.csv --history 100,-100
+    """
+    from hystgen import records, simulation
+
+    if len(data) > 1 and output is None:
+        raise Failed("error: several records need -o with a folder", 2)
+    if len({Path(path).stem for path in data}) < len(data):
+        raise Failed("error: two records have the same name; their results would overwrite each other", 2)
+    model = load_model(params, effects)
+    visited = history_values(history)
+    how = reading_options(**reading)
+    column, answer = ("v", "y") if operator == "forward" else ("u", "v")
+    read = guarded(params, partial(records.read_records, data, need=(column,), **how))
+    for record in read:
+        if {answer, f"{answer}_measured"} <= record.columns().keys():
+            raise Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
+        for note in record.notes:
+            console.note(f"warning: {record.name}: {note}")
+    targets: list[Path | None] = [Path(output) if output else None] * len(data)
+    if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
+        targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
+    keep_inputs(targets, [params, *data])
+    simulated = guarded(
+        params,
+        lambda: simulation.simulate_records(model, read, operator, arithmetic, engine, visited or (), rest),
+    )
+    for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
+        columns = record.columns()
+        for sentence in remarks:
+            console.note(f"warning: {sentence}")
+        units = dict(record.units)
+        if answer in columns:
+            columns[f"{answer}_measured"] = columns.pop(answer)
+            units[f"{answer}_measured"] = units.pop(answer, "")
+        columns[answer] = answers
+        header = records.headers(columns, units)
+        if target is None:
+            console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8
+            continue
+        guarded(str(target), partial(_write_record, target, header, columns))
+        console.say(str(target))

@@ -1,0 +1,168 @@
+"""How far a compiled operator can be from the exact model: rounding-error bounds, derived once for every model.
+
+Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own
+error, because a play never amplifies a difference of its input, threshold or start value (3); sums and products add
+their unit roundoffs.
+
+Engine `corners`: an answer is computed from the corner that it hangs on, which was an answer itself, so that the
+roundings of up to n + 1 corners and of the answer add up. `CornerRoundings` counts those of one of them.
+
+Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
+residual eta. That needs solving to stop where another play would follow: on the straight piece before, of slope P_k,
+rounding of eta is one of eta / P_k in w, which behind that place would count with a steeper slope. Engine `loop`
+stops there, engine `corners` goes over to the steeper piece as much earlier as rounding can carry; neither answers a
+move with one the other way, which would do the same to the plays that follow behind a turn. The exact inverse turns a
+reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front
+into that over its smallest slope. A clamp or commit gives both the same drive and adds nothing.
+
+With two branches two drives can give the same output, one on each, and rounding decides between them where the
+reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
+gap between the branches makes at the input of the plays, now and in what the plays remember. The bound counts that.
+The first move starts from the drive that the start memory stands for, G_R^-1(s_0), which need not be a number of the
+type. The forward operator tells on which side of it every drive lies, to the rounding of G_R^-1 in double precision.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hystgen.chain.static import StaticModel
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.stage import Stage
+from hystgen.front.tanh import kernels
+from hystgen.front.tanh.model import TanhEnvelope
+
+SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computation itself
+
+
+@dataclass(frozen=True)
+class ErrorBounds:
+    """Largest differences from the exact model: `forward` in output, `inverse` in drive units (inf: no inverse).
+
+    `rounding` is the part of `inverse` that does not come from taking another branch.
+    """
+
+    forward: float
+    inverse: float
+    rounding: float
+
+
+def largest_sum(cascade: StaticModel) -> float:
+    """Size that nothing added up for a play sum exceeds: sum |p_i| max |w| + sum |p_i| r_i."""
+    pi = cascade.pi
+    total = math.fsum(abs(p) for p in pi.weights)
+    lift = math.fsum(abs(p) * r for p, r in zip(pi.weights, pi.thresholds, strict=True))
+    w = max(*(abs(end) for end in cascade.play_range), *(abs(s) for s in pi.start))
+    return total * w + lift
+
+
+def _stage_errors(
+    stage: Stage, low: float, high: float, eps: float, kind: str, ascending: bool
+) -> tuple[float, float, float]:
+    """Error of the stage's value, of its inverse (as an error of the value), and its largest |slope|."""
+    x = max(abs(low), abs(high))
+    y = max(abs(end) for end in stage.image(low, high, ascending))
+    slope = max(abs(s) for s in stage.slope_range(low, high, ascending))
+    if isinstance(stage, TanhEnvelope):
+        a0, a1, a2, a3 = (abs(a) for a in stage.branch(ascending))
+        forward = slope * 3 * eps * (x + a2 / a1) + eps * (a0 * (3 + 2 * kernels.TANH_MAX_ULP[kind]) + 2 * a3)
+        inverse = eps * (4 * (y + a3) + a0 * (0.9 * kernels.ATANH_MAX_ULP[kind] + 4 * (0.45 + a2)))
+        return forward, inverse, slope
+    assert isinstance(stage, DeadZone)
+    return eps * (6 * slope * x + 2 * y), eps * (6 * y + 2 * slope * x), slope
+
+
+@dataclass(frozen=True)
+class CornerRoundings:
+    """Roundings of the corner engine, derived operation by operation from `c_runtime/corners_float.c`.
+
+    `forward`, `inverse`: what one answer adds to the difference between the sum of the plays and the exact one, for
+    plays that have seen the same inputs, in output units; `early`: how much earlier than exactly the inverse has plays
+    follow, in output units; `margin`: how far an answer along a line can lie beyond the exact one, in units of the
+    plays' input.
+
+    With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays, T its travel: no output is larger
+    than C W, no change of it larger than C T. A table entry or an operation adds u times the size of its result; an
+    error of the plays' input counts C times in the output.
+    """
+
+    forward: float
+    inverse: float
+    early: float
+    margin: float
+
+    @classmethod
+    def of(cls, cascade: StaticModel, kind: str) -> CornerRoundings:
+        """Those of a model in 'float32' or 'float64'; zero where the range of the drive is not bounded."""
+        if not all(math.isfinite(end) for end in cascade.input_range):
+            return cls(0.0, 0.0, 0.0, 0.0)
+        u = float(np.finfo(kind).eps) / 2
+        pi = cascade.pi
+        seen = (*cascade.play_range, *pi.start, 0.0)
+        w, travel = max(map(abs, seen)), max(seen) - min(seen)
+        c = math.fsum(abs(p) for p in pi.weights)
+        # inverse: begin (table, sum), its distance, gain and product; reach (table), two sums of drives
+        line = c * (w + travel) + 3 * c * travel
+        drives = 2 * w + travel
+        passed = c * (w + travel)  # where a block is passed: table and sum
+        early = line + passed
+        inverse = line + c * drives + early
+        # forward: begin (table, sum), its distance, gain and product; reach (table), two sums of outputs; blocks
+        forward = c * (w + travel) + 3 * c * travel + c * (2 * w + travel) + c * (w + travel)
+        # the place of the limit: two differences of drives, slope, product and sum; then as for an answer
+        least = min(abs(p) for p in np.cumsum(pi.weights)) if not cascade.inverse_problems() else math.inf
+        margin = drives + 2 * travel + (line + c * (w + 4 * travel) + early) / least
+        return cls(u * forward, u * inverse, u * early, SECOND_ORDER * u * margin)
+
+
+def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
+    """Forward error, and the residual eta of the inverse in output units, for one arithmetic."""
+    eps = float(np.finfo(kind).eps) / 2
+    pi = cascade.pi
+    total = math.fsum(abs(p) for p in pi.weights)
+    w = max(*(abs(end) for end in cascade.play_range), *(abs(s) for s in pi.start))
+    offset = abs(cascade.output_offset)
+    drive = max(abs(end) for end in cascade.input_range)
+
+    front = front_inverse = 0.0
+    for ascending in (True, False) if cascade.branches_differ else (True,):
+        error, residual = 0.0, eps * drive
+        for stage, (low, high) in zip(cascade.stages, cascade.stage_ranges(ascending), strict=True):
+            value, back, slope = _stage_errors(stage, low, high, eps, kind, ascending)
+            error = slope * error + value
+            residual = slope * residual + back
+        front, front_inverse = max(front, error), max(front_inverse, residual)
+
+    size = largest_sum(cascade)
+    underflow = (8 * pi.n + 16) * float(np.finfo(kind).smallest_subnormal) * (1 + total)
+    if engine == "loop":
+        forward = total * (front + eps * (4 * w + 5 * pi.thresholds[-1]))
+        forward += eps * ((pi.n + 3) * size + 2 * (size + offset)) + underflow
+        return forward, forward + eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
+    one = CornerRoundings.of(cascade, kind)
+    answers = pi.n + 2  # n + 1 corners below an answer
+    offsets = eps * (total * w + 2 * offset) + underflow
+    forward = answers * one.forward + total * front + offsets
+    return forward, answers * one.inverse + total * (front + front_inverse) + offsets
+
+
+def error_bounds(cascade: StaticModel, arithmetic: str, engine: str) -> ErrorBounds:
+    """Bounds for `arithmetic` 'float32' or 'float64' and `engine` 'corners' or 'loop', against the double model.
+
+    The double model's own rounding is counted too. The inverse bound never exceeds the drive range, which both keep.
+    """
+    forward, residual = _one(cascade, arithmetic, engine)
+    own_forward, own_residual = _one(cascade, "float64", "corners")
+    inverse = rounding = math.inf
+    if not cascade.inverse_problems():
+        pi = cascade.pi
+        gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / cascade.front_slopes[0]
+        rounding = SECOND_ORDER * gain * (residual + own_residual)
+        gap = cascade.branch_gap
+        inverse = rounding + gain * pi.slopes[-1] * gap + gap / cascade.front_slopes[0]
+        whole = cascade.input_range[1] - cascade.input_range[0]
+        inverse, rounding = min(inverse, whole), min(rounding, whole)
+    return ErrorBounds(SECOND_ORDER * (forward + own_forward), inverse, rounding)

@@ -1,0 +1,49 @@
+"""The forward operator of plays alone: `c_runtime/forward.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.layout import Tables
+from hystgen.plays.corners.corners_float import plays_step, start
+from hystgen.plays.corners.memory import OUTPUT, STATUS, Memory, Start
+from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
+
+
+@jit(inline=True)
+def forward_step(t: Tables, m: Memory, v: Any) -> Any:
+    """One sample."""
+    if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
+        if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
+            m.counts[STATUS] |= HELD
+            return m.real[OUTPUT] + t.limits[OFFSET]
+        v = t.limits[DRIVE_MIN] if v < t.limits[DRIVE_MIN] else t.limits[DRIVE_MAX]
+        m.counts[STATUS] |= INPUT_CLAMPED
+    return plays_step(t.forward, m, v) + t.limits[OFFSET]
+
+
+@jit
+def forward_begin(t: Tables, m: Memory, which: Start) -> None:
+    """What init and reset have in common."""
+    start(t.forward, m, which)
+    m.counts[STATUS] = 0
+
+
+@jit
+def forward_init(t: Tables, m: Memory) -> None:
+    """Start memory of the parameter file."""
+    forward_begin(t, m, t.forward_first)
+
+
+@jit
+def forward_reset(t: Tables, m: Memory, v: Any) -> None:
+    """All plays 0, status cleared, then one ordinary step."""
+    forward_begin(t, m, t.forward_zero)
+    forward_step(t, m, v)
+
+
+@jit
+def forward_visit(t: Tables, m: Memory, v: Any) -> None:
+    """Let the actuator be at drive v, in range or not, before the next sample."""
+    plays_step(t.forward, m, v)

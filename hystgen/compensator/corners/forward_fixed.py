@@ -1,0 +1,77 @@
+"""The forward operator in fixed point: `c_runtime/forward_fixed.c`, with or without a memoryless part."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.corners.inverse import clamp_drive
+from hystgen.compensator.layout import FixedTables
+from hystgen.front.curve import front_forward
+from hystgen.plays.corners.corners_fixed import plays_step, start
+from hystgen.plays.corners.memory import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS, FixedMemory, Reals
+from hystgen.plays.fixed import nearest
+from hystgen.plays.slots import CODE_MAX, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED, SATURATED
+
+
+@jit
+def code(t: FixedTables, m: FixedMemory) -> Any:
+    """Output code for the memory as it is, limited to the type."""
+    found = nearest(m.real[OUTPUT], t.limits[FRACTION])
+    if found > t.limits[SATURATED] or found < -t.limits[SATURATED]:
+        m.counts[STATUS] |= OUTPUT_CLAMPED
+    if found > t.limits[CODE_MAX]:
+        return t.limits[CODE_MAX]
+    if found < -t.limits[CODE_MAX]:
+        return -t.limits[CODE_MAX]
+    return found
+
+
+@jit
+def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
+    """The actuator is at drive v, which decides the direction of its move and so the branch."""
+    if v > m.real[DRIVE]:
+        m.counts[ASCENDING] = 1
+    elif v < m.real[DRIVE]:
+        m.counts[ASCENDING] = 0
+    m.real[DRIVE] = v
+    plays_step(t, m, front_forward(t, v, m.counts[ASCENDING]))
+
+
+@jit(inline=True)
+def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
+    """One sample."""
+    inside = clamp_drive(t, v)
+    if inside != v:
+        m.counts[STATUS] |= INPUT_CLAMPED
+    forward_arrive(t, m, inside)
+    return code(t, m)
+
+
+@jit
+def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
+    """What init and reset have in common; `first` as in `FixedTables.applied`."""
+    start(t, m, play)
+    m.real[NEXT] = m.real[INPUT]
+    m.real[DRIVE] = t.applied[first]
+    m.counts[ASCENDING] = t.ascending[first]
+    m.counts[STATUS] = 0
+
+
+@jit
+def forward_init(t: FixedTables, m: FixedMemory) -> None:
+    """Start memory of the parameter file."""
+    forward_begin(t, m, t.start, 0)
+
+
+@jit
+def forward_reset(t: FixedTables, m: FixedMemory, v: Any) -> None:
+    """All plays 0, status cleared, then one ordinary step."""
+    forward_begin(t, m, t.zero, 1)
+    forward_step(t, m, v)
+
+
+@jit
+def forward_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
+    """Let the actuator be at drive v, in range or not, before the next sample."""
+    forward_arrive(t, m, v)

@@ -1,0 +1,166 @@
+"""The inverse of plays alone in fixed point: `c_runtime/inverse_fixed.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.corners.inverse import clamp_drive
+from hystgen.compensator.layout import FixedTables
+from hystgen.plays.corners.corners_fixed import FAR, along, move_to_input, move_to_solution, solve, start
+from hystgen.plays.corners.memory import (
+    BEFORE,
+    BITS,
+    HERE,
+    INPUT,
+    NEXT,
+    ON,
+    OUTPUT,
+    REFERENCE,
+    REPEAT,
+    RISING,
+    STATUS,
+    UNDO,
+    FixedMemory,
+    K,
+    Reals,
+    copy_place,
+)
+from hystgen.plays.fixed import nearest, over_slope
+from hystgen.plays.slots import (
+    DRIVE_MAX,
+    DRIVE_MIN,
+    FINE,
+    FRACTION,
+    INPUT_CLAMPED,
+    OUTPUT_CLAMPED,
+    OUTPUT_MAX,
+    OUTPUT_MIN,
+    SHY,
+)
+
+NEVER = -(2**31)
+
+
+@jit
+def inverse_clamp(t: FixedTables, u: Any) -> Any:
+    """u inside the range of the output."""
+    if u < t.limits[OUTPUT_MIN]:
+        return t.limits[OUTPUT_MIN]
+    if u > t.limits[OUTPUT_MAX]:
+        return t.limits[OUTPUT_MAX]
+    return u
+
+
+@jit(inline=True)
+def inverse_sees(m: FixedMemory, u: Any) -> Any:
+    """A reference as the present move sees it: ~u is one less than -u, and no less than the least number."""
+    return u if m.counts[RISING] else ~u
+
+
+@jit
+def inverse_stay(m: FixedMemory) -> None:
+    """The next sample searches; the next step begins here."""
+    m.real[NEXT] = NEVER
+    m.counts[ON] = 0
+
+
+@jit
+def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
+    """Steps are usual up to where another play begins to follow or something is limited, less what rounding can add."""
+    rising = m.counts[RISING]
+    most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
+    end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
+    more = t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
+    last = along(m, m.real[OUTPUT]) + more
+    usual = ((following if following < last else last) >> t.limits[FRACTION]) - t.limits[SHY]
+    least = (t.limits[OUTPUT_MIN] if rising else t.limits[OUTPUT_MAX]) << t.limits[FRACTION]
+    if usual > m.real[NEXT] and along(m, m.real[OUTPUT] - least) >= 0:
+        m.real[NEXT] = usual if usual < most else most
+
+
+@jit
+def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
+    """Any other sample than a usual one."""
+    copy_place(m, UNDO, HERE)
+    m.counts[ON] = 0
+    if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
+        level = inverse_clamp(t, u)
+        w, kink = solve(t, m, level << t.limits[FRACTION], -FAR)
+        v = nearest(w, t.limits[FINE])
+        inside = clamp_drive(t, v)
+        following = move_to_solution(t, m, kink, inside << t.limits[FINE])
+        inverse_stay(m)
+        m.counts[BITS] = (0 if level == u else INPUT_CLAMPED) | (0 if inside == v else OUTPUT_CLAMPED)
+        if m.counts[BITS] == 0:
+            inverse_look_ahead(t, m, following)
+        m.real[REFERENCE] = u
+        m.counts[REPEAT] = 1
+    m.counts[STATUS] |= m.counts[BITS]
+    return m.real[INPUT] >> t.limits[FINE]
+
+
+@jit
+def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
+    """One sample."""
+    on = along(m, (u << t.limits[FRACTION]) - m.real[OUTPUT])
+    if inverse_sees(m, u) < m.real[NEXT] and on > 0 and u != m.real[REFERENCE]:
+        k = m.counts[K] + 1
+        v = nearest(m.real[INPUT] + along(m, over_slope(t, on, k)), t.limits[FINE])
+        m.real[BEFORE] = m.real[INPUT]
+        m.real[INPUT] = v << t.limits[FINE]
+        m.real[OUTPUT] += t.slope[k] * (m.real[INPUT] - m.real[BEFORE])
+        m.real[REFERENCE] = u
+        m.counts[ON] = 1
+        return v
+    return inverse_search(t, m, u)
+
+
+@jit
+def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
+    """What the drive really applied in place of the last answer."""
+    v = clamp_drive(t, applied)
+    if v != applied:
+        m.counts[STATUS] |= INPUT_CLAMPED
+    if m.counts[ON]:
+        m.real[OUTPUT] -= t.slope[m.counts[K] + 1] * (m.real[INPUT] - m.real[BEFORE])
+        m.real[INPUT] = m.real[BEFORE]
+        copy_place(m, UNDO, HERE)
+    copy_place(m, HERE, UNDO)
+    inverse_stay(m)
+    m.counts[REPEAT] = 0
+    move_to_input(t, m, v << t.limits[FINE])
+
+
+@jit
+def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
+    """What init and reset have in common."""
+    start(t, m, play)
+    copy_place(m, UNDO, HERE)
+    inverse_stay(m)
+    m.real[BEFORE] = 0
+    m.real[REFERENCE] = 0
+    m.counts[REPEAT] = 0
+    m.counts[BITS] = 0
+    m.counts[STATUS] = 0
+
+
+@jit
+def inverse_init(t: FixedTables, m: FixedMemory) -> None:
+    """Start memory of the parameter file."""
+    inverse_begin(t, m, t.start)
+
+
+@jit
+def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
+    """All plays 0, status cleared, then one ordinary step."""
+    inverse_begin(t, m, t.zero)
+    inverse_step(t, m, u)
+
+
+@jit
+def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
+    """Let the actuator be at drive v, in range or not, before the next sample."""
+    move_to_input(t, m, v << t.limits[FINE])
+    copy_place(m, UNDO, HERE)
+    inverse_stay(m)

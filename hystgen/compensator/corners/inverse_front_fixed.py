@@ -1,0 +1,123 @@
+"""The inverse with a memoryless part in fixed point: `c_runtime/inverse_front_fixed.c`, with one branch or two."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.corners.forward_fixed import code
+from hystgen.compensator.corners.inverse import clamp_drive
+from hystgen.compensator.corners.inverse_fixed import inverse_clamp
+from hystgen.compensator.corners.inverse_front import choosing
+from hystgen.compensator.layout import FixedTables
+from hystgen.front.curve import front_forward, front_inverse
+from hystgen.plays.corners.corners_fixed import FAR, move_to_input, move_to_solution, solve, start
+from hystgen.plays.corners.memory import (
+    ASCENDING,
+    BITS,
+    DRIVE,
+    HERE,
+    LEVEL,
+    NEXT,
+    REFERENCE,
+    REPEAT,
+    STATUS,
+    UNDO,
+    UNDO_ASCENDING,
+    UNDO_DRIVE,
+    FixedMemory,
+    Reals,
+    copy_place,
+)
+from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
+
+inverse_choose = choosing(front_inverse)
+
+
+@jit
+def inverse_keep(m: FixedMemory) -> None:
+    """The next step begins here."""
+    copy_place(m, UNDO, HERE)
+    m.real[UNDO_DRIVE] = m.real[DRIVE]
+    m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
+
+
+@jit
+def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
+    """The actuator is at drive v, which decides the direction of its move and so the branch; the input of the plays."""
+    if v > m.real[DRIVE]:
+        m.counts[ASCENDING] = 1
+    elif v < m.real[DRIVE]:
+        m.counts[ASCENDING] = 0
+    m.real[DRIVE] = v
+    return front_forward(t, v, m.counts[ASCENDING])
+
+
+@jit
+def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
+    """One sample."""
+    inverse_keep(m)
+    if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
+        level = inverse_clamp(t, u)
+        w, kink = solve(t, m, level << t.limits[FRACTION], m.real[NEXT])
+        v, limited = inverse_choose(t, m, level, w)
+        inside = clamp_drive(t, v)
+        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
+        m.counts[BITS] |= DOMAIN if limited else 0
+        m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
+        m.real[NEXT] = move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
+        m.real[REFERENCE] = u
+        m.real[LEVEL] = level
+        m.counts[REPEAT] = 1
+    m.counts[STATUS] |= m.counts[BITS]
+    return m.real[DRIVE]
+
+
+@jit
+def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
+    """What the drive really applied in place of the last answer."""
+    v = clamp_drive(t, applied)
+    if v != applied:
+        m.counts[STATUS] |= INPUT_CLAMPED
+    copy_place(m, HERE, UNDO)
+    m.real[DRIVE] = m.real[UNDO_DRIVE]
+    m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
+    m.counts[REPEAT] = 0
+    m.real[NEXT] = -FAR
+    move_to_input(t, m, inverse_arrive(t, m, v))
+
+
+@jit
+def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
+    """What init and reset have in common; `first` as in `FixedTables.applied`."""
+    start(t, m, play)
+    m.real[DRIVE] = t.applied[first]
+    m.counts[ASCENDING] = t.ascending[first]
+    inverse_keep(m)
+    m.real[REFERENCE] = 0
+    m.real[LEVEL] = code(t, m)
+    m.counts[REPEAT] = 0
+    m.real[NEXT] = -FAR
+    m.counts[BITS] = 0
+    m.counts[STATUS] = 0
+
+
+@jit
+def inverse_init(t: FixedTables, m: FixedMemory) -> None:
+    """Start memory of the parameter file."""
+    inverse_begin(t, m, t.start, 2)
+
+
+@jit
+def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
+    """All plays 0, status cleared, then one ordinary step."""
+    inverse_begin(t, m, t.zero, 3)
+    inverse_step(t, m, u)
+
+
+@jit
+def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
+    """Let the actuator be at drive v, in range or not, before the next sample."""
+    move_to_input(t, m, inverse_arrive(t, m, v))
+    inverse_keep(m)
+    m.real[LEVEL] = code(t, m)

@@ -1,0 +1,93 @@
+"""Which engine a model gets, and how much code it has there: tables measured on emulated cores, and a rule.
+
+Both tables are made by `benchmarks/engine_costs.py`. `engine_costs.csv` has the instructions of a sample, the mean over
+a decaying multisine; `code_sizes.csv` the bytes of code of a module, of both compilers the larger one.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.chain.static import StaticModel
+from hystgen.front.tanh.model import TanhEnvelope
+
+ENGINES = ("corners", "loop")
+OPTIMIZE = ("auto", "speed", "size")
+CORES = ("cortex-m0plus", "cortex-m4f")
+SMALL, FLASH, CYCLES = "cortex-m0plus", 32768, 4800
+"""What `auto` weighs for: a core, its bytes of flash, and its cycles in a sample (48 MHz at 10 kHz)."""
+
+
+def choose(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str) -> str:
+    """The engine that `auto` stands for; any other one is kept, but without plays nothing is listed.
+
+    `optimize` speed: fewer instructions, the geometric mean of both cores. size: less code on both cores. auto: the
+    smaller share of a small controller, flash and time added. The break-even is `FLASH / CYCLES`, 6.8 bytes of code for
+    an instruction of each sample. For both operators instructions add up. Raises ValueError for other words.
+    """
+    for what, value, known in (("engine", engine, ("auto", *ENGINES)), ("optimize", optimize, OPTIMIZE)):
+        if value not in known:
+            raise ValueError(f"{what} {value!r} is none of {', '.join(known)}")
+    if cascade.pi.n == 0:
+        return "loop"
+    if engine != "auto":
+        return engine
+    costs = {each: _cost(each, optimize, cascade, operator, arithmetic) for each in ENGINES}
+    return "corners" if costs["corners"] < costs["loop"] else "loop"
+
+
+def code_bytes(cascade: StaticModel, operator: str, arithmetic: str, engine: str) -> Mapping[str, int]:
+    """Bytes of code at -O2 on each of `CORES`, as measured for a model of the same kind."""
+    return _code_sizes()[operator, arithmetic, kind(cascade, arithmetic), engine]
+
+
+def kind(cascade: StaticModel, arithmetic: str) -> str:
+    """What of a model its code depends on: the stages in front, in fixed point only whether there are any; branches."""
+    if not cascade.stages:
+        return "pi"
+    tanh = [isinstance(stage, TanhEnvelope) for stage in cascade.stages]
+    front = "dead_zone" if ARITHMETICS[arithmetic].fixed or not any(tanh) else "tanh" if all(tanh) else "mixed"
+    return f"{front}_branches" if cascade.branches_differ else front
+
+
+def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str) -> float:
+    code = code_bytes(cascade, operator, arithmetic, engine)
+    if optimize == "size":
+        return sum(code.values())
+    front = "gpi" if cascade.stages else "pi"
+    instructions = dict.fromkeys(CORES, 0.0)
+    for one in ("forward", "inverse") if operator == "both" else (operator,):
+        measured = _instructions()[one, arithmetic, front, engine]
+        costs = measured[max(plays for plays in measured if plays <= cascade.pi.n)]
+        instructions = {core: instructions[core] + costs[core] for core in CORES}
+    if optimize == "speed":
+        return math.prod(instructions.values())
+    return code[SMALL] / FLASH + instructions[SMALL] / CYCLES
+
+
+@functools.cache
+def _instructions() -> dict[tuple[str, str, str, str], dict[int, dict[str, float]]]:
+    """Instructions of a sample on each core, by number of plays; for each operator, arithmetic, kind and engine."""
+    found: dict[tuple[str, str, str, str], dict[int, dict[str, float]]] = {}
+    for row in _rows("engine_costs.csv"):
+        about = (row["operator"], row["arithmetic"], row["kind"], row["engine"])
+        found.setdefault(about, {})[int(row["n"])] = {core: float(row[core]) for core in CORES}
+    return found
+
+
+@functools.cache
+def _code_sizes() -> dict[tuple[str, str, str, str], dict[str, int]]:
+    return {
+        (row["operator"], row["arithmetic"], row["kind"], row["engine"]): {core: int(row[core]) for core in CORES}
+        for row in _rows("code_sizes.csv")
+    }
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with (Path(__file__).parent / name).open(encoding="ascii", newline="") as file:
+        return list(csv.DictReader(file))

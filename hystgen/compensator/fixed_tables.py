@@ -1,0 +1,658 @@
+"""From a model to whole numbers: formats, ranges and error bounds of fixed point.
+
+Everything is computed with fractions from the parameters as they are, so that the same model gives the same numbers
+anywhere; only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
+
+Ranges. The drive is limited to `input_range`, so that the input w of the plays, every play and every corner stay
+between the least and largest of the range's images, the start memory and 0, where a reset begins. That bounds every
+sum; a format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables).
+
+Errors. With the drive exact, as it is sent: rounded thresholds and start states move a play by no more than their own
+error (3); rounded sums of weights are summed by parts, because neighbouring plays differ by no more than their
+thresholds do; an output is rounded once. The inverse as in `hystgen.compensator.bounds`: the exact model, driven as
+sent, misses the reference by a residual, and the exact inverse amplifies that by at most `2/p_0 - 1/C_n`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context, Decimal
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.problems import FormatError, Path
+from hystgen.basics.words import counted
+from hystgen.chain.static import StaticModel
+from hystgen.compensator.bounds import error_bounds, largest_sum
+from hystgen.compensator.layout import FixedTables, first_moves
+from hystgen.front.curve import HALF
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.plays import slots
+
+PLAY_BITS = 30  # of the input of the plays, where it is not the drive code itself
+SUM_BITS = 62
+TABLE_MAX = 2**31 - 1
+MOST_PIECES = 2000
+FAR = 2.0**40
+
+
+@dataclass(frozen=True)
+class Format:
+    """What the codes of a model mean, and how exact it is.
+
+    `drive_lsb`, `output_lsb`: physical units a code; `forward_error` in output codes, `inverse_error` in drive codes
+    (None: no inverse), `inverse_rounding` the part of it without taking another branch; `largest_sum`: bound of every
+    sum that is formed, below 2^62; `sum_bits`: fraction bits of an output code.
+    """
+
+    drive_lsb: Fraction
+    output_lsb: Fraction
+    forward_error: float
+    inverse_error: float | None
+    inverse_rounding: float | None
+    largest_sum: int
+    sum_bits: int
+
+
+def build(
+    cascade: StaticModel, arithmetic: str, engine: str, drive_lsb: float | None = None, output_lsb: float | None = None
+) -> tuple[FixedTables, Format]:
+    """Tables of `cascade` in 'q31' or 'q15', and what its codes mean.
+
+    Raises FormatError when a given LSB does not fit the type or the model degenerates in the format.
+    """
+    return _Builder(cascade, arithmetic, engine, drive_lsb, output_lsb).build()
+
+
+def nearest(x: Fraction | float) -> int:
+    """Nearest whole number, ties away from zero; exact for floats too."""
+    size: Fraction | float = -x if x < 0 else x
+    whole = math.floor(size)
+    if 2 * (size - whole) >= 1:
+        whole += 1
+    return whole if x >= 0 else -whole
+
+
+def lsbs(
+    cascade: StaticModel, arithmetic: str, drive_lsb: float | None = None, output_lsb: float | None = None
+) -> tuple[Fraction, Fraction]:
+    """Physical units a drive code and an output code: those given, else the finest that reach the ends of the ranges.
+
+    Raises FormatError for one that is too small, and for an output that stays 0.
+    """
+    code_max = ARITHMETICS[arithmetic].code_max
+    found: list[Fraction] = []
+    refused: list[tuple[Path, str]] = []
+    for given, ends, what, key in (
+        (drive_lsb, cascade.input_range, "input_range", "drive_lsb"),
+        (output_lsb, cascade.output_range, "the output range", "output_lsb"),
+    ):
+        largest = max(abs(decimal(end)) for end in ends)
+        finest = largest / code_max
+        lsb = finest if given is None else decimal(given)
+        if lsb == 0:
+            stays = "no play moves over this range of the drive, and the output stays 0; widen the range"
+            refused.append((("input_range",), stays))
+        if lsb < finest:
+            refused.append((
+                ("emit", key),
+                f"{given:g} is too small: {what} reaches {float(largest):.6g}, which takes at least "
+                f"{_rounded_up(finest)}; raise it or leave it out",
+            ))
+        found.append(lsb)
+    if refused:
+        raise FormatError(*refused)
+    return found[0], found[1]
+
+
+def _rounded_up(x: Fraction) -> str:
+    """Six digits of a number that is positive, not less than it is."""
+    up = Context(prec=6, rounding=ROUND_CEILING)
+    return f"{float(up.divide(Decimal(x.numerator), Decimal(x.denominator))):.6g}"
+
+
+def decimal(x: float) -> Fraction:
+    """The number as it is written: 0.001 is a thousandth, which no double is."""
+    return Fraction(repr(float(x)))
+
+
+class _Builder:
+    """The steps of `build`, each with what the ones before it found."""
+
+    def __init__(
+        self, cascade: StaticModel, arithmetic: str, engine: str, drive_lsb: float | None, output_lsb: float | None
+    ) -> None:
+        self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
+        self.code_max = ARITHMETICS[arithmetic].code_max
+        self.drive_lsb, self.output_lsb = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
+        self.given = {"drive_lsb": drive_lsb is not None, "output_lsb": output_lsb is not None}
+        self.invertible = not cascade.inverse_problems()
+        self.refused: list[tuple[Path, str]] = []
+
+    def build(self) -> tuple[FixedTables, Format]:
+        self._codes()
+        self._plays()
+        self._weights()
+        return self._tables(), self._format()
+
+    # ------------------------------------------------------------ codes
+
+    def _codes(self) -> None:
+        low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
+        self.drive = (math.ceil(low), math.floor(high))
+        low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
+        # an end that double precision may have moved off a code is that code: 2^-50 is 8 roundoffs, and no more than
+        # a thousandth of a code where the rest of a sum cancels
+        size = Fraction(largest_sum(self.cascade)) + abs(Fraction(self.cascade.output_offset))
+        slack = min(size / 2**50 / self.output_lsb, Fraction(1, 1024))
+        self.output = (math.ceil(low - slack), math.floor(high + slack))
+        for (first, last), key, far in (
+            (self.drive, "drive_lsb", ("input_range",)),
+            (self.output, "output_lsb", ("model", "output_offset")),
+        ):
+            if last - first < 2:
+                left = counted(max(last - first + 1, 0), "code")
+                advice = "move it nearer to 0 or use a finer arithmetic"
+                self.refused.append(
+                    (("emit", key), f"leaves {left} in range; make it smaller")
+                    if self.given[key]
+                    else (far, f"lies so far from 0 that {self.arithmetic} has {left} for the range; {advice}")
+                )
+        if self.refused:
+            raise FormatError(*self.refused)
+
+    def _finer(self, key: str) -> str:
+        """What helps where codes are too coarse; those that nobody asked for are as fine as they can be."""
+        return f"use {f'a smaller emit.{key} or ' if self.given[key] else ''}a finer arithmetic"
+
+    # ------------------------------------------------------------ the input of the plays
+
+    def _plays(self) -> None:
+        """Least step of w, thresholds, start states and curves in it."""
+        c, pi = self.cascade, self.cascade.pi
+        # where plays can be: in the range of their input, at the start memory, or at 0 behind a reset
+        low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start), Fraction(0))
+        high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
+        span = high - low
+        reach = max(abs(low), abs(high)) + 2 * min(span, Fraction(pi.thresholds[-1]))
+        if c.stages:
+            self.fine = 0
+            self.step = Fraction(2) ** (math.ceil(math.log2(reach)) - PLAY_BITS)
+        else:
+            self.fine = 0
+            if ARITHMETICS[self.arithmetic].finer_plays:
+                self.fine = max(0, math.floor(math.log2((1 << PLAY_BITS) / (reach / self.drive_lsb))))
+            self.step = self.drive_lsb / 2**self.fine
+
+        states = [nearest(Fraction(s) / self.step) for s in pi.start]
+        if c.stages:
+            cap = math.floor(span / self.step) + 8  # what rounding of the curves can add
+        else:
+            cap = max(self.drive[1] << self.fine, *states, 0) - min(self.drive[0] << self.fine, *states, 0)
+        # no input comes farther than `cap` from a play: one this wide never moves
+        self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
+        if cap > TABLE_MAX:
+            needed = next((i for i, t in enumerate(self.threshold) if t > TABLE_MAX), None)
+            if needed is not None:
+                message = f"{pi.thresholds[needed]:g} does not fit {self.arithmetic}; use a larger emit.drive_lsb"
+                raise FormatError((("model", "pi", "thresholds", needed), message))
+        narrow = self.drive_lsb * Fraction(c.front_slopes[0]) if c.stages and self.invertible else self.drive_lsb
+        finer = self._finer("drive_lsb")
+        for i, (a, b) in enumerate(itertools.pairwise(self.threshold), 1):
+            if b < cap and (a == b or Fraction(pi.thresholds[i]) < (narrow if not c.stages else self.step)):
+                self.refused.append((
+                    ("model", "pi", "thresholds", i),
+                    f"{pi.thresholds[i]:g} is "
+                    + (f"not above thresholds[{i - 1}]" if i > 1 and a == b else "narrower than one code")
+                    + f" in {self.arithmetic} with {float(self.drive_lsb):.6g} a drive code; "
+                    f"{finer}, or leave this play out",
+                ))
+        for i in range(2, len(states)):
+            room = self.threshold[i] - self.threshold[i - 1]
+            states[i] = min(max(states[i], states[i - 1] - room), states[i - 1] + room)
+        if len(states) > 1:
+            states[0] = states[1]
+        if max(map(abs, states)) > TABLE_MAX:
+            message = (
+                f"reaches {max(map(abs, pi.start)):g}, beyond {self.arithmetic}; start nearer to the range, use a "
+                "larger emit.drive_lsb or float32"
+            )
+            raise FormatError((("model", "pi", "initial_state"), message))
+        self.start = states
+        self._curves()
+        self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # of all that plays can be
+
+    def _curves(self) -> None:
+        c = self.cascade
+        self.front: list[_Curve] = []
+        self.arguments: list[tuple[int, int]] = []
+        if not c.stages:
+            self.play = (self.drive[0] << self.fine, self.drive[1] << self.fine)
+            self.margin = 1 << self.fine
+            return
+        lsb, step = float(self.drive_lsb), float(self.step)
+        degree = ARITHMETICS[self.arithmetic].degree
+        # a curve's own error: a 64th of a code, or rounding where codes are as fine as that
+        allowed = max(0.5 * step, lsb * c.front_slopes[0] / 64)
+        breaks = _breaks(c)
+        for ascending in (True, False):
+            corners = [b / lsb for b in breaks[ascending]]
+            self.front.append(
+                _Curve(partial(_forward, c, ascending, lsb, step), self.drive, corners, degree, allowed / step)
+            )
+        ends = [(curve.at(self.drive[0]), curve.at(self.drive[1])) for curve in self.front]
+        self.play = (min(e[0] for e in ends) - 8, max(e[1] for e in ends) + 8)
+        self.margin = 8
+        for up in (True, False):
+            bottom, top = (math.floor(min(max(end / step, -FAR), FAR)) for end in _envelope_ends(c, up))
+            self.arguments.append((bottom, top))
+            if top < FAR:  # far enough for the argument to be noticed
+                self.margin = max(self.margin, min(max(top - self.play[1], self.play[0] - bottom), 1 << PLAY_BITS) + 2)
+        self.arguments *= 2
+        for forward, (low, high) in zip(self.front[:2], ends, strict=True):
+            self.margin = max(self.margin, 4 * (high - low) // max(1, self.drive[1] - self.drive[0]))
+            if not self.invertible:
+                continue
+            ascending = len(self.front) == 2
+            below = max(0, PLAY_BITS - max(map(abs, self.drive)).bit_length())
+            corners = [float(c.front(float(b), ascending)) / step for b in breaks[ascending]]
+            scale = lsb / 2**below
+            edge = (
+                max(1, abs(forward.at(self.drive[0] + 1) - low) // 2),
+                max(1, abs(high - forward.at(self.drive[1] - 1)) // 2),
+            )
+            scale = lsb / 2**below
+            back = partial(_backward, c, ascending, step, scale)
+            self.front.append(_Curve(back, (low, high), corners, degree, max(0.5, 2**below / 64), below, edge))
+
+    # ------------------------------------------------------------ weights and sums
+
+    def _weights(self) -> None:
+        """Fraction bits of a sum, rounded sums of weights, and a bound of everything that is added up."""
+        pi = self.cascade.pi
+        gain = [Fraction(p) * self.step / self.output_lsb for p in pi.weights]
+        sums = [Fraction(0), *itertools.accumulate(gain)]
+        offset = Fraction(self.cascade.output_offset) / self.output_lsb
+        largest = max(map(abs, self.hull)) + 1
+        travel = self.play[1] - self.play[0]
+        finer = self._finer("output_lsb")
+        for i, g in enumerate(gain):
+            if g > 0 and g * travel < Fraction(1, 2):
+                self.refused.append((
+                    ("model", "pi", "weights", i),
+                    f"{pi.weights[i]:g} moves the output by less than half a code of {float(self.output_lsb):.6g}; "
+                    f"{finer}, or leave the play out",
+                ))
+        if self.refused:
+            raise FormatError(*self.refused)
+        for bits in range(56, 0, -1):
+            slope = [nearest(s * 2**bits) for s in sums]
+            weight = [b - a for a, b in itertools.pairwise(slope)]
+            lift = [0, *itertools.accumulate(p * r for p, r in zip(weight, self.threshold, strict=True))]
+            span = largest + 2 * self.threshold[-1]
+            bound = slope[-1] * span + 2 * lift[-1] + abs(nearest(offset * 2**bits)) + ((self.code_max + 1) << bits)
+            if slope[-1] <= TABLE_MAX and bound < 2**SUM_BITS:
+                break
+        else:
+            message = f"the sums of the model do not fit {self.arithmetic}; use a larger one"
+            raise FormatError((("emit", "output_lsb"), message))
+        self.bits, self.slope, self.weight, self.lift, self.bound = bits, slope, weight, lift, bound
+        self.offset = nearest(offset * 2**bits)
+        if min(weight) < 0 or (self.invertible and slope[1] < 16):
+            message = f"{pi.weights[0]:g} rounds to nothing beside the others in {self.arithmetic}"
+            raise FormatError((("model", "pi", "weights", 0), message + "; use a finer arithmetic"))
+        self.slope_errors = [abs(Fraction(k, 2**bits) - s) for k, s in zip(slope, sums, strict=True)]
+        self.offset_error = abs(Fraction(self.offset, 2**bits) - offset)
+        self.reciprocal, self.shift = [0], [1]
+        for k in slope[1:]:
+            if k <= 0:
+                self.reciprocal.append(0)
+                self.shift.append(1)
+                continue
+            shift = k.bit_length() + 30
+            r = nearest(Fraction(2**shift, k))
+            if r > TABLE_MAX:
+                shift, r = shift - 1, nearest(Fraction(2 ** (shift - 1), k))
+            self.reciprocal.append(r)
+            self.shift.append(shift - 32)
+
+    # ------------------------------------------------------------ results
+
+    def _tables(self) -> FixedTables:
+        c = self.cascade
+        limits = [0] * 18
+        limits[slots.DRIVE_MIN], limits[slots.DRIVE_MAX] = self.drive
+        limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = self.output
+        limits[slots.OFFSET] = self.offset
+        far = 2 * max(map(abs, c.input_range))  # as good as any drive beyond it, and finite
+
+        def code(v: float) -> Fraction:
+            return Fraction(min(max(v, -far), far)) / self.drive_lsb
+
+        applied, ascending = first_moves(
+            c, self.drive, lambda v: (math.floor(code(v)), code(v).denominator == 1), lambda v: nearest(code(v))
+        )
+        if c.branches_differ and self.invertible:
+            limits[slots.HOLD] = math.floor(2 * (self._inverse_rounding() or 0))
+        limits[slots.REAL_MAX] = 2**SUM_BITS
+        limits[slots.PLAY_MIN], limits[slots.PLAY_MAX] = self.play
+        limits[slots.MARGIN], limits[slots.FRACTION] = self.margin, self.bits
+        limits[slots.FINE], limits[slots.CODE_MAX] = self.fine, self.code_max
+        limits[slots.SATURATED] = self._saturated()
+        # output codes of half a drive code and of what the reciprocal can be off, on the steepest piece
+        limits[slots.SHY] = (max(self.slope) * ((2**self.fine + 1) // 2 + 8) >> self.bits) + 2
+        curves = self.front
+        pieces = [piece for curve in curves for piece in curve.pieces]
+
+        levels = [t * k - q for t, k, q in zip(self.threshold, self.slope, self.lift, strict=False)]
+
+        def whole(values: Sequence[int]) -> Any:
+            return np.array(values, dtype=np.int64)
+
+        return FixedTables(
+            threshold=whole(self.threshold),
+            weight=whole(self.weight),
+            slope=whole(self.slope),
+            start_level=whole(levels),
+            way=whole([*(2 * r for r in self.threshold), 2**32 - 1]),
+            reach=whole([*(2 * z for z in levels), 2**SUM_BITS]),
+            reciprocal=whole(self.reciprocal),
+            shift=whole(self.shift),
+            start=whole(self.start if len(set(self.start)) > 1 else self.start[:1]),
+            zero=whole([0]),
+            limits=whole(limits),
+            applied=whole(applied),
+            ascending=whole(ascending),
+            knot=whole([piece.knot for piece in pieces]),
+            coefficient=np.array([piece.coefficients for piece in pieces] or np.zeros((0, 1)), dtype=np.int64),
+            scale=whole([piece.scale for piece in pieces]),
+            first=whole([0, *itertools.accumulate(len(curve.pieces) for curve in curves)][: len(curves)]),
+            pieces=whole([len(curve.pieces) for curve in curves]),
+            domain=np.array([curve.domain for curve in curves], dtype=np.int64).reshape(-1, 2),
+            edge=np.array([curve.edge for curve in curves], dtype=np.int64).reshape(-1, 2),
+            argument=np.array(self.arguments or np.zeros((0, 2)), dtype=np.int64),
+            below=whole([curve.below for curve in curves]),
+            engine=slots.CORNERS if self.engine == "corners" else slots.LOOP,
+            branches=int(c.branches_differ),
+            fronts=int(bool(c.stages)),
+        )
+
+    def _saturated(self) -> int:
+        """Size of an output code beyond which limiting it to the type is reported.
+
+        Outputs after `init` fit the type but for rounding; those after `reset` may not.
+        """
+        largest = max(abs(Fraction(y)) for y in self.cascade.reset_range) / self.output_lsb
+        reported: int = self.code_max if largest > self.code_max + Fraction(1, 2) else 2**SUM_BITS
+        return reported
+
+    def _play_errors(self) -> list[Fraction]:
+        """How far each play can be from that of the exact model, in physical units of w."""
+        pi = self.cascade.pi
+        front = self.step * Fraction(max((curve.error for curve in self.front[:2]), default=0.0))
+        errors = []
+        for i, (r, t) in enumerate(zip(pi.thresholds, self.threshold, strict=True)):
+            rounded = abs(t * self.step - Fraction(r)) if t * self.step < Fraction(r) + self.step else Fraction(0)
+            if t == self.threshold[-1] and t * self.step < Fraction(r) - self.step:
+                rounded = Fraction(0)  # a play that never moves, whatever its threshold
+            begun = abs(self.start[i] * self.step - Fraction(pi.start[i])) if i else Fraction(0)
+            errors.append(max(front + rounded, begun))
+        return errors
+
+    def _sum_error(self) -> Fraction:
+        """How far a sum can be from the exact model's output, in output codes, before it is rounded."""
+        pi = self.cascade.pi
+        plays = sum(Fraction(p) * e for p, e in zip(pi.weights, self._play_errors(), strict=True)) / self.output_lsb
+        travel = self.hull[1] - self.hull[0]
+        weights = self.slope_errors[-1] * max(map(abs, self.hull))
+        for k, (a, b) in enumerate(itertools.pairwise(self.threshold), 1):
+            weights += self.slope_errors[k] * min(b - a, travel)
+        return plays + weights + self.offset_error
+
+    def _own_error(self) -> tuple[Fraction, Fraction]:
+        """Rounding of the double model itself, each on one branch: forward in output, inverse in drive units."""
+        own = error_bounds(self.cascade, "float64", "corners")
+        return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
+
+    def _drive_short(self) -> Fraction:
+        """How far the first and last drive codes can be inside the ends of the range, in drive units."""
+        (first, last), (low, high) = self.drive, self.cascade.input_range
+        return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
+
+    def _forward_error(self) -> float:
+        # a code beyond the range is limited to the last code inside, where the exact model goes to the range's end
+        limited = Fraction(self.cascade.pi.slopes[-1]) * Fraction(self.cascade.front_slopes[1]) * self._drive_short()
+        return _upward(
+            self._sum_error() + Fraction(1, 2) + (limited + self._own_error()[0]) / self.output_lsb
+        )
+
+    def _inverse_rounding(self) -> float | None:
+        if not self.invertible:
+            return None
+        c, pi = self.cascade, self.cascade.pi
+        steepest, flattest = Fraction(c.front_slopes[1]), Fraction(c.front_slopes[0])
+        travel = self.hull[1] - self.hull[0]
+        # rounding of the solution: its input of the plays, then the drive code
+        solved = self.step * (Fraction(1, 2) + Fraction(travel, 2**31) + Fraction(1, 2**8))
+        code = Fraction(1, 2)
+        if c.stages:
+            code += Fraction(max(curve.error / 2**curve.below for curve in self.front[2:]))
+        elif self.fine == 0:
+            code = Fraction(0)
+        outer = Fraction(pi.slopes[-1])
+        output_short = max(
+            Fraction(c.output_range[1]) - self.output[1] * self.output_lsb,
+            self.output[0] * self.output_lsb - Fraction(c.output_range[0]),
+            Fraction(0),
+        )
+        residual = (
+            self._sum_error() * self.output_lsb
+            + outer * (solved + steepest * (code * self.drive_lsb + self._drive_short()))
+            + output_short
+        )
+        gain = (2 / Fraction(pi.weights[0]) - 1 / outer) / flattest
+        whole = Fraction(self.drive[1] - self.drive[0])
+        return _upward(min((gain * residual + self._own_error()[1]) / self.drive_lsb, whole))
+
+    def _inverse_error(self) -> float | None:
+        """With what another branch makes, as in `hystgen.compensator.bounds`."""
+        rounding = self._inverse_rounding()
+        if rounding is None or not self.cascade.branches_differ:
+            return rounding
+        pi, gap, flattest = self.cascade.pi, self.cascade.branch_gap, self.cascade.front_slopes[0]
+        gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / flattest
+        other = (gain * pi.slopes[-1] * gap + gap / flattest) / float(self.drive_lsb)
+        return min(rounding + math.nextafter(1.001 * other, math.inf), float(self.drive[1] - self.drive[0]))
+
+    def _format(self) -> Format:
+        return Format(
+            self.drive_lsb,
+            self.output_lsb,
+            self._forward_error(),
+            self._inverse_error(),
+            self._inverse_rounding(),
+            self.bound,
+            self.bits,
+        )
+
+
+def _forward(cascade: StaticModel, ascending: bool, lsb: float, step: float, code: float) -> float:
+    return float(cascade.front(code * lsb, ascending)) / step
+
+
+def _backward(cascade: StaticModel, ascending: bool, step: float, scale: float, w: float) -> float:
+    return float(cascade.front_inverse(w * step, ascending)) / scale
+
+
+def _upward(x: Fraction) -> float:
+    return math.nextafter(float(x) * 1.001, math.inf)
+
+
+def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
+    """Drives at which the memoryless part has a kink, on each branch. Raises FormatError for too many."""
+    found: dict[bool, list[float]] = {}
+    for ascending in (True, False):
+        if not ascending and not cascade.branches_differ:
+            found[ascending] = found[True]
+            continue
+        inside = [
+            (j, b)
+            for j, (stage, (low, high)) in enumerate(
+                zip(cascade.stages, cascade.stage_ranges(ascending), strict=True)
+            )
+            if isinstance(stage, DeadZone)
+            for b in stage.breaks
+            if low < b < high
+        ]
+        if len(inside) > MOST_PIECES:
+            what = f"bends at {len(inside)} places inside input_range, and fixed point takes {MOST_PIECES}"
+            raise FormatError((("model", "memoryless"), f"{what}; thin out the thresholds or use float32"))
+        found[ascending] = sorted(_drive_at(cascade, j, b, ascending) for j, b in inside)
+    return found
+
+
+def _envelope_ends(cascade: StaticModel, ascending: bool) -> tuple[float, float]:
+    """What w comes to where the last envelope saturates; infinite without one."""
+    last = max((j for j, stage in enumerate(cascade.stages) if isinstance(stage, TanhEnvelope)), default=None)
+    if last is None:
+        return -math.inf, math.inf
+    envelope = cascade.stages[last]
+    assert isinstance(envelope, TanhEnvelope)
+    a0, _, _, a3 = envelope.branch(ascending)
+    ends = []
+    for x in (a3 - abs(a0), a3 + abs(a0)):
+        for stage in cascade.stages[last + 1 :]:
+            x = float(stage.forward(x, ascending))
+        ends.append(x)
+    return ends[0], ends[1]
+
+
+def _drive_at(cascade: StaticModel, j: int, value: float, ascending: bool) -> float:
+    """Drive at which the input of stage j has the value; every stage before it rises or the model is refused."""
+    low, high = cascade.input_range
+    for _ in range(200):
+        middle = (low + high) / 2
+        if middle in (low, high):  # no double lies between them
+            break
+        x = middle
+        for stage in cascade.stages[:j]:
+            x = float(stage.forward(x, ascending))
+        if x < value:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2
+
+
+@dataclass(frozen=True)
+class _Piece:
+    knot: int
+    scale: int
+    coefficients: tuple[int, ...]
+
+
+class _Curve:
+    """A function on whole numbers as pieces of polynomials; `error`: how far its values can be from the function's.
+
+    Interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
+    `corners` are places of kinks, `below` the least steps of a value per code as a power of 2, `edge` how far beyond
+    the domain an argument is no more than rounding.
+    """
+
+    def __init__(
+        self,
+        function: Callable[[float], float],
+        domain: tuple[int, int],
+        corners: Sequence[float],
+        degree: int,
+        allowed: float,
+        below: int = 0,
+        edge: tuple[int, int] = (0, 0),
+    ) -> None:
+        self.function, self.domain, self.below, self.edge, self.degree = function, domain, below, edge, degree
+        self.pieces: list[_Piece] = []
+        self.fit_error = 0.0
+        low, high = domain
+        knots = {low, high + 1}
+        for corner in corners:
+            knots.update(k for k in (math.floor(corner), math.floor(corner) + 1) if low < k <= high)
+        knots.update(range(low, high + 1, max(1, (high + 1 - low + 3) // 4)))  # no coefficient wider than a value
+        todo = list(itertools.pairwise(sorted(knots)))[::-1]
+        while todo:
+            a, b = todo.pop()
+            piece, miss = self._fit(a, b)
+            if b - a > 1 and (miss > allowed or max(map(abs, piece.coefficients)) > TABLE_MAX):
+                if len(self.pieces) + len(todo) > MOST_PIECES:
+                    message = "bends too sharply for fixed point over input_range; narrow the range or use float32"
+                    raise FormatError((("model", "memoryless"), message))
+                middle = (a + b) // 2
+                todo += [(middle, b), (a, middle)]
+                continue
+            self.fit_error = max(self.fit_error, miss)
+            self.pieces.append(piece)
+        # each coefficient and each product is rounded; a quarter for what lies between the samples
+        self.error = 1.25 * self.fit_error + degree + 0.5
+
+    def _fit(self, a: int, b: int) -> tuple[_Piece, float]:
+        if b - a == 1:
+            first = round(self.function(float(a)))
+            kept = _kept(first)
+            return _Piece(a, 30, (kept, *(0,) * self.degree)), float(abs(first - kept))
+        scale = 31 - (b - a).bit_length()
+        whole = float(2 ** (31 - scale))
+        length = (b - 1 - a) / whole  # the last argument, in the variable of the polynomial
+        nodes = [length * (0.5 - 0.5 * x) for x in _NODES[self.degree]]
+        c = _monomials(nodes, [self.function(a + h * whole) for h in nodes])
+        miss = 0.0
+        for i in range(SAMPLES):
+            h = length * i / (SAMPLES - 1)
+            value = 0.0
+            for coefficient in reversed(c):
+                value = coefficient + h * value
+            miss = max(miss, abs(self.function(a + h * whole) - value))
+        first, *others = map(round, c)
+        kept = _kept(first)
+        return _Piece(a, scale, (kept, *others)), miss + abs(first - kept)
+
+    def at(self, x: int) -> int:
+        """Value at x, as the kernel computes it."""
+        piece = next(piece for piece in reversed(self.pieces) if piece.knot <= x)
+        h = (x - piece.knot) << piece.scale
+        y = 0
+        for c in reversed(piece.coefficients):
+            y = c + ((y * h + HALF) >> 31)
+        return y
+
+
+def _kept(value: int) -> int:
+    """The nearest number of the tables' type: rounding at an end of the drive's range can pass its last code."""
+    return min(max(value, -TABLE_MAX), TABLE_MAX)
+
+
+SAMPLES = 25  # of the error of a piece, both ends among them
+_NODES = {  # cos of the odd multiples of pi / (2 degree + 2), written out: libraries differ in the last bit
+    3: (0.9238795325112867, 0.3826834323650898, -0.3826834323650898, -0.9238795325112867),
+    5: (0.9659258262890683, 0.7071067811865476, 0.25881904510252074,
+        -0.25881904510252074, -0.7071067811865476, -0.9659258262890683),
+}  # fmt: skip
+
+
+def _monomials(x: Sequence[float], y: Sequence[float]) -> list[float]:
+    """Coefficients from degree 0 of the polynomial through the points, by divided differences."""
+    n = len(x)
+    d = list(y)
+    for j in range(1, n):
+        for i in range(n - 1, j - 1, -1):
+            d[i] = (d[i] - d[i - 1]) / (x[i] - x[i - j])
+    c = [d[-1]] + [0.0] * (n - 1)
+    for i in range(n - 2, -1, -1):
+        c = [d[i] - x[i] * c[0], *(c[k - 1] - x[i] * c[k] for k in range(1, n))]
+    return c

@@ -1,0 +1,117 @@
+"""The constants of one model in one arithmetic, as the bit reference and the C text take them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from hystgen.chain.static import StaticModel
+from hystgen.front.tanh.kernels import AtanhTables, TanhTables
+from hystgen.plays.corners.memory import Curve, Start
+from hystgen.plays.slots import Counts, Reals
+
+
+class Tables(NamedTuple):
+    """The constants of one model in one arithmetic; arrays of the real type unless said otherwise."""
+
+    threshold: Reals  # n + 1
+    weight: Reals  # n + 1
+    slope: Reals  # n + 2
+    lift: Reals  # n + 2
+    start_level: Reals  # n + 1
+    inverse_slope: Reals  # n + 2
+    start: Reals  # n + 1 plays, or 1 where all start at the same value
+    limits: Reals  # DRIVE_MIN .. ZERO
+    applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
+    ascending: Counts  # direction before the first move, likewise
+    stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
+    stage_first: Counts  # where the stage's numbers begin in stage_data
+    stage_size: Counts  # break points of a dead zone
+    stage_data: Reals
+    forward: Curve  # of the corner engine, as what follows
+    inverse: Curve
+    forward_first: Start
+    forward_zero: Start
+    inverse_first: Start
+    inverse_zero: Start
+    begin: Reals  # input of the plays before the first move, as `applied`
+    engine: int
+    branches: int  # 1 where an ascending and a descending branch differ
+    tanh: TanhTables
+    atanh: AtanhTables
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is fixed point."""
+        return False
+
+    @property
+    def has_front(self) -> bool:
+        """Whether there is a memoryless part."""
+        return len(self.stage_kind) > 0
+
+
+class FixedTables(NamedTuple):
+    """The constants of one model in fixed point; arrays of int64, however narrow they are in C."""
+
+    threshold: Reals
+    weight: Reals
+    slope: Reals  # of sums per least step of the plays' input
+    start_level: Reals
+    way: Reals  # 2 threshold: input gained behind a corner by the time play k begins to follow; one never does
+    reach: Reals  # 2 start_level: the output likewise
+    reciprocal: Reals  # 2^(32 + shift) / slope
+    shift: Reals
+    start: Reals
+    zero: Reals  # all plays 0
+    limits: Reals
+    applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
+    ascending: Reals  # direction before the first move, likewise
+    knot: Reals  # where the pieces of the curves begin, curve after curve
+    coefficient: Reals  # (pieces, degree + 1)
+    scale: Reals  # left shift that stretches a piece to 2^31
+    first: Reals  # first piece of each curve
+    pieces: Reals
+    domain: Reals  # (4, 2): first and last argument of a curve
+    edge: Reals  # (4, 2): how far beyond them an argument is still no more than rounding
+    argument: Reals  # (4, 2): least and greatest argument that the envelopes themselves can take
+    below: Reals  # (4,): least steps of a curve's value per code, as a power of 2
+    engine: int
+    branches: int
+    fronts: int
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is fixed point."""
+        return True
+
+    @property
+    def has_front(self) -> bool:
+        """Whether there is a memoryless part."""
+        return self.fronts > 0
+
+
+def first_moves(
+    cascade: StaticModel,
+    limits: tuple[Any, Any],
+    not_above: Callable[[float], tuple[Any, bool]],
+    nearest: Callable[[float], Any],
+) -> tuple[list[Any], list[int]]:
+    """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.
+
+    `not_above` gives the largest number of the type that is not above a drive, and whether it is that drive. The
+    forward operator has to know which way the actuator moves from the drive that the start memory stands for, also
+    where that is no number of the type or lies beyond the limits: seen from the number below it, every move has its
+    true direction if no move counts as descending. The inverse starts at the nearest number, where it may stay.
+    """
+    low, high = limits
+    applied, ascending = [0, 0, 0, 0], [1, 1, 1, 1]
+    if cascade.start_is_defined:
+        for j, w in enumerate((float(cascade.pi.start[0]), 0.0)):
+            v = float(cascade.front_inverse(w))
+            number, same = not_above(v)
+            ascending[j] = int(number < low or (same and number <= high))
+            applied[j] = min(max(number, low), high)
+            ascending[2 + j] = int(nearest(v) <= high)
+            applied[2 + j] = min(max(nearest(v), low), high)
+    return applied, ascending

@@ -1,0 +1,66 @@
+"""The bit reference: the emitted C, operation for operation, of the functions for the tables it is given."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics import jit
+from hystgen.compensator import step, step_fixed, step_float
+from hystgen.compensator.corners import (
+    forward,
+    forward_fixed,
+    forward_front,
+    inverse,
+    inverse_fixed,
+    inverse_front,
+    inverse_front_fixed,
+    run,
+)
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.compensator.step import Operations
+from hystgen.front import compensator, curve
+from hystgen.plays import loop
+from hystgen.plays.corners.memory import new_fixed_memory, new_memory
+from hystgen.plays.slots import LOOP
+
+
+def operations(t: Tables | FixedTables) -> Operations:
+    """What the bit reference is made of for the arithmetic and the engine of these tables."""
+    return _operations(t.engine == LOOP, t.fixed, t.has_front)
+
+
+@functools.cache
+def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
+    ends = (curve if fixed else compensator).front_forward, (curve if fixed else compensator).front_inverse
+    if loops:
+        own = step_fixed if fixed else step_float
+        return step.of(*ends, own.output, own.solve, own.finite)
+    if fixed:
+        return run.of(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
+    return run.of(forward_front, inverse_front, *ends) if front else run.of(forward, inverse, *ends)
+
+
+def new_state(t: Tables | FixedTables) -> Any:
+    """Memory for one instance; `init` of its operations gives it its values."""
+    if t.engine == LOOP:
+        return loop.new_state(t)
+    memory = new_fixed_memory if t.fixed else new_memory
+    return memory(len(t.threshold) - 1, t.threshold.dtype)
+
+
+def answers(
+    t: Tables | FixedTables, inverse: bool, call: Any, x: Any, compiled: bool = True
+) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+    """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
+    code, state = operations(t), new_state(t)
+    x = np.asarray(x).astype(t.threshold.dtype)
+    found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
+    with contextlib.nullcontext() if compiled else jit.plain():
+        code.init(t, state, int(inverse))
+        code.run(t, state, int(inverse), np.asarray(call, dtype=np.uint8), x, found, status)
+    return found, status

@@ -1,0 +1,256 @@
+"""One step of engine loop, and the operations around it: commit, reset, init.
+
+Every function has its counterpart in `c_runtime/` or in the step template, mostly of the same name. Engine corners has
+its own in `hystgen.compensator.corners`, and shares the memoryless part and the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.plays.loop import (
+    ANSWER,
+    APPLIED,
+    ASCENDING,
+    BITS,
+    HAS_PENDING,
+    LEVEL,
+    PENDING,
+    REFERENCE,
+    REPEAT,
+    STATUS,
+    STEPPED,
+    State,
+    loop_absorb,
+    loop_rest,
+    loop_start,
+)
+from hystgen.plays.slots import (
+    DOMAIN,
+    DRIVE_MAX,
+    DRIVE_MIN,
+    HELD,
+    HOLD,
+    INPUT_CLAMPED,
+    OP_COMMIT,
+    OP_INIT,
+    OP_RESET,
+    OP_STEP,
+    OUTPUT_CLAMPED,
+    OUTPUT_MAX,
+    OUTPUT_MIN,
+    ZERO,
+    Bytes,
+    Reals,
+)
+
+
+class Operations(NamedTuple):
+    """What is done to an instance: `init`, `visit` and `run` as `of` has them, a step of each operator, the front."""
+
+    init: Callable[..., Any]
+    visit: Callable[..., Any]
+    run: Callable[..., Any]
+    forward_step: Callable[..., Any]
+    inverse_step: Callable[..., Any]
+    front_forward: Callable[..., Any]
+    front_inverse: Callable[..., Any]
+
+
+@jit(inline=True)
+def answer(s: State, v: Any) -> Any:
+    """Leave drive v pending and return it."""
+    s.real[ANSWER] = v
+    s.real[PENDING] = v
+    s.counts[HAS_PENDING] = 1
+    s.counts[STEPPED] = 1
+    return v
+
+
+
+@jit(inline=True)
+def clamp_drive(t: Tables | FixedTables, v: Any) -> Any:
+    """v inside the input range."""
+    if v < t.limits[DRIVE_MIN]:
+        return t.limits[DRIVE_MIN]
+    if v > t.limits[DRIVE_MAX]:
+        return t.limits[DRIVE_MAX]
+    return v
+
+
+
+@jit
+def fits(s: State, v: Any, ascending: int) -> bool:
+    """Whether going to v is a move of the branch that v was computed on."""
+    if v == s.real[APPLIED]:
+        return bool(s.counts[ASCENDING] == ascending)
+    return bool((v > s.real[APPLIED]) == (ascending != 0))
+
+
+def of(
+    front_forward: Callable[..., Any],
+    front_inverse: Callable[..., Any],
+    output: Callable[..., Any],
+    solve: Callable[..., Any],
+    finite: Callable[..., Any],
+) -> Operations:
+    """The operations with the parts in which arithmetics differ: the memoryless part, the output for the memory as it
+    is, the input of the plays that gives an output, and whether an argument is a number."""
+
+    @jit
+    def begin(t: Tables | FixedTables, s: State, which: int) -> None:
+        """What init and reset have in common once the plays are set; `which` as in `Tables.applied`."""
+        applied = t.applied[which]
+        s.counts[ASCENDING] = t.ascending[which]
+        s.counts[HAS_PENDING] = 0
+        s.counts[REPEAT] = 0
+        s.counts[STEPPED] = 0
+        s.counts[BITS] = 0
+        s.real[PENDING] = applied
+        s.real[APPLIED] = applied
+        s.real[LEVEL] = output(t, s)
+        s.counts[STATUS] = 0
+        s.real[REFERENCE] = s.real[LEVEL]
+        s.real[ANSWER] = s.real[LEVEL]
+
+    @jit
+    def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
+        """Start memory of the parameter file."""
+        if len(t.start) == 1:
+            loop_rest(s, t.start[0])
+        else:
+            loop_start(s, t.start)
+        begin(t, s, 2 * inverse)
+
+    @jit
+    def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
+        """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
+        loop_rest(s, t.limits[ZERO])
+        begin(t, s, 2 * inverse + 1)
+
+    @jit(inline=True)
+    def see_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
+        """The actuator sees drive v: its own move picks the branch."""
+        if t.branches:
+            if v > s.real[APPLIED]:
+                s.counts[ASCENDING] = 1
+            elif v < s.real[APPLIED]:
+                s.counts[ASCENDING] = 0
+        s.real[APPLIED] = v
+        loop_absorb(t, s, front_forward(t, v, s.counts[ASCENDING]))
+
+    @jit
+    def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
+        """Let the actuator be at drive v before the next sample."""
+        see_drive(t, s, v)
+        s.real[LEVEL] = output(t, s)
+
+    @jit(inline=True)
+    def forward_step(t: Tables | FixedTables, s: State, v: Any) -> Any:
+        """One sample of the forward operator."""
+        if not finite(t, v):
+            s.counts[STATUS] |= HELD
+            return s.real[ANSWER]
+        if v < t.limits[DRIVE_MIN]:
+            v = t.limits[DRIVE_MIN]
+            s.counts[STATUS] |= INPUT_CLAMPED
+        elif v > t.limits[DRIVE_MAX]:
+            v = t.limits[DRIVE_MAX]
+            s.counts[STATUS] |= INPUT_CLAMPED
+        see_drive(t, s, v)
+        s.real[ANSWER] = output(t, s)
+        return s.real[ANSWER]
+
+    @jit
+    def choose_branch(t: Tables | FixedTables, s: State, u: Any, w: Any) -> tuple[Any, int]:
+        """The drive on the branch of its own move: that of u's move first, the other one next, else no move."""
+        up = s.counts[ASCENDING]
+        if u > s.real[LEVEL]:
+            up = 1
+        elif u < s.real[LEVEL]:
+            up = 0
+        v, limited = front_inverse(t, w, up)
+        if fits(s, clamp_drive(t, v), up):
+            return v, limited
+        back = clamp_drive(t, v) - s.real[APPLIED]
+        if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+            return s.real[APPLIED], limited
+        v, limited = front_inverse(t, w, 1 - up)
+        if fits(s, clamp_drive(t, v), 1 - up):
+            return v, limited
+        return s.real[APPLIED], limited
+
+    @jit
+    def inverse_step(t: Tables | FixedTables, s: State, u: Any) -> Any:
+        """One sample of the inverse operator."""
+        if s.counts[HAS_PENDING]:
+            see_drive(t, s, s.real[PENDING])
+            s.counts[HAS_PENDING] = 0
+        if not finite(t, u):
+            s.counts[STATUS] |= HELD
+            return answer(s, s.real[ANSWER] if s.counts[STEPPED] else s.real[APPLIED])
+        if s.counts[REPEAT] and u == s.real[REFERENCE]:
+            s.counts[STATUS] |= s.counts[BITS]
+            return answer(s, s.real[ANSWER])
+        bits = 0
+        s.real[REFERENCE] = u
+        s.counts[REPEAT] = 1
+        if u < t.limits[OUTPUT_MIN]:
+            u = t.limits[OUTPUT_MIN]
+            bits = bits | INPUT_CLAMPED
+        elif u > t.limits[OUTPUT_MAX]:
+            u = t.limits[OUTPUT_MAX]
+            bits = bits | INPUT_CLAMPED
+        w = solve(t, s, u)
+        if t.branches:
+            v, limited = choose_branch(t, s, u, w)
+        else:
+            v, limited = front_inverse(t, w, 1)
+        s.real[LEVEL] = u
+        if limited:
+            bits = bits | DOMAIN
+        inside = clamp_drive(t, v)
+        if inside != v:
+            bits = bits | OUTPUT_CLAMPED
+        s.counts[BITS] = bits
+        s.counts[STATUS] |= bits
+        return answer(s, inside)
+
+    @jit
+    def inverse_commit(t: Tables | FixedTables, s: State, applied: Any) -> None:
+        """What the drive really applied in place of the last answer."""
+        if not finite(t, applied):
+            s.counts[STATUS] |= HELD
+            return
+        v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
+        if v != applied:
+            s.counts[STATUS] |= INPUT_CLAMPED
+        s.real[PENDING] = v
+        s.counts[HAS_PENDING] = 1
+        s.counts[REPEAT] = 0
+
+    @jit
+    def run(
+        t: Tables | FixedTables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes
+    ) -> None:
+        """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
+        for i in range(len(op)):
+            if op[i] == OP_INIT:
+                init(t, s, inverse)
+            elif op[i] == OP_COMMIT:
+                inverse_commit(t, s, x[i])
+            else:
+                if op[i] == OP_RESET:
+                    reset(t, s, inverse)
+                if inverse:
+                    inverse_step(t, s, x[i])
+                else:
+                    forward_step(t, s, x[i])
+            answers[i] = s.real[ANSWER] if op[i] == OP_STEP else t.limits[ZERO]
+            status[i] = s.counts[STATUS]
+            s.counts[STATUS] = 0
+
+    return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)

@@ -1,0 +1,36 @@
+"""What a step of engine loop does otherwise in fixed point: limiting the output code, solving for one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.layout import FixedTables
+from hystgen.plays.fixed import loop_solve, nearest
+from hystgen.plays.loop import STATUS, State, loop_output
+from hystgen.plays.slots import CODE_MAX, FRACTION, OFFSET, OUTPUT_CLAMPED, SATURATED
+
+
+@jit
+def output(t: FixedTables, s: State) -> Any:
+    """Output code for the memory as it is, limited to the type."""
+    code = nearest(loop_output(t, s) + t.limits[OFFSET], t.limits[FRACTION])
+    if code > t.limits[SATURATED] or code < -t.limits[SATURATED]:
+        s.counts[STATUS] |= OUTPUT_CLAMPED
+    if code > t.limits[CODE_MAX]:
+        return t.limits[CODE_MAX]
+    if code < -t.limits[CODE_MAX]:
+        return -t.limits[CODE_MAX]
+    return code
+
+
+@jit
+def solve(t: FixedTables, s: State, u: Any) -> Any:
+    """Input of the plays that gives output code u."""
+    return loop_solve(t, s, (u << t.limits[FRACTION]) - t.limits[OFFSET])
+
+
+@jit
+def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
+    """Whole numbers are."""
+    return True

@@ -1,0 +1,30 @@
+"""What a step of engine loop does in floating point where fixed point differs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.layout import Tables
+from hystgen.plays.loop import State, loop_output, loop_solve
+from hystgen.plays.slots import OFFSET, REAL_MAX
+
+
+@jit(inline=True)
+def output(t: Tables, s: State) -> Any:
+    """Output for the memory as it is, offset included."""
+    return loop_output(t, s) + t.limits[OFFSET]
+
+
+
+@jit(inline=True)
+def solve(t: Tables, s: State, u: Any) -> Any:
+    """Input of the plays that gives u, offset included."""
+    return loop_solve(t, s, u - t.limits[OFFSET])
+
+
+
+@jit(inline=True)
+def finite(t: Tables, x: Any) -> bool:
+    """Neither NaN nor infinite."""
+    return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])

@@ -1,0 +1,1 @@
+"""Gain that falls with the distance travelled."""

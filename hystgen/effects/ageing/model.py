@@ -1,0 +1,136 @@
+"""Gain that falls with the distance travelled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import Number, Positive
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many
+
+EXPONENTIAL = "ageing, exponential"
+
+LEAST, MOST, APART = -3.0, 1.0, 0.6
+"""Decimal logarithms of travels in the recorded one: bounds, and half of how far apart two begin."""
+
+
+class _Ageing(Effect):
+    name: Literal["ageing"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.GAIN
+    compensated: ClassVar[Compensated] = "needs a sensor"
+    compensation: ClassVar[str] = "a gain input to `step`"
+    timed: ClassVar[bool] = False
+
+    @classmethod
+    def _candidate(cls, label: str, about: About) -> Candidate:
+        total = max(about.travel, 1e-12)
+
+        def build(x: Array) -> Effect:
+            shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
+            return cls(  # type: ignore[call-arg]
+                name="ageing", shape=shape, loss=0.1 * float(x[0]), travel=total * float(10.0 ** x[1])
+            )
+
+        start = np.array([0.1, -0.7])
+        none, others = np.array([0.0, -0.7]), (np.array([0.1, -2.0]), np.array([0.1, 0.5]))
+        return Candidate(label, np.array([-5.0, LEAST]), np.array([5.0, MOST]), start, build, none, others)
+
+
+class LogarithmicAgeing(_Ageing):
+    """Gain `1 - loss log10(1 + D/travel)`, D the distance travelled since the start of the session.
+
+    The logarithmic law of depolarisation, which data sheets quote a decade, over travel in place of time.
+    """
+
+    shape: Literal["logarithmic"] = Field(default="logarithmic", description="loss a decade of travel")
+    loss: Number = Field(description="share lost a decade of travel", examples=[0.01])
+    travel: Positive = Field(description="travel from which decades count, input units", examples=[1.0e4])
+
+    def gain(self, run: Run) -> Array:
+        """The falling gain."""
+        return np.asarray(1.0 - self.loss * run.remembered(("decades", self.travel), lambda: self._decades(run)))
+
+    def _decades(self, run: Run) -> Array:
+        """Decades of travel; a search changes the loss more often than the travel."""
+        with np.errstate(over="ignore"):
+            return np.asarray(np.log10(1.0 + np.minimum(run.travelled / self.travel, 1e300)))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Loss and travel, the travel from a thousandth of the recorded one to ten."""
+        return [cls._candidate("ageing, logarithmic", about)]
+
+
+class ExponentialAgeing(_Ageing):
+    """Gain `1 - loss (1 - exp(-D/travel))`, D the distance travelled since the start of the session."""
+
+    shape: Literal["exponential"] = Field(description="loss that comes to an end")
+    loss: Number = Field(description="share lost in the end", examples=[0.05])
+    travel: Positive = Field(description="travel after which 63 % is lost, input units", examples=[1.0e4])
+
+    def gain(self, run: Run) -> Array:
+        """The falling gain."""
+        return np.asarray(1.0 + self.loss * _worn(run, self.travel))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Loss and travel, the travel from a thousandth of the recorded one to ten."""
+        return [cls._candidate(EXPONENTIAL, about)]
+
+
+class SeveralAgeing(_Ageing):
+    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at several distances, wear of different speeds.
+
+    Two of them follow laws between the exponential and the logarithmic one, which spread over decades of travel.
+    """
+
+    shape: Literal["exponentials"] = Field(description="losses that come to an end at several distances")
+    losses: Annotated[tuple[Number, ...], Field(min_length=1, max_length=16)] = Field(
+        description="shares lost in the end", examples=[[0.02, 0.03]]
+    )
+    travels: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=16)] = Field(
+        description="travels after which 63 % of each is lost, input units", examples=[[1.0e3, 1.0e4]]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """One loss a travel."""
+        yield from not_as_many("losses", self.losses, "travels", self.travels)
+
+    def gain(self, run: Run) -> Array:
+        """The falling gain."""
+        total = np.ones(len(run.t))
+        for loss, travel in zip(self.losses, self.travels, strict=True):
+            total += loss * _worn(run, travel)
+        return total
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Two losses and travels, where one exponential takes something away."""
+        total = max(about.travel, 1e-12)
+
+        def build(x: Array) -> SeveralAgeing:
+            return cls(
+                name="ageing", shape="exponentials", losses=tuple((0.1 * x[:2]).tolist()),
+                travels=tuple((total * 10.0 ** x[2:]).tolist()),
+            )  # fmt: skip
+
+        def grown(one: Array) -> Array:
+            loss, travel = one
+            return np.array([0.5 * loss, 0.5 * loss, max(travel - APART, LEAST), min(travel + APART, MOST)])
+
+        low, high = np.array([-5.0, -5.0, LEAST, LEAST]), np.array([5.0, 5.0, MOST, MOST])
+        start = np.array([0.1, 0.1, -2.0, 0.0])
+        none = np.array([0.0, 0.0, -2.0, 0.0])
+        return [Candidate("ageing, two exponentials", low, high, start, build, none, (), EXPONENTIAL, grown)]
+
+
+def _worn(run: Run, travel: float) -> Array:
+    """`exp(-D/travel) - 1`; a search changes the loss more often than the travel."""
+    return run.remembered(("worn", travel), lambda: np.asarray(np.expm1(-run.travelled / travel)))
+
+
+SHAPES = (LogarithmicAgeing, ExponentialAgeing, SeveralAgeing)

@@ -1,0 +1,193 @@
+"""Creep: slow motion after a move, of the play sum as a whole."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import NotNegative, Positive
+from hystgen.basics.words import counted
+from hystgen.effects import recursions
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
+
+FASTEST = 0.01
+"""s; what follows a move faster than this is a lag or friction of the domain walls, and has other names."""
+
+MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.1
+"""Largest shares that are tried: stages creep by 1 to 2 % a decade, and up to three times as much."""
+
+LOGARITHMIC = "creep, logarithmic"
+
+PER_DECADE = 2
+"""States a decade of a logarithmic spectrum; their ripple on the straight line over log t is 0.1 % of its slope."""
+
+
+def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
+    """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
+    rows = np.ascontiguousarray(np.atleast_2d(h).T)
+    total, states = np.zeros_like(rows), np.repeat(rows[:1], len(weights), axis=0)
+    decay, early, late = run.spectrum(tuple(time_constants.tolist()))
+    recursions.creep(rows, run.different[1], decay, early, late, weights, states, total)
+    return total.T.reshape(np.shape(h))
+
+
+def _fading(run: Run, time_constants: Array) -> Array:
+    since = run.t - run.t[0]
+    return np.asarray(np.exp(-since[None, :] / np.asarray(time_constants)[:, None]))
+
+
+class _Creep(Effect):
+    name: Literal["creep"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.LINEAR
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "exact and causal: the plays are solved for with the states known"
+
+
+class ExponentialCreep(_Creep):
+    """Creep in parallel to the plays: `y = h + sum c_i x_i`, `tau_i x_i' = h - x_i`.
+
+    Springs and dampers in series behind the play sum `h` (Croft, Shed, Devasia: Creep, hysteresis, and vibration
+    compensation for piezoactuators, J. Dyn. Sys., Meas., Control 123, 2001). A record starts settled: `x_i = h`.
+    """
+
+    shape: Literal["exponential"] = Field(default="exponential", description="a few states of their own")
+    time_constants: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=64)] = Field(
+        description="tau_i, s", examples=[[0.1, 1.0]]
+    )
+    weights: Annotated[tuple[NotNegative, ...], Field(min_length=1, max_length=64)] = Field(
+        description="c_i, as many as time_constants, shares of the play sum", examples=[[0.02, 0.01]]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """One weight a time constant."""
+        yield from not_as_many("weights", self.weights, "time_constants", self.time_constants)
+
+    def filtered(self, h: Array, run: Run) -> Array:
+        """The play sum with its creep."""
+        return h + _states(h, run, np.array(self.time_constants), np.array(self.weights))
+
+    def transients(self, run: Run) -> Array:
+        """`exp(-t/tau_i)`."""
+        return _fading(run, np.array(self.time_constants))
+
+    def largest(self, run: Run) -> Array:
+        """A state lags behind the play sum by its span at most."""
+        return np.array(self.weights)
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One state, two, and three where two help; time constants from a few samples to beyond the session."""
+        low, high = span(max(4.0 * about.sample_time, FASTEST), 3.0 * about.session)
+
+        def build(x: Array) -> ExponentialCreep:
+            half = len(x) // 2
+            return cls(
+                name="creep",
+                time_constants=tuple((10.0 ** x[:half]).tolist()),
+                weights=tuple((0.1 * x[half:]).tolist()),
+            )
+
+        found: list[Candidate] = []
+        for n in (1, 2, 3):
+            places = low + (high - low) * (np.arange(n) + 0.5) / n
+            found.append(
+                Candidate(
+                    f"creep, exponential, {counted(n, 'state')}",
+                    np.concatenate([np.full(n, low), np.zeros(n)]),
+                    np.concatenate([np.full(n, high), np.full(n, MOST_OF_A_STATE / 0.1)]),
+                    np.concatenate([places, np.full(n, 0.1)]),
+                    build,
+                    np.concatenate([places, np.zeros(n)]),
+                    beyond=found[1].label if n == 3 else "",
+                )
+            )
+        return found
+
+
+class LogarithmicCreep(_Creep):
+    """Creep along log t: after a step of the play sum `y = h (1 + g log10(t/t_0))` for t between t_min and t_max.
+
+    The law is that of the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric
+    actuators for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is carried by states with time
+    constants spread evenly over log t from t_min to t_max, of equal weight, and a gain with which a step has its full
+    height at t_0.
+    """
+
+    shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
+    per_decade: NotNegative = Field(description="g, share of the play sum a decade of time", examples=[0.015])
+    t0: Positive = Field(default=0.1, description="s after a step at which it has its full height")
+    t_min: Positive = Field(default=1e-3, description="shortest time constant, s")
+    t_max: Positive = Field(default=1e3, description="longest time constant, s")
+
+    settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """t_min < t_max, and not more decades than states can be spent on."""
+        if not self.t_min < self.t_max:
+            yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
+        elif self.t_max > 1e12 * self.t_min:
+            yield ("t_max",), "is more than 12 decades above t_min; narrow the two"
+
+    def spectrum(self) -> tuple[Array, float]:
+        """Time constants and the weight of each."""
+        decades = math.log10(self.t_max / self.t_min)
+        n = max(1, math.ceil(PER_DECADE * decades - 1e-9))
+        spacing = decades / n
+        places = math.log10(self.t_min) + (np.arange(n) + 0.5) * spacing
+        return np.asarray(10.0**places, dtype=np.float64), self.per_decade * spacing
+
+    def filtered(self, h: Array, run: Run) -> Array:
+        """The play sum with its creep."""
+        tau, weight = self.spectrum()
+        at_t0 = weight * float(np.sum(-np.expm1(-self.t0 / tau)))
+        return (1.0 - at_t0) * h + _states(h, run, tau, np.full(len(tau), weight))
+
+    def transients(self, run: Run) -> Array:
+        """`exp(-t/tau_i)` for one time constant a decade, enough for any start of the spectrum."""
+        return _fading(run, self.spectrum()[0][::PER_DECADE])
+
+    def largest(self, run: Run) -> Array:
+        """Each stands for the states of a decade, which lag behind the play sum by its span at most."""
+        tau, weight = self.spectrum()
+        return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The share a decade over the whole recorded time; where it helps, with free ends of the spectrum."""
+        low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
+        t0 = min(max(0.1, about.sample_time), about.duration)
+        # A longer spectrum only changes the gain, which the weights of the plays take up
+        whole = (10.0**low, 10.0**high)
+
+        def even(x: Array) -> LogarithmicCreep:
+            return cls(
+                name="creep", shape="logarithmic", per_decade=0.1 * float(x[0]), t0=t0, t_min=whole[0], t_max=whole[1]
+            )
+
+        def ended(x: Array) -> LogarithmicCreep:
+            first, decades = float(x[1]), float(x[2])
+            return cls(
+                name="creep", shape="logarithmic", per_decade=0.1 * float(x[0]), t0=t0,
+                t_min=10.0**first, t_max=10.0 ** (first + decades),
+            )  # fmt: skip
+
+        wide = high - low
+        return [
+            Candidate(
+                LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1)
+            ),
+            Candidate(
+                "creep, logarithmic, free ends",
+                np.array([0.0, low, min(0.3, wide)]), np.array([MOST_A_DECADE / 0.1, high - 0.3, wide]),
+                np.array([0.1, low, wide]), ended, np.array([0.0, low, wide]),
+                beyond=LOGARITHMIC,
+            ),
+        ]  # fmt: skip
+
+
+SHAPES = (ExponentialCreep, LogarithmicCreep)

@@ -1,0 +1,1 @@
+"""Dead time in front of the actuator."""

@@ -1,0 +1,48 @@
+"""Dead time in front of the actuator."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import NotNegative
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
+
+FAR = (0.3, 0.4, 0.5, 0.55, 0.6, 0.7)
+"""Starts as shares of the way from no delay to the longest: the error is wavy over it, with valleys no wider than
+half a period of the fastest drive that is followed."""
+
+
+class Delay(Effect):
+    """Pure delay `a(t) = v(t - T)` of the drive, T any number of seconds.
+
+    The drive is straight between its samples, as for every effect, and constant before its first: steps stay without
+    overshoot, ramps are exact, a sine of angular frequency w is off by at most (w dt)^2/8 of its amplitude.
+    """
+
+    name: Literal["delay"] = Field(description="name of the effect")
+    time: NotNegative = Field(description="T, s", examples=[2.0e-4])
+
+    place: ClassVar[Place] = Place.DRIVE
+    compensated: ClassVar[Compensated] = "none without preview"
+    compensation: ClassVar[str] = "preview of a known reference; otherwise named, not inverted"
+
+    def drive(self, a: Array, run: Run) -> Array:
+        """The drive `time` seconds earlier."""
+        return np.asarray(np.interp(run.t - self.time, run.t, a)) if self.time else a
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The time, from none to a tenth of the longest record."""
+        low, high, start, value = from_zero(0.1 * about.sample_time, 0.1 * about.duration, about.sample_time)
+        far = tuple(low + share * (high - low) for share in FAR)
+        return [
+            Candidate(
+                "delay", low, high, start, lambda x: cls(name="delay", time=value(float(x[0]))), np.zeros(1), far
+            )
+        ]
+
+
+SHAPES = (Delay,)

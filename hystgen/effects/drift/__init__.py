@@ -1,0 +1,1 @@
+"""Drift of the output with session time."""

@@ -1,0 +1,1 @@
+"""First-order lag of amplifier or averaging in front of the actuator."""

@@ -1,0 +1,49 @@
+"""First-order lag of amplifier or averaging in front of the actuator."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import NotNegative
+from hystgen.effects import recursions
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
+
+
+class Lag(Effect):
+    """First-order lag `tau a' + a = v` of the drive.
+
+    Over a step with straight `v` the solution is exact (first-order hold: Franklin, Powell, Workman, Digital Control of
+    Dynamic Systems). A record starts settled at its first drive.
+    """
+
+    name: Literal["lag"] = Field(description="name of the effect")
+    time_constant: NotNegative = Field(description="tau, s; 0 is no lag", examples=[0.0125])
+
+    place: ClassVar[Place] = Place.DRIVE
+    order: ClassVar[int] = 2
+    compensated: ClassVar[Compensated] = "approximate"
+    compensation: ClassVar[str] = "a lead with a pole that bounds the noise"
+
+    def drive(self, a: Array, run: Run) -> Array:
+        """The drive behind the lag."""
+        out = np.empty_like(a)
+        decay, early, late = run.factors(self.time_constant)
+        recursions.follow(a, decay, early, late, float(a[0]), out)
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The time constant, from none to a fifth of the longest record, sought from several places on."""
+        low, high, start, value = from_zero(0.1 * about.sample_time, 0.2 * about.duration, about.sample_time)
+
+        def build(x: Array) -> Lag:
+            return cls(name="lag", time_constant=value(float(x[0])))
+
+        others = tuple(x for decades in (1.0, 2.0) if (x := start + decades) < high)
+        return [Candidate("lag", low, high, start, build, np.zeros(1), others)]
+
+
+SHAPES = (Lag,)

@@ -1,0 +1,1 @@
+"""Plays whose loops depend on where they lie."""

@@ -1,0 +1,189 @@
+"""Plays whose loops depend on where they lie: minor loops between the same ends are not congruent."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import MAX_PLAYS, Number, Positive
+from hystgen.effects import recursions
+from hystgen.effects.base import (
+    About,
+    Array,
+    Candidate,
+    Compensated,
+    Effect,
+    Place,
+    Problem,
+    not_one_a_play,
+    span,
+    without_plays,
+)
+
+MAX_TERMS = 8
+
+CUBIC = "noncongruent, cubic"
+
+PLACES = 101
+
+LOWEST, HIGHEST = -0.8, 2.5
+"""Amplitudes of a bump from which a search starts."""
+
+EVEN = 1e-6
+"""A density that is as far below its ends as above them, within this share, has a bump and no dip."""
+
+
+class _Noncongruent(Effect):
+    name: Literal["noncongruent"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.PLAYS
+    order: ClassVar[int] = 1
+    timed: ClassVar[bool] = False
+    pointwise: ClassVar[bool] = True
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "a monotone scalar equation, solved every sample"
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """There are plays to bend."""
+        yield from without_plays(thresholds)
+
+    @abstractmethod
+    def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
+        """Add to `total` (N,) what the play of a number above 0 gains, times `weight`."""
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """The drive itself, and bent plays."""
+        out = np.array(rows)
+        for i in range(1, len(rows)):
+            self.bend(i, rows[i], thresholds, 1.0, out[i])
+        return out
+
+    def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
+        """Their sum; plays of weight 0 need not be bent."""
+        total: Array = p @ rows
+        for i in range(1, len(rows)):
+            if p[i] != 0.0:
+                self.bend(i, rows[i], thresholds, float(p[i]), total)
+        return total
+
+
+class PlayFunctions(_Noncongruent):
+    """Play functions `sum p_i g_i(play_i)`, `g_i(s) = s + r_n sum_k c_ik xi^k`, `xi = s/r_n`, k = 2, 3, ...
+
+    r_n is the largest threshold; the drive itself (weight p_0) takes no part. Every Preisach operator is such a sum
+    of functions of plays (Brokate, Sprekels, Hysteresis and Phase Transitions, 1996).
+    """
+
+    shape: Literal["play_functions"] = Field(default="play_functions", description="a polynomial a play")
+    coefficients: Annotated[
+        tuple[Annotated[tuple[Number, ...], Field(min_length=1, max_length=MAX_TERMS)], ...],
+        Field(min_length=1, max_length=MAX_PLAYS),
+    ] = Field(
+        description="a list for each threshold but r_0: coefficients of xi^2, xi^3, ..",
+        examples=[[[0.05], [0.02, 0.01]]],
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """One list a play."""
+        yield from super().problems(thresholds)
+        yield from not_one_a_play("coefficients", self.coefficients, thresholds, "list")
+
+    def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
+        """What its polynomial adds to a play."""
+        recursions.curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The same parabola for all plays; with a cubic term, which may change evenly over r; with a quartic one."""
+        plays = len(about.thresholds) - 1
+        if plays < 1:
+            return []
+        # of order one where xi is as large as the drive makes it
+        largest = max(1.0, max(map(abs, about.drive)) / about.thresholds[-1])
+
+        share = np.array(about.thresholds[1:]) / about.thresholds[-1]
+
+        def candidate(label: str, terms: int, *courses: Array, **more: Any) -> Candidate:
+            def build(x: Array) -> PlayFunctions:
+                table = 0.1 * x.reshape(len(courses), terms) / largest ** np.arange(1, terms + 1)
+                rows = np.array(courses).T @ table
+                return cls(name="noncongruent", coefficients=tuple(map(tuple, rows.tolist())))
+
+            n = terms * len(courses)
+            zero = np.zeros(n)
+            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), zero, build, zero, **more)
+
+        even = np.ones(plays)
+        return [
+            candidate("noncongruent, parabola", 1, even),
+            candidate(CUBIC, 2, even),
+            candidate(
+                "noncongruent, cubic over r", 2, 1.0 - share, share, beyond=CUBIC, grown=lambda x: np.tile(x, 2)
+            ),
+            candidate("noncongruent, quartic", 3, even, beyond=CUBIC, grown=lambda x: np.append(x, 0.0)),
+        ]
+
+
+class LoopCentre(_Noncongruent):
+    """Preisach density that depends on the centre of a relay's loop: `p_i (1 + A sech^2((c - centre)/width))`.
+
+    A play is the sum of relays of its half width over all centres c below its state (Brokate, Sprekels, Hysteresis and
+    Phase Transitions, 1996), so that the density makes every play `g(s) = s + A width (tanh((s - centre)/width) +
+    tanh(centre/width))`. The drive itself (weight p_0) has no relays and takes no part.
+    """
+
+    shape: Literal["centre"] = Field(description="Preisach density that depends on the loop's centre")
+    amplitude: Annotated[Number, Field(gt=-1.0)] = Field(
+        description="A, share by which the density at `centre` is higher; above -1", examples=[0.2]
+    )
+    centre: Number = Field(description="centre of the bump, input units of the plays", examples=[50.0])
+    width: Positive = Field(description="width of the bump, input units of the plays", examples=[20.0])
+
+    def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
+        """What the density's integral adds to a play."""
+        bump = np.tanh((row - self.centre) / self.width) + np.tanh(self.centre / self.width)
+        total += weight * self.amplitude * self.width * bump
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Amplitude, centre within the drive, width; where a cubic takes something away.
+
+        How a bump begins is read off the density that the cubic has: from far away no search finds its place.
+        """
+        if len(about.thresholds) < 2:
+            return []
+        low, high = about.drive
+        wide = high - low
+        ends = span(0.05 * wide, 2.0 * wide)
+        start = float(np.log10(0.4 * wide))
+
+        def build(x: Array) -> LoopCentre:
+            return cls(
+                name="noncongruent", shape="centre", amplitude=float(x[0]),
+                centre=low + wide * float(x[1]), width=10.0 ** float(x[2]),
+            )  # fmt: skip
+
+        def grown(cubic: Array) -> Array:
+            largest = max(map(abs, about.drive))
+            at = np.linspace(low, high, PLACES)
+            density = np.maximum(1.0 + 0.2 * cubic[0] * at / largest + 0.3 * cubic[1] * (at / largest) ** 2, 0.05)
+            outside = 0.5 * float(density[0] + density[-1])
+            above, below = int(np.argmax(density)), int(np.argmin(density))
+            # from one end to the other it may rise or fall evenly: which is further off would be a matter of rounding
+            k = above if density[above] - outside >= (1.0 - EVEN) * (outside - density[below]) else below
+            amplitude = float(np.clip(density[k] / outside - 1.0, LOWEST, HIGHEST))
+            return np.array([amplitude, k / (PLACES - 1), start])
+
+        return [
+            Candidate(
+                "noncongruent, loop centre", np.array([-0.9, 0.0, ends[0]]), np.array([3.0, 1.0, ends[1]]),
+                np.array([0.05, 0.5, start]), build, np.array([0.0, 0.5, start]), (), CUBIC, grown,
+            )
+        ]  # fmt: skip
+
+
+SHAPES = (PlayFunctions, LoopCentre)

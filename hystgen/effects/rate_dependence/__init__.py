@@ -1,0 +1,1 @@
+"""Plays that depend on the rate of their input."""

@@ -1,0 +1,1 @@
+"""A mechanical mode of the stage."""

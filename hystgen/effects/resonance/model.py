@@ -1,0 +1,105 @@
+"""A mechanical mode of the stage."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import Positive
+from hystgen.effects import recursions
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+
+
+class Resonance(Effect):
+    """Mode `y'' + 2 zeta w0 y' + w0^2 y = w0^2 h`, `w0 = 2 pi frequency`, gain 1 at rest; several in series.
+
+    Over a step with straight `h` the solution is exact, for any damping: a free oscillation about `h - 2 zeta h'/w0`.
+    A record starts at rest: `y = h`, `y' = 0`.
+    """
+
+    name: Literal["resonance"] = Field(description="name of the effect")
+    frequency: Positive = Field(description="undamped frequency, Hz", examples=[350.0])
+    damping: Annotated[Positive, Field(le=10.0)] = Field(description="zeta, above 0, 1 is critical", examples=[0.02])
+
+    place: ClassVar[Place] = Place.LINEAR
+    fades: ClassVar[bool] = True
+    order: ClassVar[int] = 1
+    repeatable: ClassVar[bool] = True
+    compensated: ClassVar[Compensated] = "approximate"
+    compensation: ClassVar[str] = "a reference filter: notch or zero-vibration shaper, or the second-order inverse"
+
+    def _factors(self, times: Array) -> tuple[Array, Array, Array]:
+        """Times in radians of the undamped oscillation, and the decaying cosine and sine."""
+        zeta = self.damping
+        angle = 2.0 * np.pi * self.frequency * times
+        with np.errstate(under="ignore"):
+            if zeta < 1.0:
+                turn = np.sqrt(1.0 - zeta * zeta)
+                decay = np.exp(-zeta * angle)
+                return angle, decay * np.cos(turn * angle), decay * np.sin(turn * angle) / turn
+            apart = np.sqrt(zeta * zeta - 1.0)
+            slow, fast = np.exp(-angle / (zeta + apart)), np.exp(-(zeta + apart) * angle)
+            sine = -slow * np.expm1(-2.0 * apart * angle) / (2.0 * apart) if apart > 0.0 else angle * slow
+            return angle, 0.5 * (slow + fast), sine
+
+    def _forced(self, steps: Array) -> Array:
+        """Decaying cosine and sine of each step, and the responses to a change by 1 over it: output, and its rate."""
+        zeta = self.damping
+        x, c, s = self._factors(steps)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ramp = 1.0 + (2.0 * zeta * (c - 1.0) + (2.0 * zeta * zeta - 1.0) * s) / x
+            step = (1.0 - c - zeta * s) / x
+        # Digits that cancel for short steps
+        curved = (4.0 * zeta * zeta - 1.0) * x * x
+        short = x < 1e-3 / (1.0 + zeta)
+        ramp = np.where(short, x * x * (1.0 / 6.0 - zeta * x / 12.0 + curved / 120.0), ramp)
+        step = np.where(short, x * (0.5 - zeta * x / 3.0 + curved / 24.0), step)
+        return np.stack([c, s, ramp, step])
+
+    def filtered(self, h: Array, run: Run) -> Array:
+        """The play sum as the mode passes it on."""
+        rows = np.ascontiguousarray(np.atleast_2d(h))
+        out = np.empty_like(rows)
+        factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self._forced))
+        a, b, early, late = factors
+        recursions.ring(rows, a, b, early, late, self.damping, out)
+        return out.reshape(np.shape(h))
+
+    def transients(self, run: Run) -> Array:
+        """The free oscillation from a start that is not at rest: decaying cosine and sine."""
+        return np.stack(self._factors(run.t - run.t[0])[1:])
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Frequency from two periods a record to three samples a period, damping 0.3 % to 70 %; starts all over log f.
+
+        What is faster is not seen to ring, nor what is damped more: in the records it is a delay or a lag. A light
+        damping rings long, and is found from the frequency at which the error so far rings alone.
+        """
+        low, fastest = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
+        high = max(fastest - np.log10(3.0), low)
+
+        def build(x: Array) -> Resonance:
+            return cls(name="resonance", frequency=float(10.0 ** x[0]), damping=float(10.0 ** x[1]))
+
+        def start(place: float) -> Array:
+            return np.array([min(fastest - max(fastest - low, 0.0) * place, high), -1.3])
+
+        places = {
+            "high": [start(place) for place in (0.14, 0.2, 0.28)],
+            "middle": [start(place) for place in (0.36, 0.44, 0.52)],
+            "low": [start(place) for place in (0.6, 0.7, 0.8)],
+            "where it rings": [np.array([np.log10(f), -1.8]) for f in about.ringing],
+        }
+        return [
+            Candidate(
+                f"resonance, {name}", np.array([low, -2.5]), np.array([high, np.log10(0.7)]), starts[0], build,
+                others=tuple(starts[1:]),
+            )
+            for name, starts in places.items() if starts
+        ]  # fmt: skip
+
+
+SHAPES = (Resonance,)

@@ -1,0 +1,132 @@
+"""Saturation behind the plays; one in front of them is a stage of `model.memoryless`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import NotNegative, Number, Positive
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run
+
+LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
+"""Starts within the output: a limit beyond what was measured does nothing, and neither does a small change of it."""
+
+
+INSIDE, GIVE = (0.03, 0.1), 0.2
+"""Stops from which a search starts: shares of the output range inside its ends, and what they give."""
+
+AWAY, FARTHEST = -0.3, 0.45
+"""Stops are sought up to so far beyond the ends, where they do nothing, and inside them."""
+
+
+class _Saturation(Effect):
+    name: Literal["saturation"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.OUTPUT
+    timed: ClassVar[bool] = False
+    pointwise: ClassVar[bool] = True
+    hint: ClassVar[str] = "this is saturation behind the plays, one in front is a stage of model.memoryless"
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "exact inside the range, clamped outside"
+
+
+class _Level(_Saturation):
+    @classmethod
+    def _candidate(cls, label: str, about: About, high: float) -> Candidate:
+        def build(x: Array) -> Effect:
+            shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
+            return cls(name="saturation", shape=shape, level=about.output_range * float(10.0 ** x[0]))  # type: ignore[call-arg]
+
+        return Candidate(label, np.array([-1.0]), np.array([high]), np.array([0.3]), build, np.array([high]), LEVELS)
+
+
+class TanhSaturation(_Level):
+    """Smooth limit `y = level tanh(h/level)` of the output in front of the offset."""
+
+    shape: Literal["tanh"] = Field(default="tanh", description="smooth limit")
+    level: Positive = Field(description="largest output, output units", examples=[50.0])
+
+    def mapped(self, y: Array, run: Run) -> Array:
+        """The limited output."""
+        return np.asarray(self.level * np.tanh(y / self.level))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The level, from a tenth of the output range to a thousand."""
+        return [cls._candidate("saturation behind, tanh", about, 3.0)]
+
+
+class HardSaturation(_Level):
+    """Hard limit `y = min(max(h, -level), level)` of the output in front of the offset."""
+
+    shape: Literal["hard"] = Field(description="hard limit")
+    level: Positive = Field(description="largest output, output units", examples=[50.0])
+
+    def mapped(self, y: Array, run: Run) -> Array:
+        """The limited output."""
+        return np.clip(y, -self.level, self.level)
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """The level, from a tenth of the output range to ten."""
+        return [cls._candidate(HARD, about, 1.0)]
+
+
+HARD = "saturation behind, hard"
+
+
+class Stops(_Saturation):
+    """Elastic stops at either end: beyond `upper` and `lower` the output goes on with `give` of its slope.
+
+    A stage that meets a stop moves on by what the stop's stiffness beside its own lets it, and its travel need not be
+    centred between the two.
+    """
+
+    shape: Literal["stops"] = Field(description="elastic stops at either end")
+    lower: Number = Field(description="where the lower one begins, output units", examples=[-1.0])
+    upper: Number = Field(description="where the upper one begins, above lower, output units", examples=[38.0])
+    give: Annotated[NotNegative, Field(le=1.0)] = Field(
+        default=0.0, description="slope beyond them over that between, 0 is hard", examples=[0.1]
+    )
+
+    def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
+        """lower < upper."""
+        if not self.lower < self.upper:
+            yield ("upper",), f"{self.upper!r} is not above lower = {self.lower!r}; give lower < upper"
+
+    def mapped(self, y: Array, run: Run) -> Array:
+        """The output between the stops, and what they give beyond."""
+        inside = np.clip(y, self.lower, self.upper)
+        return np.asarray(inside + self.give * (y - inside))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Where they begin and what they give, where a hard limit takes something away."""
+        low, high = about.drive
+        wide = about.output_range
+        bottom, top = (wide * v / (high - low) for v in about.drive)  # of plays without hysteresis
+
+        def build(x: Array) -> Stops:
+            return cls(
+                name="saturation", shape="stops", lower=bottom + wide * float(x[1]), upper=top - wide * float(x[0]),
+                give=float(x[2]),
+            )  # fmt: skip
+
+        def grown(hard: Array) -> Array:
+            level = wide * 10.0 ** float(hard[0])
+            places = np.array([top - level, -level - bottom]) / wide
+            return np.append(np.clip(places, AWAY, FARTHEST), GIVE)
+
+        one, other = (np.array([share, share, GIVE]) for share in INSIDE)
+        return [
+            Candidate(
+                "saturation behind, stops", np.array([AWAY, AWAY, 0.0]), np.array([FARTHEST, FARTHEST, 0.9]), one,
+                build, np.array([AWAY, AWAY, GIVE]), (other,), HARD, grown,
+            )
+        ]  # fmt: skip
+
+
+SHAPES = (TanhSaturation, HardSaturation, Stops)

@@ -1,0 +1,1 @@
+"""Limited slew rate of the amplifier."""

@@ -1,0 +1,1 @@
+"""Gain and offset that follow a temperature."""

@@ -1,0 +1,211 @@
+"""Gain and offset that follow a temperature."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from hystgen.basics.quantities import NotNegative, Number, Positive
+from hystgen.effects import recursions
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, span
+
+COLUMN = "temperature"
+
+SELF_HEATING = "thermal, self-heating"
+
+SHARES = (0.3, 0.15, 0.5)
+"""Shares of the way down from the longest time constant to the shortest from which searches start."""
+
+SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
+"""Decimal logarithms of the reach of what rubs, in ranges of the drive: bounds and start."""
+
+
+class _Thermal(Effect):
+    name: Literal["thermal"] = Field(description="name of the effect")
+
+    place: ClassVar[Place] = Place.GAIN
+    order: ClassVar[int] = 1
+    selector: ClassVar[str] = "source"
+
+    gain_per_degree: Number = Field(default=0.0, description="change of gain, 1/K", examples=[-0.002])
+    offset_per_degree: Number = Field(default=0.0, description="change of offset, output units/K")
+    reference: Number = Field(default=20.0, description="temperature at which nothing changes, degC")
+
+    settled: ClassVar[tuple[str, ...]] = ("reference", "heating")
+
+    @abstractmethod
+    def above(self, run: Run) -> Array:
+        """Temperature above the reference (N,), K."""
+
+    def gain(self, run: Run) -> Array:
+        """`1 + gain_per_degree (T - reference)`."""
+        return 1.0 + self.gain_per_degree * self.above(run)
+
+    def offset(self, run: Run) -> Array:
+        """`offset_per_degree (T - reference)`."""
+        return self.offset_per_degree * self.above(run)
+
+
+class LoggedThermal(_Thermal):
+    """Gain `1 + g (T - T_ref)` and offset `o (T - T_ref)` of a temperature in the record's column `temperature`."""
+
+    source: Literal["logged"] = Field(default="logged", description="temperature from the column `temperature`")
+
+    timed: ClassVar[bool] = False
+    columns: ClassVar[tuple[str, ...]] = (COLUMN,)
+    compensated: ClassVar[Compensated] = "needs a sensor"
+    compensation: ClassVar[str] = "exact with a temperature input to `step`"
+
+    def above(self, run: Run) -> Array:
+        """The logged temperature above the reference."""
+        return run.extra[COLUMN] - self.reference
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Gain, offset, both; none without a temperature in every record."""
+        if COLUMN not in about.columns:
+            return []
+        found = []
+        for what, row in (("gain", (0, None)), ("offset", (None, 0)), ("gain and offset", (0, 1))):
+            n = sum(place is not None for place in row)
+
+            def build(x: Array, row: tuple[int | None, int | None] = row) -> LoggedThermal:
+                gain, offset = _of_row(x, row, about)
+                return cls(name="thermal", gain_per_degree=gain, offset_per_degree=offset)
+
+            bounds = np.full(n, 5.0)
+            found.append(Candidate(f"thermal, logged, {what}", -bounds, bounds, np.zeros(n), build, np.zeros(n)))
+        return found
+
+
+class _OwnHeat(_Thermal):
+    time_constant: Positive = Field(description="tau, s", examples=[60.0])
+
+    compensated: ClassVar[Compensated] = "needs a sensor"
+    compensation: ClassVar[str] = "flagged: the temperature is not measured"
+
+    @abstractmethod
+    def heat(self, run: Run) -> Array:
+        """Final rise at the heat of each step (N - 1,), K."""
+
+    def above(self, run: Run) -> Array:
+        """Temperature rise, K; a search comes back to it with other gains and offsets."""
+        numbers = self.model_dump(exclude={"gain_per_degree", "offset_per_degree"})
+        return run.remembered((type(self), *numbers.values()), lambda: self._rise(run))
+
+    def _rise(self, run: Run) -> Array:
+        decay, kept, none = run.of_steps(lambda steps: _kept(steps / self.time_constant))
+        out = np.empty(len(run.t))
+        recursions.follow(np.append(self.heat(run), 0.0), decay, kept, none, 0.0, out)
+        return out
+
+
+class SelfHeating(_OwnHeat):
+    """Gain and offset of self-heating: `tau T' + T = heating |v v'|/2`, T above the reference, 0 at the start.
+
+    A drive of amplitude V about 0 and frequency f has `|v v'|/2 = f V^2` in the mean, the law of dielectric loss; one
+    thermal resistance and capacity carry the heat away. The heat of a step is spread evenly over it.
+    """
+
+    source: Literal["self_heating"] = Field(description="temperature from the drive's own heat")
+    heating: NotNegative = Field(description="K s/input^2: heating f V^2 is the final rise", examples=[1.0e-5])
+
+    def heat(self, run: Run) -> Array:
+        """`heating |v v'|/2`."""
+        return self.heating * run.heat
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Time constant with gain, with offset, with both; heating is such that a session warms by about 1 K."""
+        power = max(map(abs, about.drive)) * about.travel / (2.0 * max(about.session, about.sample_time))
+        heating = 1.0 / max(power, 1e-12)
+        found = []
+        for what, row in (("gain", (1, None)), ("offset", (None, 1)), ("gain and offset", (1, 2))):
+
+            def build(x: Array, row: tuple[int | None, int | None] = row) -> SelfHeating:
+                gain, offset = _of_row(x, row, about)
+                return cls(
+                    name="thermal", source="self_heating", time_constant=float(10.0 ** x[0]), heating=heating,
+                    gain_per_degree=gain, offset_per_degree=offset,
+                )  # fmt: skip
+
+            low, high, start, others = _numbers(row, about)
+            found.append(Candidate(f"{SELF_HEATING}, {what}", low, high, start, build, start, others))
+        return found
+
+
+class HysteresisHeating(_OwnHeat):
+    """Gain and offset of the heat that hysteresis itself loses: `tau T' + T = heating q`, T 0 at the start.
+
+    `q` is what plays of all thresholds up to `reach`, equally dense, lose to friction, input units^3/s: `2/3 f V^3`
+    for amplitudes V below the reach (Rayleigh's law: Damjanovic, Rep. Prog. Phys. 61 (1998) 1267), wherever the loop
+    lies, and growing with V far above it.
+    """
+
+    source: Literal["hysteresis"] = Field(description="temperature from the heat of the loops")
+    heating: NotNegative = Field(description="K s/input^3: heating 2/3 f V^3 is the final rise", examples=[1.0e-6])
+    reach: Positive = Field(description="largest half width of what rubs, input units", examples=[30.0])
+
+    def heat(self, run: Run) -> Array:
+        """`heating q`, the loss of each step spread evenly over it."""
+        return self.heating * run.remembered((type(self), self.reach), lambda: self._lost(run)) / run.steps
+
+    def _lost(self, run: Run) -> Array:
+        out = np.empty(len(run.steps))
+        recursions.lost(run.v, self.reach, np.empty(len(run.v)), out)
+        return out
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """Time constant with gain, with gain and offset, and the reach; where the drive's own heat takes something."""
+        low_drive, high_drive = about.drive
+        wide = high_drive - low_drive
+        rate = about.travel / max(about.session, about.sample_time)
+        found = []
+        for what, row in (("gain", (1, None)), ("gain and offset", (1, 2))):
+
+            def build(x: Array, row: tuple[int | None, int | None] = row) -> HysteresisHeating:
+                gain, offset = _of_row(x, row, about)
+                reach = wide * float(10.0 ** x[-1])
+                return cls(
+                    name="thermal", source="hysteresis", time_constant=float(10.0 ** x[0]),
+                    heating=2.0 / max(reach * reach * rate, 1e-12), reach=reach,
+                    gain_per_degree=gain, offset_per_degree=offset,
+                )  # fmt: skip
+
+            def grown(x: Array) -> Array:
+                return np.append(x, REACH)
+
+            low, high, start, others = _numbers(row, about)
+            found.append(
+                Candidate(
+                    f"thermal, heat of hysteresis, {what}", np.append(low, SMALLEST), np.append(high, LARGEST),
+                    grown(start), build, grown(start), tuple(map(grown, others)), f"{SELF_HEATING}, {what}", grown,
+                )
+            )  # fmt: skip
+        return found
+
+
+def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, Array, Array, tuple[Array, ...]]:
+    """Least, largest, first and other first numbers: time constant, then a gain, an offset or both."""
+    n = sum(place is not None for place in row)
+    low, high = span(20.0 * about.sample_time, 3.0 * about.session)
+    start, *others = (np.append(high - share * (high - low), np.zeros(n)) for share in SHARES)
+    return np.append(low, np.full(n, -20.0)), np.append(high, np.full(n, 20.0)), start, tuple(others)
+
+
+def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple[float, float]:
+    """Gain and offset per degree of such numbers."""
+    gain, offset = (0.0 if place is None else float(x[place]) for place in row)
+    return 0.01 * gain, 0.01 * about.output_range * offset
+
+
+def _kept(share: Array) -> Array:
+    """Of the warmth and of the heat of each step, for steps in time constants; the next step's has no part in it."""
+    return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
+
+
+SHAPES = (LoggedThermal, SelfHeating, HysteresisHeating)

@@ -1,0 +1,100 @@
+"""The calls that emit: from models to C files in a folder, or to how those there differ."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from hystgen.basics import arguments
+from hystgen.compensator import engines
+from hystgen.emission import files, module
+from hystgen.emission.options import LAYOUTS, OPERATORS, Options
+from hystgen.model import Model, as_model, check_arithmetic
+
+if TYPE_CHECKING:
+    from hystgen.emission.stale import Difference
+
+Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
+
+
+def _models(source: Sources) -> list[Model]:
+    """The models of one source or several."""
+    if isinstance(source, list | tuple | Iterator):
+        return [as_model(each) for each in source]
+    return [as_model(source)]  # type: ignore[arg-type]
+
+
+def emit_options(
+    model: Model,
+    operator: str | None = None,
+    arithmetic: str | None = None,
+    engine: str | None = None,
+    layout: str = "self-contained",
+    optimize: str | None = None,
+) -> Options:
+    """What is to be emitted: the arguments given, else the parameter file's `emit` section."""
+    model.need_static("C")
+    defaults = model.parameters.emit
+    operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
+    check_arithmetic(arithmetic)
+    arguments.choice("operator", operator, OPERATORS)
+    arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
+    arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
+    arguments.choice("layout", layout, LAYOUTS)
+    return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout)
+
+
+@arguments.taking(emit_options, "emit")
+def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
+    """Names and text of the C files of a model, or of several; options as for `emit`. Nothing is written.
+
+    Raises what `emit` raises, and ValueError where two models make files of one name.
+    """
+    models = _models(source)
+    check_names(models)
+    made: dict[str, str] = {}
+    for model in models:
+        made |= module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+    return made
+
+
+def check_names(models: Sequence[Model]) -> None:
+    """Raise ValueError where two models make files of one name."""
+    names = [model.name.lower() for model in models]  # as some file systems and all macros see them
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ValueError(f"two models are called {twice[0]}, their files would overwrite each other; rename one")
+
+
+@arguments.taking(emit_options, "emit")
+def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[Path]:
+    """Write the C files of a model (or parameter file), or of several, into folder `output` and return their paths.
+
+    Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
+    loop; `optimize` auto, speed or size, for what `engine` auto chooses; `layout` self-contained, shared-runtime or
+    single-header. What is not given comes from the parameter file.
+    Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
+    FormatError and UnsupportedEffectsError; then nothing is written.
+    """
+    return files.write(Path(arguments.path("output", output)), emitted_files(source, **options))
+
+
+@arguments.taking(emit_options, "emit")
+def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[str]:
+    """What in folder `output` is missing or other than what `emit` would write, one sentence a file.
+
+    The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
+    """
+    return [each.sentence() for each in stale_files(source, output, **options)]
+
+
+@arguments.taking(emit_options, "emit")
+def stale_files(
+    source: Sources, output: str | os.PathLike[str] = ".", **options: str | None
+) -> list[Difference]:
+    """The differences behind the sentences of `differences`."""
+    from hystgen.emission import stale
+
+    return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))

@@ -1,0 +1,1 @@
+"""Fitting and emitting many units of one design."""

@@ -1,0 +1,288 @@
+"""Fitting units elsewhere: in processes of this machine (joblib), or on the workers of a Dask cluster.
+
+A task carries the bytes of its records and a result the text of its files, so that a worker needs the package and
+neither the records nor the output folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import tempfile
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hystgen.basics import extras, writing
+from hystgen.basics.version import __version__
+from hystgen.identification.settings import Settings
+
+LOST = "the Dask scheduler was lost; the same command goes on from here"
+DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
+
+PATIENCE = 15.0
+"""Seconds for a scheduler to answer, and for it to have a worker."""
+
+IDLE = 30.0
+"""Seconds after which a process without work ends."""
+
+WATCH = 1.0
+"""Seconds between two looks of a process for the one that started it."""
+
+
+class SchedulerError(OSError):
+    """A scheduler that cannot be used; `str()` says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and what is wanted.
+
+    `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
+    """
+
+    unit: str
+    records: tuple[tuple[str, bytes | None], ...]
+    holdout: tuple[tuple[str, bytes | None], ...]
+    options: Mapping[str, Any]
+    emission: Mapping[str, str | None] | None
+    settings: Settings = field(default_factory=Settings)
+    version: str = __version__
+
+
+@dataclass(frozen=True)
+class Result:
+    """What became of a task: text of the parameter file, C files by name, figures; `message` says what failed."""
+
+    unit: str
+    message: str = ""
+    parameters: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+
+Work = Callable[[Task], Result]
+
+
+def fit_unit(task: Task) -> Result:
+    """Fit and emit one unit. Never raises an Exception: whatever goes wrong is the result's message."""
+    if task.version != __version__:
+        return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same")
+    with writing.temporary() as folder:
+        paths = {}
+        for k, (path, data) in enumerate((*task.records, *task.holdout)):
+            copy = folder / str(k) / Path(path).name
+            copy.parent.mkdir()
+            paths[str(copy)] = path
+            if data is not None:
+                copy.write_bytes(data)
+        copies = list(paths)
+        try:
+            return _fitted(task, copies[: len(task.records)], copies[len(task.records) :])
+        except Exception as failure:
+            message = _line(failure)
+        for copy_path, path in paths.items():
+            message = message.replace(copy_path, path)
+        return Result(task.unit, message)
+
+
+def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
+    from hystgen import identification
+    from hystgen.emission import calls
+    from hystgen.model import Model
+
+    fit = task.settings.on(identification.identify(records, holdout=holdout, name=task.unit, **task.options))
+    model = Model(fit.parameters)
+    text, figures = fit.text(), _figures(fit, model)
+    if task.emission is None:
+        return Result(task.unit, "", text, {}, figures)
+    try:
+        return Result(task.unit, "", text, calls.emitted_files(model, **task.emission), figures)
+    except Exception as failure:
+        return Result(task.unit, f"fitted, but not emitted: {_line(failure)}", text, {}, figures)
+
+
+def _line(failure: Exception) -> str:
+    """What went wrong, in one line."""
+    from hystgen.basics.problems import NotInvertibleError
+
+    if isinstance(failure, NotInvertibleError):
+        return "no inverse: " + "; ".join(failure.reasons)
+    first, *more = str(failure).splitlines() or [""]
+    if not isinstance(failure, ValueError | OSError):
+        first = f"unexpected {type(failure).__name__}: {first}"
+    return first + (f" (and {len(more)} more)" if more else "")
+
+
+def _figures(fit: Any, model: Any) -> dict[str, Any]:
+    """The unit's columns of the summary."""
+    cascade = model.cascade
+    low, high = cascade.output_range
+    stages = fit.parameters.model.memoryless
+    kinds = {"dead_zone": "gpi-deadzone", "tanh": "gpi-tanh"}
+    own = next(row for row in fit.rows if row.model == "written" and row.part in ("fit", "all"))
+    held = next((row for row in fit.rows if row.part == "held out"), None)
+    return {
+        "kind": kinds[stages[0].kind] if stages else "pi",
+        "plays": cascade.pi.n,
+        "p_0": float(cascade.pi.weights[0]),
+        "width": float(cascade.pi.width),
+        "gain": float((high - low) / (cascade.input_range[1] - cascade.input_range[0])),
+        "output_low": float(low),
+        "output_high": float(high),
+        "fit_rms": own.rms,
+        "fit_rms_percent": own.rms_percent,
+        "held_out_rms": held.rms if held else None,
+        "held_out_rms_percent": held.rms_percent if held else None,
+        "warnings": len(fit.warnings),
+    }
+
+
+def _begin(folder: str, parent: int) -> None:
+    """Set a process up for work: whoever started it, `parent`, ends it and clears up behind it.
+
+    Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
+    a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the one that started it is gone."""
+    while os.getppid() == parent:
+        time.sleep(WATCH)
+    os._exit(1)
+
+
+def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:
+    """Results in the order in which they come, from `jobs` processes (1: from this one); tasks are taken when needed.
+
+    A process that dies takes the whole pool along. What was under way is then repeated one by one: only the unit that
+    dies alone too has failed, and the rest goes on.
+    """
+    with writing.temporary() as folder:
+        yield from _pooled(tasks, jobs, work, str(folder))
+
+
+def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Generator[Result, None, None]:
+    from joblib import Parallel, delayed, parallel_config
+
+    waiting = iter(tasks)
+    sent: dict[str, Task] = {}
+
+    def calls() -> Iterator[Any]:
+        for task in waiting:
+            sent[task.unit] = task
+            yield delayed(work)(task)
+
+    def pool(**how: Any) -> Any:
+        apart: dict[str, Any] = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE}
+        apart |= {"initializer": _begin, "initargs": (folder, os.getpid())}
+        with parallel_config("loky", **apart) if jobs > 1 else parallel_config("sequential"):
+            return Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered", **how)
+
+    while True:
+        results = pool(pre_dispatch="2*n_jobs")(calls())
+        try:
+            for result in results:
+                del sent[result.unit]
+                yield result
+            return
+        except BrokenProcessPool:
+            for task in list(sent.values()):
+                try:
+                    yield from pool()([delayed(work)(task)])
+                except BrokenProcessPool:
+                    yield Result(task.unit, DIED)
+            sent.clear()
+        finally:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # that tasks are given up, where nobody waits for them any more
+                results.close()
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the libraries of a cluster from logging, with tracebacks, what an exception says in one line."""
+    names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
+    before = {logger: logger.level for logger in map(logging.getLogger, [*names, "asyncio"])}
+    for logger in before:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in before.items():
+            logger.setLevel(level)
+
+
+@contextlib.contextmanager
+def cluster(address: str) -> Iterator[Any]:
+    """A client of the Dask scheduler at `address`, which has a worker. Raises SchedulerError."""
+    try:
+        from distributed import Client
+        from distributed.comm import get_address_host_port
+    except ModuleNotFoundError:
+        raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
+    with _quiet():
+        try:
+            get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
+            client = Client(address, timeout=PATIENCE, set_as_default=False)
+        except Exception as failure:  # of as many kinds as there are protocols
+            reason = (str(failure).splitlines() or [type(failure).__name__])[0]
+            raise SchedulerError(f"no Dask scheduler answers at {address}: {reason}") from None
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=PATIENCE)
+            except TimeoutError:
+                raise SchedulerError(f"the Dask scheduler at {address} has no workers; start some") from None
+            yield client
+
+
+def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Generator[Result, None, None]:
+    """Results in the order in which they come, from the workers of a Dask scheduler.
+
+    No more tasks than the workers soon need are under way, so that few records are in memory. Dask repeats what a
+    dying worker had; a unit on which workers die again and again has failed. Raises SchedulerError.
+    """
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    waiting = iter(tasks)
+    under_way: dict[Any, str] = {}
+    finished = as_completed(loop=client.loop)
+
+    def refill() -> None:
+        try:
+            wanted = 2 * max(sum(client.nthreads().values()), 1)
+        except OSError:
+            raise SchedulerError(LOST) from None
+        while len(under_way) < wanted and (task := next(waiting, None)) is not None:
+            future = client.submit(work, task, pure=False)
+            under_way[future] = task.unit
+            finished.add(future)
+
+    try:
+        refill()
+        for future in finished:
+            unit = under_way.pop(future)
+            if future.status not in ("finished", "error"):
+                raise SchedulerError(LOST)
+            try:
+                result = future.result()
+            except KilledWorker:
+                result = Result(unit, DIED)
+            except Exception as failure:
+                result = Result(unit, _line(failure))
+            yield result
+            refill()
+    finally:
+        client.cancel(list(under_way))

@@ -1,0 +1,1 @@
+"""Memoryless stages in front of the plays: model and compensator of each."""

@@ -1,0 +1,58 @@
+"""The memoryless part in fixed point: piecewise polynomials, `c_runtime/curve.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.front.stage import CurveTables
+from hystgen.plays.fixed import nearest
+from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, FINE
+
+HALF = 1 << 30
+
+# the curves of the memoryless part, two branches of each
+FORWARD, INVERSE = 0, 2
+
+
+@jit
+def curve(t: CurveTables, which: int, x: Any) -> Any:
+    """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece that x lies on, h = 0 .. 1 along it."""
+    j = t.first[which]
+    high = j + t.pieces[which] - 1
+    while j < high:
+        middle = (j + high + 1) // 2
+        if x >= t.knot[middle]:
+            j = middle
+        else:
+            high = middle - 1
+    h = (x - t.knot[j]) << t.scale[j]
+    y = h - h
+    for i in range(t.coefficient.shape[1] - 1, -1, -1):
+        y = t.coefficient[j, i] + ((y * h + HALF) >> 31)
+    return y
+
+
+@jit
+def front_forward(t: CurveTables, v: Any, ascending: int) -> Any:
+    """w = G[v] on one branch."""
+    if t.fronts:
+        return curve(t, FORWARD + 1 - ascending, v)
+    return v << t.limits[FINE]
+
+
+@jit
+def front_inverse(t: CurveTables, w: Any, ascending: int) -> tuple[Any, int]:
+    """v = G^-1[w] on one branch, one code beyond the range where w lies beyond it; whether an envelope limits w."""
+    if not t.fronts:
+        return nearest(w, t.limits[FINE]), 0
+    which = INVERSE + 1 - ascending
+    if w > t.domain[which, 1]:
+        if w > t.domain[which, 1] + t.edge[which, 1]:
+            return t.limits[DRIVE_MAX] + 1, 1 if w > t.argument[which, 1] else 0
+        return t.limits[DRIVE_MAX], 0
+    if w < t.domain[which, 0]:
+        if w < t.domain[which, 0] - t.edge[which, 0]:
+            return t.limits[DRIVE_MIN] - 1, 1 if w < t.argument[which, 0] else 0
+        return t.limits[DRIVE_MIN], 0
+    return nearest(curve(t, which, w), t.below[which]), 0

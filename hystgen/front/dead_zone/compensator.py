@@ -1,0 +1,27 @@
+"""Dead zones in floating point: `c_runtime/dead_zone_forward.c` and `dead_zone_inverse.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.front.stage import StageTables
+
+
+@jit
+def dead_zone(t: StageTables, first: int, n: int, x: Any, inverse: int) -> Any:
+    """Follow the straight piece that x lies on; the tables of the inverse are those of the forward map swapped."""
+    d = t.stage_data
+    breaks = first + n * inverse
+    anchor_in = first + 2 * n + (n + 1) * inverse
+    anchor_out = first + 2 * n + (n + 1) * (1 - inverse)
+    slope = first + 2 * n + 2 * (n + 1) + (n + 1) * inverse
+    low = 0
+    high = n
+    while low < high:
+        middle = (low + high) // 2
+        if x >= d[breaks + middle]:
+            low = middle + 1
+        else:
+            high = middle
+    return d[anchor_out + low] + (x - d[anchor_in + low]) * d[slope + low]

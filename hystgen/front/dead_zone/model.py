@@ -1,0 +1,186 @@
+"""Dead-zone sums: a piecewise straight map in front of the plays, and its inverse."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen.basics.checks import numbers
+from hystgen.basics.problems import NotInvertibleError
+
+Array = NDArray[np.float64]
+
+
+class Pieces(NamedTuple):
+    """A piecewise straight map: breaks and the values there, and of each piece a point and the slope."""
+
+    breaks: tuple[float, ...]
+    values: tuple[float, ...]
+    anchors: tuple[tuple[float, float], ...]
+    slopes: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class DeadZone:
+    """Dead-zone sum `w = eta_0 v + sum eta_j S_(rho_j)(v)` (41).
+
+    `thresholds`: rho, strictly rising, containing 0; `weights`: eta, same length. Raises ValueError otherwise.
+    """
+
+    thresholds: Sequence[float]
+    weights: Sequence[float]
+
+    def __post_init__(self) -> None:
+        thresholds = numbers(self.thresholds, "thresholds")
+        weights = numbers(self.weights, "weights")
+        if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
+            raise ValueError("dead-zone thresholds rise strictly and contain 0")
+        if len(weights) != len(thresholds):
+            raise ValueError(f"{len(thresholds)} thresholds but {len(weights)} weights")
+        object.__setattr__(self, "thresholds", thresholds)
+        object.__setattr__(self, "weights", weights)
+
+    @property
+    def branches_differ(self) -> bool:
+        """One curve for both directions."""
+        return False
+
+    @cached_property
+    def breaks(self) -> tuple[float, ...]:
+        """The places where the slope changes: all thresholds but 0."""
+        return tuple(r for r in self.thresholds if r != 0.0)
+
+    @cached_property
+    def piece_slopes(self) -> tuple[float, ...]:
+        """Slopes of the straight pieces, one more than there are breaks: the partial sums of the weights."""
+        zero = self.thresholds.index(0.0)
+        eta = self.weights
+        left = [math.fsum(eta[j : zero + 1]) for j in range(zero)]
+        right = [math.fsum(eta[zero : j + 1]) for j in range(zero + 1, len(eta))]
+        return (*left, eta[zero], *right)
+
+    @cached_property
+    def anchors(self) -> tuple[tuple[float, float], ...]:
+        """A point of each piece: its break next to zero, or the origin for the piece that contains it."""
+        middle = sum(1 for b in self.breaks if b < 0)
+        points = []
+        for j in range(len(self.piece_slopes)):
+            k = j if j < middle else j - 1
+            points.append((0.0, self._value(0.0)) if j == middle else (self.breaks[k], self._values[k]))
+        return tuple(points)
+
+    def _value(self, x: float) -> float:
+        if math.isinf(x):  # the end piece decides, its terms may cancel
+            slope = self.piece_slopes[-1 if x > 0 else 0]
+            return slope * x if slope else self.anchors[-1 if x > 0 else 0][1]
+        rho, eta, least, most = self._terms
+        return math.fsum((eta * np.clip(x - rho, least, most)).tolist())
+
+    @cached_property
+    def _terms(self) -> tuple[Array, Array, Array, Array]:
+        """rho, eta, and the least and largest value of `x - rho` in each term."""
+        rho, eta = np.array(self.thresholds), np.array(self.weights)
+        return rho, eta, np.where(rho > 0, 0.0, -math.inf), np.where(rho < 0, 0.0, math.inf)
+
+    @cached_property
+    def _values(self) -> tuple[float, ...]:
+        """Values at the breaks."""
+        return tuple(map(self._value, self.breaks))
+
+    @cached_property
+    def _all_pieces(self) -> tuple[Array, Array, Array]:
+        """Breaks, anchors and slopes as arrays."""
+        return np.array(self.breaks), np.array(self.anchors), np.array(self.piece_slopes)
+
+    def forward(self, x: ArrayLike, ascending: bool = True) -> Array:
+        """Value at x; both directions share it."""
+        points = np.asarray(x, dtype=np.float64)
+        breaks, anchors, slopes = self._all_pieces
+        piece = np.searchsorted(breaks, points, side="right")
+        anchor = anchors[piece]
+        return np.asarray(anchor[..., 1] + (points - anchor[..., 0]) * slopes[piece])
+
+    def inverse_map(self) -> DeadZone:
+        """The dead-zone sum that undoes this one: thresholds tau (53)(55), weights mu (54)(56).
+
+        Raises NotInvertibleError unless every partial sum of the weights is positive.
+        """
+        problems = self.inverse_problems(-math.inf, math.inf)
+        if problems:
+            raise NotInvertibleError(problems)
+        zero = self.thresholds.index(0.0)
+        slopes = self.piece_slopes
+        mu = []
+        for j in range(len(self.weights)):
+            if j == zero:
+                mu.append(1.0 / slopes[j])
+            else:
+                outer, inner = slopes[j], slopes[j + 1] if j < zero else slopes[j - 1]
+                mu.append(-self.weights[j] / (outer * inner))
+        return DeadZone([self._value(rho) for rho in self.thresholds], mu)
+
+    def inverse(
+        self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
+    ) -> Array:
+        """The x in [low, high], where the map has to rise, that has the value y; beyond it the end pieces go on."""
+        ends, anchors, slopes = self._inverses(low, high)
+        values = np.asarray(y, dtype=np.float64)
+        piece = np.searchsorted(ends, values, side="right")
+        anchor = anchors[piece]
+        return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / slopes[piece])
+
+    def _inverses(self, low: float, high: float) -> tuple[Array, Array, Array]:
+        """Values at the breaks, anchors and slopes of `over` as arrays, made once for each range."""
+        if (low, high) not in self._inverted:
+            kept = self.over(low, high)
+            self._inverted[low, high] = np.array(kept.values), np.array(kept.anchors), np.array(kept.slopes)
+        return self._inverted[low, high]
+
+    @cached_property
+    def _inverted(self) -> dict[tuple[float, float], tuple[Array, Array, Array]]:
+        return {}
+
+    def over(self, low: float, high: float) -> Pieces:
+        """The straight pieces that [low, high] touches; the first and the last go on beyond it."""
+        first, last = self._pieces(low, high)[0], self._pieces(low, high)[-1]
+        breaks = self.breaks[first:last]
+        return Pieces(
+            breaks,
+            self._values[first:last],
+            self.anchors[first : last + 1],
+            self.piece_slopes[first : last + 1],
+        )
+
+    def _pieces(self, low: float, high: float) -> range:
+        first = bisect.bisect_right(self.breaks, low)
+        last = bisect.bisect_left(self.breaks, high)
+        return range(first, max(first, last) + 1)
+
+    def image(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
+        """Least and largest value over [low, high]; they lie at the ends or at breaks."""
+        inside = slice(bisect.bisect_right(self.breaks, low), bisect.bisect_left(self.breaks, high))
+        values = (self._value(low), self._value(high), *self._values[inside])
+        return min(values), max(values)
+
+    def slope_range(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
+        """Least and largest slope of the pieces that [low, high] touches."""
+        slopes = [self.piece_slopes[j] for j in self._pieces(low, high)]
+        return min(slopes), max(slopes)
+
+    def inverse_problems(self, low: float, high: float) -> list[str]:
+        """The pieces inside [low, high] whose partial sum of weights is not positive."""
+        edges = (-math.inf, *self.breaks, math.inf)
+        return [
+            f"the dead-zone weights sum to {self.piece_slopes[j]:.6g} between {max(edges[j], low):.6g} and "
+            f"{min(edges[j + 1], high):.6g}, every partial sum with eta_0 has to be positive"
+            for j in self._pieces(low, high)
+            if not self.piece_slopes[j] > 0.0
+        ]

@@ -1,0 +1,1 @@
+"""Tanh envelopes."""

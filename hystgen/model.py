@@ -1,0 +1,233 @@
+"""What `hystgen.load` gives: the parameters of a model and the chain that they describe."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import arguments
+from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
+from hystgen.cascade import PI, Cascade
+from hystgen.compensator import engines, tables
+from hystgen.compensator.session import Session
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.front.stage import Stage
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.parameters.files import Parameters, load_parameters
+
+if TYPE_CHECKING:
+    from hystgen.chain.chain import Chain
+    from hystgen.compensator.layout import FixedTables, Tables
+    from hystgen.effects import Effect, Run
+
+
+def cascade_of(parameters: Parameters) -> Cascade:
+    """The mathematical model that a parameter file describes."""
+    part = parameters.model
+    stages: list[Stage] = []
+    for stage in part.memoryless:
+        if stage.kind == "dead_zone":
+            stages.append(DeadZone(stage.thresholds, stage.weights))
+        else:
+            up, down = stage.ascending, stage.descending or stage.ascending
+            stages.append(
+                TanhEnvelope((up.a0, up.a1, up.a2, up.a3), (down.a0, down.a1, down.a2, down.a3))
+            )
+    pi = PI(part.pi.thresholds, part.pi.weights, part.pi.initial_state)
+    return Cascade(pi, tuple(stages), part.output_offset, parameters.input_range)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A model as its parameter file gives it: `parameters`, and the mathematics in `cascade`."""
+
+    parameters: Parameters
+
+    @cached_property
+    def cascade(self) -> Cascade:
+        """Stages, play sum, offset and input range."""
+        return cascade_of(self.parameters)
+
+    @property
+    def name(self) -> str:
+        """C identifier that prefixes every emitted symbol."""
+        return self.parameters.name
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Effects beyond the static model, as in the parameter file."""
+        return self.parameters.model.effects
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The static model with its effects."""
+        from hystgen.chain.chain import Chain
+
+        return Chain(self.cascade, self.effects)
+
+    def need_static(self, what: str) -> None:
+        """Raise UnsupportedEffectsError if the model has effects: `what` (`the inverse`) does not cover them yet."""
+        if self.effects:
+            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
+            raise UnsupportedEffectsError(
+                f"{what} of a model with effects ({names}) is not supported yet; remove model.effects, or simulate "
+                "the model forward in double precision"
+            )
+
+    def engine(
+        self,
+        engine: str | None = None,
+        operator: str | None = None,
+        arithmetic: str | None = None,
+        optimize: str | None = None,
+    ) -> str:
+        """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
+        emit = self.parameters.emit
+        about = (operator or emit.operator, arithmetic or emit.arithmetic)
+        return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
+
+    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables:
+        """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
+        return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
+
+    @property
+    def _lsb(self) -> tuple[float | None, float | None]:
+        return self.parameters.emit.drive_lsb, self.parameters.emit.output_lsb
+
+    def session(
+        self, operator: str = "forward", arithmetic: str | None = None, engine: str | None = None, clamp: bool = False
+    ) -> Session:
+        """An instance of an operator that keeps its memory from record to record."""
+        self.need_static("a sample-by-sample operator" if arithmetic is None else "the bit reference")
+        if arithmetic is not None:
+            check_arithmetic(arithmetic)
+            chosen = self.engine(engine, arithmetic=arithmetic)
+            return Session(self.cascade, operator, arithmetic, chosen, clamp, self._lsb)
+        return Session(self.cascade, operator, clamp=clamp)
+
+    def simulate(
+        self,
+        v: ArrayLike,
+        arithmetic: str | None = None,
+        clamp: bool = False,
+        engine: str | None = None,
+        *,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
+    ) -> NDArray[Any]:
+        """Output (N,) for the drive samples `v` (N,) from the start memory.
+
+        Without `arithmetic` in double precision, unlimited unless `clamp`. With 'float32', 'float64', 'q31' or 'q15'
+        the bit reference of the emitted C, which limits the drive to `input_range`; fixed point takes and gives codes.
+
+        Only effects see time: `t` (N,) in seconds, rising, or the parameter file's `sample_time`; and `extra`, further
+        columns (N,) such as `temperature`. Everything starts at rest at the first sample. Raises EffectsError for what
+        they need and do not get, UnsupportedEffectsError for effects in an `arithmetic`.
+        """
+        if not self.effects:
+            return self.session("forward", arithmetic, engine, clamp).run(v)[0]
+        if arithmetic is not None:
+            self.need_static("the bit reference")
+        return self.chain.simulate([self.run(v, t, extra, clamp)])[0]
+
+    def run(
+        self,
+        v: ArrayLike,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
+        clamp: bool = False,
+        rest: float = 0.0,
+    ) -> Run:
+        """A record as `chain.simulate` takes it; arguments as for `simulate`, `rest` in seconds before it."""
+        from hystgen.effects import Run
+
+        drive = np.array(arguments.signal("v", v), dtype=np.float64)
+        low, high = self.cascade.input_range
+        period = self.parameters.sample_time or 1.0
+        if t is None and self.parameters.sample_time is None and any(effect.timed for effect in self.effects):
+            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects if effect.timed))
+            raise EffectsError(f"the effects ({names}) need time; give t, or sample_time in the parameter file")
+        times = np.array(np.arange(len(drive)) * period if t is None else arguments.signal("t", t), dtype=np.float64)
+        if not isinstance(extra or {}, Mapping):
+            raise TypeError(f"extra is a mapping of names to arrays, not {arguments.kind(extra)}")
+        columns = {
+            name: np.array(arguments.signal(name, values), dtype=np.float64) for name, values in (extra or {}).items()
+        }
+        for name, values in (("v", drive), ("t", times), *columns.items()):
+            if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
+                raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one a sample of v")
+        if np.any(np.diff(times) <= 0.0):
+            raise EffectsError("t has to rise from sample to sample")
+        return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
+
+    def inverse(self) -> InverseModel:
+        """The compensator. Raises NotInvertibleError with the reasons and ranges, UnsupportedEffectsError."""
+        self.need_static("the inverse")
+        self.cascade.inverse()
+        return InverseModel(self)
+
+
+@dataclass(frozen=True)
+class InverseModel:
+    """The compensator of a model: reference in, drive out."""
+
+    forward: Model
+
+    def simulate(
+        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None
+    ) -> NDArray[Any]:
+        """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`."""
+        return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
+
+    def inverse(self) -> Model:
+        """The model that this compensates."""
+        return self.forward
+
+
+def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] | type[Effect]] = ()) -> Model:
+    """The model of a parameter file; `effects`: files, or classes, of effects of the user's own that it names.
+
+    Raises ParameterError with every problem in the file, EffectsError for a file of effects that cannot be used; warns
+    of a start memory that had to be projected.
+    """
+    path = arguments.path("the parameter file", path)
+    model = Model(load_parameters(path, _own_effects(effects)))
+    if model.cascade.pi.projected:
+        warnings.warn(
+            f"{os.fspath(path)}: model.pi.initial_state cannot have come from any input; moved to the nearest "
+            "admissible memory (entry 1 kept)",
+            stacklevel=2,
+        )
+    return model
+
+
+def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
+    if isinstance(sources, str | os.PathLike) or not isinstance(sources, Iterable):
+        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect.py']")
+    found: list[type[Effect]] = []
+    for source in sources:
+        from hystgen.effects.user import load_user_effects  # no effect, no import: `hystgen emit` has to start fast
+
+        found += [source] if isinstance(source, type) else load_user_effects(arguments.path("effects", source))
+    return found
+
+
+def check_arithmetic(arithmetic: str) -> None:
+    """Raise FormatError for an arithmetic that there is not."""
+    if arithmetic not in ARITHMETICS:
+        raise FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(ARITHMETICS)}")
+
+
+def as_model(source: Model | str | os.PathLike[str]) -> Model:
+    """The model, or that of a parameter file. Raises ParameterError, and TypeError for what is neither."""
+    if not isinstance(source, Model | str | os.PathLike):
+        raise TypeError(f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}")
+    return source if isinstance(source, Model) else load(source)

@@ -1,0 +1,297 @@
+"""The parameter file's structure: frozen pydantic models with the names of the YAML keys, and their JSON Schema.
+
+Only what can be said of one value by itself is said here; how values must fit together is in `param_checks`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+from hystgen.basics.names import MAX_NAME, NAME_PATTERN
+from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Number, Positive
+
+MAX_STAGES = 16
+MAX_EFFECTS = 64
+MAX_DESCRIPTION = 500
+MAX_UNIT = 40
+
+STAGE_KINDS = ("dead_zone", "tanh")
+
+_MEMBER = "\0member "
+MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
+"""Names of union members: steps of pydantic's locations that are no keys of the file."""
+
+
+def _whole(value: Any) -> Any:
+    if type(value) is not int:  # true and 1.0 are equal to 1
+        raise PydanticCustomError("literal_error", "must be 1")
+    return value
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Units(_Part):
+    """Units of the drive and of the displacement, as they appear in comments, plots and reports."""
+
+    input: str = Field(default="", max_length=MAX_UNIT, description="unit of the drive", examples=["V"])
+    output: str = Field(default="", max_length=MAX_UNIT, description="unit of the displacement", examples=["um"])
+
+
+class DensityTable(_Part):
+    """Points of a piecewise linear density that is zero outside them."""
+
+    r: tuple[NotNegative, ...] = Field(
+        min_length=2, max_length=MAX_PLAYS, description="thresholds, strictly rising, input units"
+    )
+    p: tuple[NotNegative, ...] = Field(
+        min_length=2, max_length=MAX_PLAYS, description="density there, as many values as r"
+    )
+
+
+class DensityParameters(_Part):
+    """Density p(r) of the continuous model: a formula or a table, cut into n plays or as many as a tolerance needs."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "allOf": [
+                {
+                    "oneOf": [
+                        {"required": ["formula", "r_max"], "not": {"required": ["table"]}},
+                        {"required": ["table"], "not": {"anyOf": [{"required": ["formula"]}, {"required": ["r_max"]}]}},
+                    ]
+                },
+                {"oneOf": [{"required": ["n"]}, {"required": ["tolerance"]}]},
+            ]
+        }
+    )
+
+    formula: str | None = Field(
+        default=None,
+        max_length=1000,
+        description="p(r) >= 0, from + - * / ** ( ) r numbers exp log sqrt sin cos tanh",
+        examples=["0.8*exp(-0.3*r)"],
+    )
+    table: DensityTable | None = Field(default=None, description="p(r) as points, in place of a formula")
+    p0: NotNegative = Field(description="weight of the drive itself (p_0); the inverse needs more than 0")
+    r_max: Positive | None = Field(default=None, description="last threshold of a formula, input units")
+    n: int | None = Field(default=None, ge=1, le=MAX_PLAYS, description="number of plays")
+    tolerance: Positive | None = Field(
+        default=None, description="largest error of the initial loading curve, output units, in place of n"
+    )
+
+
+def _number_or_list(value: Any) -> str:
+    return _MEMBER + ("list" if isinstance(value, tuple) else "number")
+
+
+class PIParameters(_Part):
+    """Prandtl-Ishlinskii model: thresholds and weights, or a density from which loading makes them."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {"required": ["thresholds", "weights"], "not": {"required": ["density"]}},
+                {
+                    "required": ["density"],
+                    "not": {"anyOf": [{"required": ["thresholds"]}, {"required": ["weights"]}]},
+                },
+            ]
+        }
+    )
+
+    thresholds: tuple[NotNegative, ...] = Field(
+        default=(), min_length=1, max_length=MAX_PLAYS + 1, description="r_0 = 0 first, strictly rising, input units"
+    )
+    weights: tuple[NotNegative, ...] = Field(
+        default=(),
+        min_length=1,
+        max_length=MAX_PLAYS + 1,
+        description="p_0 .. p_n, as many as thresholds, not all zero",
+    )
+    initial_state: Annotated[
+        Annotated[Number, Tag(_MEMBER + "number")]
+        | Annotated[tuple[Number, ...], Field(min_length=1, max_length=MAX_PLAYS + 1), Tag(_MEMBER + "list")],
+        Discriminator(_number_or_list),
+    ] = Field(default=0.0, description="start memory M0: one number, or one a threshold (the first is ignored)")
+    density: DensityParameters | None = Field(default=None, description="density in place of thresholds and weights")
+
+    _density_errors: tuple[float, float] | None = PrivateAttr(default=None)
+
+    @property
+    def density_error(self) -> float | None:
+        """Bound of the discretised density's error on the initial loading curve, output units; None without one."""
+        return self._density_errors[0] if self._density_errors else None
+
+    @property
+    def density_output_error(self) -> float | None:
+        """Bound of the discretised density's error on the output, any drive and history; None without a density."""
+        return self._density_errors[1] if self._density_errors else None
+
+
+class DeadZoneParameters(_Part):
+    """Sum of dead zones."""
+
+    kind: Literal["dead_zone"]
+    thresholds: tuple[Number, ...] = Field(
+        min_length=1, max_length=MAX_PLAYS, description="strictly rising, 0 among them, units of the stage's input"
+    )
+    weights: tuple[Number, ...] = Field(
+        min_length=1, max_length=MAX_PLAYS, description="as many as thresholds; the one at 0 is the linear part"
+    )
+
+
+class TanhBranch(_Part):
+    """Branch `a0 tanh(a1 v + a2) + a3` of an envelope, with a0 a1 > 0."""
+
+    a0: Number = Field(description="half height")
+    a1: Number = Field(description="inverse width")
+    a2: Number = Field(description="shift of the argument")
+    a3: Number = Field(description="shift of the value")
+
+
+class TanhParameters(_Part):
+    """Tanh envelope: one branch for a rising and one for a falling drive."""
+
+    kind: Literal["tanh"]
+    ascending: TanhBranch = Field(description="branch of a rising drive")
+    descending: TanhBranch = Field(
+        default=cast("TanhBranch", None), description="branch of a falling drive; by default the same"
+    )
+
+    @model_validator(mode="after")
+    def _same_branch(self) -> TanhParameters:
+        if self.descending is None:
+            object.__setattr__(self, "descending", self.ascending)
+        return self
+
+
+def _kind(value: Any) -> str | None:
+    kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
+    return _MEMBER + kind if kind in STAGE_KINDS else None
+
+
+StageParameters = Annotated[
+    Annotated[DeadZoneParameters, Tag(_MEMBER + "dead_zone")] | Annotated[TanhParameters, Tag(_MEMBER + "tanh")],
+    Discriminator(_kind),
+]
+
+
+def _as_list(value: Any) -> Any:
+    return (value,) if isinstance(value, Mapping) else value
+
+
+class ModelParameters(_Part):
+    """What the actuator does: a memoryless front, the Prandtl-Ishlinskii model, an offset, further effects."""
+
+    pi: PIParameters
+    memoryless: Annotated[tuple[StageParameters, ...], BeforeValidator(_as_list)] = Field(
+        default=(),
+        max_length=MAX_STAGES,
+        description="stage in front of pi, or a list of stages in order from the drive",
+    )
+    output_offset: Number = Field(default=0.0, description="added to the model's output, output units")
+    effects: tuple[Any, ...] = Field(
+        default=(), max_length=MAX_EFFECTS, description="effects beyond the static model, in any order"
+    )
+    """Instances of `hystgen.effects.Effect`; their classes are imported when a file names them."""
+
+
+class EmitDefaults(_Part):
+    """Defaults of `hystgen emit`."""
+
+    operator: Literal["inverse", "forward", "both"] = Field(default="inverse", description="operator to emit")
+    arithmetic: Literal["float32", "float64", "q31", "q15"] = Field(
+        default="float32", description="number format of the C"
+    )
+    engine: Literal["auto", "corners", "loop"] = Field(default="auto", description="how the play sum is evaluated")
+    optimize: Literal["auto", "speed", "size"] = Field(
+        default="auto", description="what engine auto chooses for: instructions, code, or both weighed"
+    )
+    drive_lsb: Positive | None = Field(default=None, description="fixed point: input units per code")
+    output_lsb: Positive | None = Field(default=None, description="fixed point: output units per code")
+
+
+class Parameters(_Part):
+    """Parameter file of hystgen: one hysteresis model and how to emit it.
+
+    Built by `load_parameters`, `parse_parameters` and `make_parameters`, which also check how values fit together.
+    """
+
+    hystgen: Annotated[Literal[1], BeforeValidator(_whole)] = Field(description="format version")
+    name: str = Field(
+        description="prefix of every emitted C symbol, in upper case of every macro, and name of the files",
+        json_schema_extra={"pattern": NAME_PATTERN, "maxLength": MAX_NAME},
+        examples=["stage_x"],
+    )
+    description: str = Field(default="", max_length=MAX_DESCRIPTION, description="what the model describes")
+    units: Units = Field(default=Units(), description="units for comments, plots and reports")
+    sample_time: Positive | None = Field(
+        default=None, description="period at which the emitted step is called, in seconds", examples=[5.0e-5]
+    )
+    input_range: tuple[Number, Number] = Field(
+        description="lowest and highest drive the actuator may see, input units", examples=[[0.0, 100.0]]
+    )
+    model: ModelParameters = Field(description="what the actuator does")
+    emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
+
+
+_EXAMPLE = {
+    "hystgen": 1,
+    "name": "stage_x",
+    "description": "P-885 stack, axis X",
+    "units": {"input": "V", "output": "um"},
+    "sample_time": 5.0e-5,
+    "input_range": [0.0, 100.0],
+    "model": {"pi": {"thresholds": [0.0, 0.45, 0.9], "weights": [0.72, 0.6, 0.48], "initial_state": 0.0}},
+    "emit": {"operator": "inverse", "arithmetic": "float32", "engine": "auto"},
+}
+
+
+def schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of the parameter file in its YAML form, for editors."""
+    made = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **_tidy(Parameters.model_json_schema()),
+        "title": "hystgen parameter file",
+        "description": "One hysteresis model and how to emit it.",
+        "examples": [_EXAMPLE],
+    }
+    stages = made["$defs"]["ModelParameters"]["properties"]["memoryless"]
+    several = {key: stages.pop(key) for key in ("type", "items", "maxItems")}
+    stages["anyOf"] = [several["items"], several]
+    made["$defs"]["ModelParameters"]["properties"]["effects"]["items"] = {"anyOf": _effects(made["$defs"])}
+    return made
+
+
+def _effects(definitions: dict[str, Any]) -> list[dict[str, Any]]:
+    """Schemas of the shapes of all effects, put among the definitions; a user's own has any keys."""
+    from hystgen import effects
+
+    found: list[dict[str, Any]] = []
+    for name in effects.CATALOGUE:
+        for shape in effects.shapes(name):
+            definitions[shape.__name__] = _tidy(shape.model_json_schema())
+            found.append({"$ref": f"#/$defs/{shape.__name__}"})
+    own = {"type": "string", "pattern": "^user:.", "description": "an effect of the user's own, with its keys"}
+    return [*found, {"type": "object", "required": ["name"], "properties": {"name": own}}]
+
+
+def _tidy(node: Any) -> Any:
+    """Without what only Python needs: titles of fields, null as a value, defaults that stand for nothing."""
+    if isinstance(node, list):
+        return [_tidy(entry) for entry in node]
+    if not isinstance(node, dict):
+        return node
+    if {"type": "null"} in node.get("anyOf", ()):
+        value, _ = node["anyOf"]
+        node = {**value, **{key: entry for key, entry in node.items() if key != "anyOf"}}
+    unneeded = {"default"} if isinstance(node.get("default"), dict | list | None) else set()
+    if isinstance(node.get("title"), str):
+        unneeded.add("title")
+    return {key: _tidy(entry) for key, entry in node.items() if key not in unneeded}

@@ -1,0 +1,1 @@
+"""Planning: the drive records that a diagnosis needs."""

@@ -1,0 +1,196 @@
+"""The plays of the corner engine in fixed point: `c_runtime/corners_fixed.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.plays.corners.memory import DEPTH, INPUT, NEXT, OUTPUT, RISING, FixedMemory, K, Reals
+from hystgen.plays.fixed import FixedPlayTables, over_slope
+from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN
+
+INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
+
+Kink = tuple[Any, Any, int, int]
+"""`hystgen_kink_t`: output, input, plays that follow from there on, corners that hold the others."""
+
+FAR = 1 << 62
+
+
+@jit(inline=True)
+def along(m: FixedMemory, x: Any) -> Any:
+    """x as the present move sees it: a falling move is a rising one with all signs changed."""
+    return x if m.counts[RISING] else -x
+
+
+@jit
+def leave_corner(m: FixedMemory) -> None:
+    """Leave a corner here."""
+    c = m.counts[DEPTH]
+    m.output[c] = m.real[OUTPUT]
+    m.input[c] = m.real[INPUT]
+    m.top[c] = m.counts[K]
+    m.rose[c] = m.counts[RISING]
+    m.counts[DEPTH] += 1
+
+
+@jit
+def turn_back(m: FixedMemory) -> None:
+    """Turn; a corner stays where plays have followed."""
+    if m.counts[K] > 0:
+        leave_corner(m)
+        m.counts[K] = 0
+    m.counts[RISING] = 1 - m.counts[RISING]
+
+
+@jit
+def find(t: FixedPlayTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
+    """The last place on the present move where another play begins to follow before the output, or the input, is x; or
+    the present one."""
+    rising = m.counts[RISING]
+    held, whole = (m.output, t.reach) if by_output else (m.input, t.way)
+    to = along(m, x)
+    c = -1
+    low = 0
+    left = m.counts[DEPTH]
+    k = m.counts[K]
+    while low < left:
+        middle = (low + left) // 2
+        if to - along(m, held[middle]) >= (0 if m.rose[middle] == rising else whole[m.top[middle]]):
+            left = middle
+        else:
+            low = middle + 1
+    if left < m.counts[DEPTH]:
+        c = left
+        k = m.top[c]
+    if left > 0 and m.rose[left - 1] != rising:
+        top = left - 1
+        on = to - along(m, held[top])
+        before = k
+        last = m.top[top] - 1
+        while k < last:
+            middle = (k + last) // 2 + 1
+            if on >= whole[middle]:
+                k = middle
+            else:
+                last = middle - 1
+        c = top if k > before else c
+    if c < 0:
+        return m.real[OUTPUT], m.real[INPUT], k, left
+    if m.rose[c] == rising:
+        return m.output[c], m.input[c], k, left
+    return m.output[c] + along(m, t.reach[k]), m.input[c] + along(m, t.way[k]), k, left
+
+
+@jit
+def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
+    """The same for any move to an input; turns, moves nothing."""
+    if along(m, to - m.real[INPUT]) < 0:
+        turn_back(m)
+    return find(t, m, to, False)
+
+
+@jit
+def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
+    """Move the plays on from a kink to an input at which the same ones follow; `moved` is the output between."""
+    m.real[OUTPUT] = kink[0] + along(m, moved)
+    m.real[INPUT] = to
+    m.counts[K] = kink[2]
+    m.counts[DEPTH] = kink[3]
+
+
+@jit
+def gained(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """Output that is gained from a kink on until the input comes to `to`, which may lie before it."""
+    way = along(m, to - kink[1])
+    return -1 if way < 0 else t.slope[kink[2] + 1] * way
+
+
+@jit
+def move_to_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> None:
+    """Move the plays to any input."""
+    kink = find_input(t, m, to)
+    go_on(m, kink, to, gained(t, m, kink, to))
+
+
+@jit
+def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
+    """Input at which another play begins to follow the present move, or the last one there is."""
+    x = INPUT_MOST
+    c = m.counts[DEPTH] - 1
+    if c >= 0:
+        begins = along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[m.counts[K] + 1])
+        x = begins if begins < x else x
+    return along(m, x)
+
+
+@jit(inline=True)
+def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
+    """The sum of the plays for the next input."""
+    at = m.real[INPUT]
+    if at < to < m.real[NEXT] if m.counts[RISING] else m.real[NEXT] < to < at:
+        m.real[OUTPUT] += t.slope[m.counts[K] + 1] * (to - at)
+        m.real[INPUT] = to
+    elif to != at:
+        move_to_input(t, m, to)
+        m.real[NEXT] = next_input(t, m)
+    return m.real[OUTPUT]
+
+
+@jit
+def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
+    """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing.
+    Short of `following`, an output as the present move sees it, the same plays are known to follow."""
+    if along(m, output - m.real[OUTPUT]) < 0:
+        turn_back(m)
+        kink = find(t, m, output, True)
+    elif along(m, output) < following:
+        kink = (m.real[OUTPUT], m.real[INPUT], m.counts[K], m.counts[DEPTH])
+    else:
+        kink = find(t, m, output, True)
+    x = along(m, kink[1]) + over_slope(t, along(m, output - kink[0]), kink[2] + 1)
+    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
+    return along(m, most if x > most else x), kink
+
+
+@jit
+def next_output(t: FixedPlayTables, m: FixedMemory, depth: int, k: int) -> Any:
+    """Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left."""
+    if depth == 0:
+        return FAR
+    c = depth - 1
+    return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k + 1])
+
+
+@jit
+def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
+    at which another one begins to follow."""
+    following = next_output(t, m, kink[3], kink[2])
+    moved = gained(t, m, kink, to)
+    if moved < 0 or along(m, kink[0]) + moved > following:  # by rounding, or it was limited
+        kink = find_input(t, m, to)
+        following = next_output(t, m, kink[3], kink[2])
+        moved = gained(t, m, kink, to)
+    go_on(m, kink, to, moved)
+    return following
+
+
+@jit
+def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
+    """Start memory: what each play holds, or all of them. Each is a block of its own, as if left by a move that ended
+    where the play begins to follow."""
+    aside = t.limits[OFFSET]
+    m.counts[DEPTH] = 0
+    for k in range(len(t.threshold) - 1, 0, -1):
+        w = play[k if len(play) > 1 else 0]
+        m.counts[K] = k
+        m.counts[RISING] = 1 if w + t.threshold[k] <= INPUT_MOST else 0
+        m.real[INPUT] = w + along(m, t.threshold[k])
+        m.real[OUTPUT] = aside + w * t.slope[k + 1] + along(m, t.start_level[k])
+        leave_corner(m)
+        aside = aside + w * (t.slope[k + 1] - t.slope[k])
+    m.counts[K] = 0
+    m.counts[RISING] = 1
+    m.real[INPUT] = play[0]
+    m.real[OUTPUT] = aside + play[0] * t.slope[1]

@@ -1,0 +1,239 @@
+"""The plays of the corner engine in floating point: `c_runtime/corners_float.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.plays.corners.memory import (
+    BASE,
+    BEGIN,
+    BOTTOM,
+    CAP,
+    DEPTH,
+    FROM,
+    GAIN,
+    HALF,
+    INPUT,
+    LIMITED,
+    MOST,
+    NEXT,
+    ONE,
+    OUTPUT,
+    RISING,
+    SIGN,
+    START,
+    ZERO,
+    Curve,
+    K,
+    Memory,
+    Reals,
+    Start,
+)
+
+
+@jit(inline=True)
+def along(m: Memory, x: Any) -> Any:
+    """x as the present move sees it: a falling move is a rising one with all signs changed."""
+    return m.real[SIGN] * x
+
+
+@jit(inline=True)
+def forget_line(t: Curve, m: Memory) -> None:
+    """There is no line to go on along: the next sample searches."""
+    m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
+    m.real[NEXT] = m.real[INPUT]
+    m.real[CAP] = m.real[INPUT]
+
+
+@jit
+def leave_corner(t: Curve, m: Memory) -> None:
+    """Leave a corner here. A block whose last play follows beyond the limit only is never passed."""
+    rising = m.counts[RISING]
+    k = m.counts[K]
+    c = m.counts[DEPTH]
+    x = along(m, m.real[INPUT])
+    room = t.limit[1 - rising] + along(m, m.real[OUTPUT])
+    m.output[c] = m.real[OUTPUT]
+    m.passed[c, rising] = x
+    m.passed[c, 1 - rising] = t.constant[MOST] if t.reach[k] > room else t.way[k] - x
+    m.top[c] = k
+    m.rose[c] = rising
+    m.counts[DEPTH] += 1
+
+
+@jit
+def turn_back(t: Curve, m: Memory) -> None:
+    """Turn; a corner stays where plays have followed."""
+    if m.counts[K] > 0:
+        leave_corner(t, m)
+        m.counts[K] = 0
+    m.counts[RISING] = 1 - m.counts[RISING]
+    m.counts[LIMITED] = 0
+    m.real[SIGN] = -m.real[SIGN]
+
+
+@jit
+def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
+    """The last of segments k .. last that begins before `way`; `step` are all ways, or all reaches."""
+    while k < last:
+        middle = (k + last) // 2
+        if way > step[middle + 1]:
+            k = middle + 1
+        else:
+            last = middle
+    return k
+
+
+@jit
+def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
+    """Stop the present move inside the top corner's block: where the sum is `output`, or before that at `to`."""
+    c = m.counts[DEPTH] - 1
+    rising = m.counts[RISING]
+    reach = along(m, output - m.output[c])
+    x = m.passed[c, rising]
+    k = m.counts[K]
+    if m.rose[c] != rising:
+        k = find_segment(t.reach, k, m.top[c] - 1, reach)
+        reach = reach - t.reach[k]
+        x = t.way[k] - m.passed[c, 1 - rising]
+    x = x + reach * t.slope[k]
+    m.real[INPUT] = along(m, x) if x < along(m, to) else to
+    m.real[OUTPUT] = output
+    m.counts[K] = k
+    forget_line(t, m)
+
+
+@jit
+def move_to_output(t: Curve, m: Memory, output: Any) -> None:
+    """Move the plays to where their sum is `output`, as nearly as floating point can tell."""
+    if along(m, output) < along(m, m.real[OUTPUT]):
+        turn_back(t, m)
+    rising = m.counts[RISING]
+    kept = 0
+    while m.counts[DEPTH] - kept > 1:
+        middle = (kept + m.counts[DEPTH]) // 2
+        reach = t.constant[ZERO] if m.rose[middle] == rising else t.reach[m.top[middle]]
+        if along(m, output - m.output[middle]) >= reach:
+            m.counts[DEPTH] = middle
+            m.counts[K] = m.top[middle]
+        else:
+            kept = middle
+    m.counts[LIMITED] = 0
+    stop_in_block(t, m, output, along(m, t.constant[MOST]))
+
+
+@jit
+def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
+    """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
+    x = along(m, to)
+    if x < along(m, m.real[INPUT]):
+        turn_back(t, m)
+        x = -x
+    rising = m.counts[RISING]
+    passed = m.counts[DEPTH] - 1
+    if passed > 0 and x >= m.passed[passed, rising]:
+        kept = 0
+        while passed - kept > 1:
+            middle = (kept + passed) // 2
+            if x >= m.passed[middle, rising]:
+                passed = middle
+            else:
+                kept = middle
+        m.counts[K] = m.top[passed]
+        m.counts[DEPTH] = passed
+    c = m.counts[DEPTH] - 1
+    k = m.counts[K]
+    cap = m.passed[c, rising]
+    after = cap
+    if m.rose[c] == rising:
+        m.real[BEGIN] = along(m, cap)
+        m.real[START] = m.output[c]
+    else:
+        top = m.top[c]
+        k = find_segment(t.way, k, top - 1, x + m.passed[c, 1 - rising])
+        m.real[FROM] = -along(m, m.passed[c, 1 - rising])
+        m.real[BASE] = m.output[c]
+        m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
+        m.real[START] = m.real[BASE] + along(m, t.reach[k])
+        after = t.way[k + 1] - m.passed[c, 1 - rising]
+        cap = t.way[top] - m.passed[c, 1 - rising]
+        room = t.inside[rising] - along(m, m.real[BASE])
+        if t.reach[top] > room:
+            cap = along(m, m.real[BEGIN]) + (room - t.reach[k]) * t.slope[k]
+    m.real[GAIN] = t.gain[k]
+    output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
+    if along(m, output) > t.limit[rising]:
+        return False
+    if along(m, output) < along(m, m.real[OUTPUT]):
+        cap = x
+    else:
+        m.real[OUTPUT] = output
+    cap = t.range[rising] if t.range[rising] < cap else cap
+    m.real[CAP] = along(m, cap)
+    m.real[NEXT] = along(m, after if after < cap else cap)
+    m.counts[K] = k
+    m.real[INPUT] = to
+    return True
+
+
+@jit
+def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
+    """Move on to an input short of CAP: more plays of the same block follow. False where a search is faster."""
+    way = along(m, to - m.real[FROM])
+    k = m.counts[K] + 1
+    many = m.counts[K] + 8
+    while k < many and way > t.way[k + 1]:
+        k += 1
+    m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
+    m.real[START] = m.real[BASE] + along(m, t.reach[k])
+    m.real[GAIN] = t.gain[k]
+    output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
+    if k == many or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
+        return False
+    after = m.real[FROM] + along(m, t.way[k + 1])
+    m.real[NEXT] = after if along(m, after - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
+    m.counts[K] = k
+    m.real[INPUT] = to
+    m.real[OUTPUT] = output
+    return True
+
+
+@jit(inline=True)
+def plays_step(t: Curve, m: Memory, to: Any) -> Any:
+    """The sum of the plays for the next input; a NaN moves nothing."""
+    rising = m.counts[RISING]
+    if to > m.real[INPUT] if rising else to < m.real[INPUT]:
+        if to < m.real[NEXT] if rising else to > m.real[NEXT]:
+            m.real[INPUT] = to
+            m.real[OUTPUT] = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
+            return m.real[OUTPUT]
+        if (to < m.real[CAP] if rising else to > m.real[CAP]) and move_in_block(t, m, to):
+            return m.real[OUTPUT]
+    if to < m.real[INPUT] or to > m.real[INPUT]:
+        move_to_input(t, m, to)
+    return m.real[OUTPUT]
+
+
+@jit
+def start(t: Curve, m: Memory, s: Start) -> None:
+    """Start memory. Each play is a block of its own."""
+    m.output[0] = s.bottom[0]
+    m.passed[0, 0] = s.bottom[1]
+    m.passed[0, 1] = s.bottom[2]
+    m.top[0] = s.top
+    m.rose[0] = BOTTOM
+    m.counts[DEPTH] = 1
+    for k in range(s.top - 1, 0, -1):
+        center = s.center[s.step * k]
+        m.counts[K] = k
+        m.counts[RISING] = 1 if k <= s.risen else 0
+        m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
+        m.real[INPUT] = center[0] + along(m, t.way[k] * t.constant[HALF])
+        m.real[OUTPUT] = center[1] + along(m, t.reach[k] * t.constant[HALF])
+        leave_corner(t, m)
+    m.counts[K] = 0
+    m.counts[RISING] = 1
+    m.real[INPUT] = s.center[0, 0]
+    m.real[OUTPUT] = s.center[0, 1]
+    forget_line(t, m)

@@ -1,0 +1,85 @@
+"""Elastoplastic elements, solved as plasticity in one dimension: what play and stop are in mechanics (7)-(17).
+
+A spring of modulus E and a rigid-plastic slider of yield stress r, side by side or in a row. A step is a return
+mapping: a trial with the slider at rest, which stands where the slider can bear it and is brought back to its yield
+stress otherwise. No operator takes part, so that the elements can tell whether the operators are right.
+
+Of a slider the relation between stress and rate is `stress in r sign(rate)`, set-valued at rest, with the rate of the
+slider's own strain; the note prints the rate of the whole strain in (16).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen.basics.checks import finite, signal
+
+Array = NDArray[np.float64]
+
+
+class Parallel(NamedTuple):
+    """Answer of the parallel element, arrays (N,); the stresses add up to the one applied (7)."""
+
+    strain: Array
+    elastic_stress: Array
+    plastic_stress: Array
+
+
+class Series(NamedTuple):
+    """Answer of the series element, arrays (N,); the strains add up to the one applied (13)."""
+
+    stress: Array
+    elastic_strain: Array
+    plastic_strain: Array
+
+
+def _check(modulus: float, yield_stress: float) -> None:
+    if not (modulus > 0.0 and math.isfinite(modulus)):
+        raise ValueError("a modulus is a positive number")
+    if not (yield_stress >= 0.0 and math.isfinite(yield_stress)):
+        raise ValueError("a yield stress is a number that is not negative")
+
+
+def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: float = 0.0) -> Parallel:
+    """Spring and slider side by side under a given stress (7)-(11); `strain` is that of both before the first sample.
+
+    `stress`: N samples in the unit of `yield_stress`, to which that of `modulus` times that of `strain` comes. The
+    strain is `play_r[stress] / E` (12), the play started at `E strain`. Raises ValueError for a modulus that is not
+    positive, a negative yield stress, and samples or a start that are not finite.
+    """
+    _check(modulus, yield_stress)
+    finite(strain=strain)
+    applied = signal(stress)
+    strains, plastic = np.empty_like(applied), np.empty_like(applied)
+    for k, sigma in enumerate(applied.tolist()):
+        borne = sigma - modulus * strain
+        excess = abs(borne) - yield_stress
+        if excess > 0.0:
+            strain += math.copysign(excess / modulus, borne)
+            borne = math.copysign(yield_stress, borne)
+        strains[k], plastic[k] = strain, borne
+    return Parallel(strains, modulus * strains, plastic)
+
+
+def series(strain: ArrayLike, modulus: float, yield_stress: float, plastic_strain: float = 0.0) -> Series:
+    """Spring and slider in a row under a given strain (13)-(16); `plastic_strain` is the slider's before sample 0.
+
+    `strain`: N samples in the unit of `plastic_strain`, which times that of `modulus` is that of `yield_stress`. The
+    stress is `stop_r[E strain]` (17), the stop started at `E plastic_strain`. Raises ValueError as `parallel` does.
+    """
+    _check(modulus, yield_stress)
+    finite(plastic_strain=plastic_strain)
+    applied = signal(strain)
+    stresses, plastic = np.empty_like(applied), np.empty_like(applied)
+    for k, epsilon in enumerate(applied.tolist()):
+        trial = modulus * (epsilon - plastic_strain)
+        excess = abs(trial) - yield_stress
+        if excess > 0.0:
+            plastic_strain += math.copysign(excess / modulus, trial)
+            trial = math.copysign(yield_stress, trial)
+        stresses[k], plastic[k] = trial, plastic_strain
+    return Series(stresses, applied - plastic, plastic)

@@ -1,0 +1,86 @@
+"""Plays in fixed point: rounding, dividing by a slope with a reciprocal, and solving in engine loop.
+
+Inputs of the plays are whole multiples of a least step, sums are whole multiples of a fraction of the output code, and
+both engines compute the same whole numbers, so that they agree in every bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from hystgen.basics.jit import jit
+from hystgen.plays.loop import PlayTables, State, loop_output
+from hystgen.plays.slots import MARGIN, PLAY_MAX, PLAY_MIN, Reals
+
+
+class FixedPlayTables(PlayTables, Protocol):
+    """What plays need of a model's constants in fixed point."""
+
+    @property
+    def slope(self) -> Reals: ...
+    @property
+    def start_level(self) -> Reals: ...
+    @property
+    def way(self) -> Reals: ...
+    @property
+    def reach(self) -> Reals: ...
+    @property
+    def reciprocal(self) -> Reals: ...
+    @property
+    def shift(self) -> Reals: ...
+
+
+@jit
+def nearest(x: Any, bits: Any) -> Any:
+    """x / 2^bits to the nearest whole number, ties away from zero."""
+    if bits == 0:
+        return x
+    half = 1 << (bits - 1)
+    if x < 0:
+        return (x + half - 1) >> bits
+    return (x + half) >> bits
+
+
+@jit
+def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
+    """d / slope[k] to the nearest whole number, d not negative."""
+    r = t.reciprocal[k]
+    shift = t.shift[k]
+    quotient = (d >> 32) * r + (((d & 0xFFFFFFFF) * r) >> 32)
+    return ((quotient >> (shift - 1)) + 1) >> 1
+
+
+@jit
+def going(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
+    """Input of the plays that is d further on in output than w, kept near the range of the plays' input."""
+    step = over_slope(t, d, k)
+    if rising:
+        most = t.limits[PLAY_MAX] + t.limits[MARGIN]
+        if step > most - w:
+            return most
+        return w + step
+    least = t.limits[PLAY_MIN] - t.limits[MARGIN]
+    if step > w - least:
+        return least
+    return w - step
+
+
+@jit
+def loop_solve(t: FixedPlayTables, s: State, output: Any) -> Any:
+    """Input of the plays that gives `output`, taking along the plays one by one."""
+    here = loop_output(t, s)
+    w = s.play[0]
+    if output == here:
+        return w
+    rising = 1 if output > here else 0
+    left = output - here if rising else here - output
+    k = 1
+    while k < len(s.play):
+        start = s.play[k] + t.threshold[k] if rising else s.play[k] - t.threshold[k]
+        step = t.slope[k] * (start - w if rising else w - start)
+        if left < step:
+            break
+        left = left - step
+        w = start
+        k += 1
+    return going(t, w, left, k, rising)

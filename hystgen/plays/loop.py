@@ -1,0 +1,117 @@
+"""The plays of engine loop: every play in every sample, in floating point, and what fixed point shares with it.
+
+Functions that are written once for Python and C stand in these rooms under the names that they have in `c_runtime/`
+and compute the same operations in the same order in the same arithmetic, so that results are compared for equal bits.
+They know nothing of numpy's or numba's types: they run as plain Python on scalars of the arrays they are given, or
+compiled (see `hystgen.basics.jit`). Real constants come out of arrays because a literal would not have the
+arithmetic's type.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from hystgen.basics.jit import jit
+from hystgen.plays.slots import ZERO, Counts, Reals
+
+PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
+ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5
+
+
+class PlayTables(Protocol):
+    """What memory and plays need of a model's constants, in any arithmetic."""
+
+    @property
+    def threshold(self) -> Reals: ...
+    @property
+    def weight(self) -> Reals: ...
+    @property
+    def limits(self) -> Reals: ...
+
+
+class LoopTables(PlayTables, Protocol):
+    """What solving needs beyond that in floating point."""
+
+    @property
+    def lift(self) -> Reals: ...
+    @property
+    def inverse_slope(self) -> Reals: ...
+
+
+class State(NamedTuple):
+    """One instance: plain arrays."""
+
+    real: Reals
+    counts: Counts
+    play: Reals
+
+
+def new_state(t: PlayTables) -> State:
+    """Memory for one instance of the model; `init` gives it its values."""
+    dtype = t.threshold.dtype
+    return State(real=np.zeros(5, dtype), counts=np.zeros(6, np.int64), play=np.zeros(len(t.threshold), dtype))
+
+
+# ---------------------------------------------------------------- loop_absorb.c, loop_solve.c
+
+
+@jit
+def loop_rest(s: State, w: Any) -> None:
+    """Every play holds w."""
+    for i in range(len(s.play)):
+        s.play[i] = w
+
+
+@jit
+def loop_start(s: State, start: Reals) -> None:
+    """Each play holds its own start value."""
+    for i in range(len(s.play)):
+        s.play[i] = start[i]
+
+
+@jit
+def loop_absorb(t: PlayTables, s: State, w: Any) -> None:
+    """play_r[w] = max(w - r, min(w + r, play)), play by play."""
+    for i in range(len(s.play)):
+        low = w - t.threshold[i]
+        high = w + t.threshold[i]
+        upper = s.play[i]
+        if upper > high:
+            upper = high
+        if upper < low:
+            upper = low
+        s.play[i] = upper
+
+
+@jit
+def loop_output(t: PlayTables, s: State) -> Any:
+    """p_0 play_0 + p_1 play_1 + ..., in this order."""
+    total = t.limits[ZERO]
+    for i in range(len(s.play)):
+        total = total + t.weight[i] * s.play[i]
+    return total
+
+
+@jit
+def loop_solve(t: LoopTables, s: State, output: Any) -> Any:
+    """Input of the plays that gives `output`, letting go of the largest thresholds one by one."""
+    rising = output >= loop_output(t, s)
+    tail = t.limits[ZERO]
+    next_follows = t.limits[ZERO]
+    for last in range(len(s.play) - 1, -1, -1):
+        k = last + 1
+        if rising:
+            first = s.play[last] + t.threshold[last]
+            w = (output - (tail - t.lift[k])) * t.inverse_slope[k]
+        else:
+            first = s.play[last] - t.threshold[last]
+            w = (output - (tail + t.lift[k])) * t.inverse_slope[k]
+        if w >= first if rising else w <= first:
+            if k < len(s.play) and (w > next_follows if rising else w < next_follows):
+                return next_follows
+            return w
+        tail = tail + t.weight[last] * s.play[last]
+        next_follows = first
+    return s.play[0]

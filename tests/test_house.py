@@ -1,0 +1,210 @@
+"""The order of the rooms of `hystgen`: what imports what, at any level and for types alone; and its public names."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import pydoc
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import pytest
+
+import hystgen
+
+PACKAGE = Path(hystgen.__file__).parent
+
+ROOMS = (
+    "basics",
+    "arithmetic",
+    "plays",
+    "front",
+    "effects",
+    "chain",
+    "plants",
+    "parameters",
+    "compensator",
+    "cascade",
+    "model",
+    "records",
+    "simulation",
+    "emission",
+    "verification",
+    "closed_loop",
+    "identification",
+    "fleet",
+    "diagnosis",
+    "planning",
+    "report",
+    "cli",
+    "__main__",
+    "__init__",
+)
+"""Folders and modules of the package, each of which imports only from itself and those above it."""
+
+AGAINST = {("hystgen.diagnosis", "hystgen.report.diagnosis")}
+"""Arrows against the order that are known: `Diagnosis.write` makes its page itself."""
+
+
+def modules(package: Path) -> dict[str, Path]:
+    """Files by the dotted names of their modules."""
+    found = {}
+    for path in package.rglob("*.py"):
+        parts = (package.name, *path.relative_to(package).with_suffix("").parts)
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(name: str, path: Path, known: Mapping[str, Path]) -> Iterator[str]:
+    """Modules of the package that a module imports: on top, inside functions, and for types alone."""
+    top = name.split(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                if alias.name.split(".")[0] == top:
+                    assert alias.name in known, f"{path}:{node.lineno}"
+                    yield alias.name
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{path}:{node.lineno}: write the whole name"
+            assert node.module
+            if node.module.split(".")[0] == top:
+                for alias in node.names:
+                    whole = f"{node.module}.{alias.name}"
+                    yield whole if whole in known else node.module
+
+
+@functools.cache
+def graph() -> dict[str, frozenset[str]]:
+    """Of every module of the package those that it imports."""
+    known = modules(PACKAGE)
+    return {name: frozenset(imports(name, path, known)) - {name} for name, path in known.items()}
+
+
+def room(module: str) -> str:
+    """The room that a module is in."""
+    return (*module.split("."), "__init__")[1]
+
+
+def against(arrows: Mapping[str, frozenset[str]], rooms: Sequence[str]) -> set[tuple[str, str]]:
+    """Imports from a room further down."""
+    return {
+        (name, other)
+        for name, others in arrows.items()
+        for other in others
+        if rooms.index(room(other)) > rooms.index(room(name))
+    }
+
+
+def circles(arrows: Mapping[str, frozenset[str]]) -> list[list[str]]:
+    """Modules in circles, and between two of them, in one list: what is left when modules that import none of the rest,
+    or that none of the rest imports, are taken away again and again."""
+    left = dict(arrows)
+    while True:
+        ends = {name for name, others in left.items() if not others & left.keys()}
+        wanted = {other for others in left.values() for other in others}
+        ends |= left.keys() - wanted
+        if not ends:
+            return [sorted(left)] if left else []
+        left = {name: others for name, others in left.items() if name not in ends}
+
+
+def test_every_room_is_in_the_order() -> None:
+    there = {room(name) for name in graph()}
+    assert there == set(ROOMS)
+    assert len(set(ROOMS)) == len(ROOMS)
+
+
+def test_imports_follow_the_order_of_the_rooms() -> None:
+    assert against(graph(), ROOMS) == AGAINST
+
+
+def test_there_is_no_circle() -> None:
+    """Not even within a room; but for what runs along the known arrows."""
+    arrows = {name: others - {other for one, other in AGAINST if one == name} for name, others in graph().items()}
+    assert circles(arrows) == []
+
+
+def test_what_the_test_of_the_order_sees(tmp_path: Path) -> None:
+    """Arrows and circles in an invented package, whichever way they are written."""
+    package = tmp_path / "made"
+    for path, text in {
+        "__init__.py": "",
+        "low/__init__.py": "",
+        "low/leaf.py": "import os\n",
+        "low/late.py": "def f():\n    from made.high import other\n",
+        "low/typed.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from made.high.other import X\n",
+        "high/__init__.py": "",
+        "high/other.py": "import made.low.leaf\nfrom made.high import round\n",
+        "high/round.py": "from made.high import other\n",
+    }.items():
+        (package / path).parent.mkdir(parents=True, exist_ok=True)
+        (package / path).write_text(text)
+    known = modules(package)
+    arrows = {name: frozenset(imports(name, path, known)) - {name} for name, path in known.items()}
+    assert against(arrows, ("low", "high", "__init__")) == {
+        ("made.low.late", "made.high.other"),
+        ("made.low.typed", "made.high.other"),
+    }
+    assert circles(arrows) == [["made.high.other", "made.high.round"]]
+
+
+def test_effects_are_folders() -> None:
+    """A folder is in the catalogue, and a catalogue entry has a model."""
+    from hystgen.effects import CATALOGUE, shapes
+
+    folders = {path.parent.name for path in (PACKAGE / "effects").glob("*/model.py")}
+    assert set(CATALOGUE) == folders
+    assert all(shapes(name) for name in CATALOGUE)
+
+
+# The front door
+
+
+def public() -> list[str]:
+    return [name for name in hystgen.__all__ if name != "__version__"]
+
+
+def test_public_names_are_those_that_type_checkers_see() -> None:
+    """What `hystgen/__init__.py` imports for types is what it gives at run time."""
+    (block,) = (
+        node
+        for node in ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8")).body
+        if isinstance(node, ast.If)
+    )
+    typed = {}
+    for node in block.body:
+        assert isinstance(node, ast.ImportFrom)
+        for alias in node.names:
+            assert alias.asname == alias.name, "exported"
+            typed[alias.name] = node.module
+    assert typed.keys() == set(public())
+    for name, module in typed.items():
+        code = f"import hystgen\nfrom {module} import {name} as own\nassert hystgen.{name} is own"
+        exec(code, {})
+
+
+def test_dir_and_help_list_the_public_names() -> None:
+    assert set(public()) <= set(dir(hystgen))
+    assert not [name for name in dir(hystgen) if name.startswith("_") and not name.startswith("__")]
+    page = pydoc.plain(pydoc.render_doc(hystgen))
+    for name in public():
+        assert name in page
+
+
+@pytest.mark.parametrize("name", ["emit", "verify", "identify", "diagnose", "plan", "differences"])
+def test_signatures_are_real(name: str) -> None:
+    """Every option stands in the signature with its default, and none is hidden in `**options`."""
+    parameters = inspect.signature(getattr(hystgen, name)).parameters.values()
+    assert len(parameters) > 3
+    assert all(each.kind is not each.VAR_KEYWORD for each in parameters)
+    with pytest.raises(TypeError, match=r"\(\) has no option nonsense"):
+        getattr(hystgen, name)("stage.yaml", nonsense=1)
+
+
+def test_the_package_itself_imports_nothing() -> None:
+    code = "import sys, hystgen; print(*(m for m in sys.modules if m.split('.')[0] in ('hystgen', 'numpy', 'numba')))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert set(loaded) == {"hystgen", "hystgen.basics", "hystgen.basics.version"}
