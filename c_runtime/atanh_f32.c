@@ -1,25 +1,23 @@
 #include "hystgen_runtime.h"
 
 /*
- * atanh x for |x| < 1, without division; anything beyond, NaN too, is taken as the last float below 1.
+ * atanh x for |x| < 1, without division; anything beyond, NaN too, is taken as the last float
+ * below 1.
  *
- * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| = m / 2^k and
- * m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in the distances d and e from
- * the center of a piece of [1, 2); each center is a point whose logarithm is almost a float. k and the pieces are
- * read off 2^24 (1 - |x|), a whole number. fit_coefficients.py derives the numbers. Worst error over all
- * floats: 1.07 ulp, and 0.84 where |x| < 0.999. Odd and nowhere falling; the sign of zero and subnormal numbers
- * are kept.
+ * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| =
+ * m / 2^k and m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in
+ * the distances d and e from the center of a piece of [1, 2); each center is a point whose
+ * logarithm is almost a float. k and the pieces are read off 2^24 (1 - |x|), a whole number.
+ * fit_coefficients.py derives the numbers. Worst error over all floats: 1.07 ulp, and 0.84 where
+ * |x| < 0.999. Odd and nowhere falling; the sign of zero and subnormal numbers are kept.
  */
-static const hystgen_real_t hystgen_atanh_odd[6] = {
-    0.33333296f, 0.20002694f, 0.14220285f, 0.11839814f, 0.050866313f, 0.17726555f
-};
+static const hystgen_real_t hystgen_atanh_odd[6] = {0.33333296f, 0.20002694f,  0.14220285f,
+                                                    0.11839814f, 0.050866313f, 0.17726555f};
 static const hystgen_real_t hystgen_atanh_center[8] = {
-    1.0612793f, 1.1879883f, 1.3120117f, 1.440918f, 1.5683594f, 1.6894531f, 1.8212891f, 1.9360352f
-};
+    1.0612793f, 1.1879883f, 1.3120117f, 1.440918f, 1.5683594f, 1.6894531f, 1.8212891f, 1.9360352f};
 /* center - 1, for the upper half of the pieces */
-static const hystgen_real_t hystgen_atanh_offset[4] = {
-    0.5683594f, 0.6894531f, 0.82128906f, 0.93603516f
-};
+static const hystgen_real_t hystgen_atanh_offset[4] = {0.5683594f, 0.6894531f, 0.82128906f,
+                                                       0.93603516f};
 static const hystgen_real_t hystgen_atanh_row[8][5] = {
     {0.029737532f, 0.47112915f, -0.22196332f, 0.13979696f, -0.098547764f},
     {0.08613068f, 0.42087936f, -0.17713977f, 0.099614635f, -0.06286922f},
@@ -28,8 +26,7 @@ static const hystgen_real_t hystgen_atanh_row[8][5] = {
     {0.22501504f, 0.31880444f, -0.10163531f, 0.043249074f, -0.021028293f},
     {0.26220244f, 0.29595372f, -0.087589204f, 0.03459916f, -0.015269698f},
     {0.29977226f, 0.27453083f, -0.07536596f, 0.02760172f, -0.011743604f},
-    {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}
-};
+    {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
 HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 {
@@ -55,7 +52,8 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
     }
     const unsigned int i = (unsigned int)(m >> 21) & 7u;
     const unsigned int j = (unsigned int)((33554432u - whole) >> 21) & 7u;
-    const hystgen_real_t d = u * (hystgen_real_t)((uint_least32_t)1u << k) - hystgen_atanh_center[i];
+    const hystgen_real_t d =
+        u * (hystgen_real_t)((uint_least32_t)1u << k) - hystgen_atanh_center[i];
     const hystgen_real_t e = a - hystgen_atanh_offset[j - 4u];
 
     const hystgen_real_t *p = hystgen_atanh_row[i];

@@ -1,6 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* One by one, since a copy of all may become a call of memcpy, which a freestanding target need not have. */
+/* One by one, since a copy of all may become a call of memcpy, which a freestanding target need not
+ * have. */
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
 {
     to->output = from->output;
@@ -36,10 +37,11 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last place on the present move where another play begins to follow before the output, or the input, is x; or the
-   present one. */
-HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner,
-                                int64_t x, bool by_output, hystgen_kink_t *kink)
+/* The last place on the present move where another play begins to follow before the output, or the
+   input, is x; or the present one. */
+HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                const hystgen_corner_t *corner, int64_t x, bool by_output,
+                                hystgen_kink_t *kink)
 {
     const int64_t to = hystgen_along(here, x);
     const hystgen_corner_t *c = NULL; /* held play k until it began to follow */
@@ -51,7 +53,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const hystgen_segment_t *s = &t->segment[corner[middle].top];
-        const int64_t on = to - hystgen_along(here, by_output ? corner[middle].output : corner[middle].input);
+        const int64_t on =
+            to - hystgen_along(here, by_output ? corner[middle].output : corner[middle].input);
         const int64_t whole = by_output ? s->reach : (int64_t)s->way;
         const bool passed = on >= (corner[middle].rose == here->rising ? 0 : whole);
         left = passed ? middle : left;
@@ -68,7 +71,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
             const unsigned int middle = (k + last) / 2 + 1u;
-            const bool begun = on >= (by_output ? t->segment[middle].reach : (int64_t)t->segment[middle].way);
+            const bool begun =
+                on >= (by_output ? t->segment[middle].reach : (int64_t)t->segment[middle].way);
             k = begun ? middle : k;
             last = begun ? last : middle - 1u;
         }
@@ -87,8 +91,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
 }
 
 /* The same for any move to an input; turns, moves nothing. */
-static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner, int32_t to,
-                               hystgen_kink_t *kink)
+static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
+                               hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink)
 {
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
@@ -96,8 +100,10 @@ static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here, 
     hystgen_find(t, here, corner, to, false, kink);
 }
 
-/* Moves the plays on from a kink to an input at which the same ones follow; `moved` is the output between. */
-static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to, int64_t moved)
+/* Moves the plays on from a kink to an input at which the same ones follow; `moved` is the output
+ * between. */
+static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
+                          int64_t moved)
 {
     here->output = kink->output + hystgen_along(here, moved);
     here->input = to;
@@ -106,38 +112,45 @@ static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int
 }
 
 /* Output that is gained from a kink on until the input comes to `to`, which may lie before it. */
-HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to)
+HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                     const hystgen_kink_t *kink, int32_t to)
 {
     const int64_t way = hystgen_along(here, to - kink->input);
     return way < 0 ? -1 : (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
 
 /* Moves the plays to any input. */
-HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                          hystgen_kink_t *kink, int32_t to)
+HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here,
+                                          hystgen_corner_t *corner, hystgen_kink_t *kink,
+                                          int32_t to)
 {
     hystgen_find_input(t, here, corner, to, kink);
     hystgen_go_on(here, kink, to, hystgen_gained(t, here, kink, to));
 }
 
 /* Input at which another play begins to follow the present move, or the last one there is. */
-static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_t *here, const hystgen_corner_t *corner)
+static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                  const hystgen_corner_t *corner)
 {
-    int64_t x = 2147483647;
+    int64_t x = HYSTGEN_LARGEST;
     if (here->depth > 0) {
         const hystgen_corner_t *c = &corner[here->depth - 1u];
-        const int64_t begins = hystgen_along(here, c->input) + (c->rose == here->rising ? 0 : t->segment[here->k + 1u].way);
+        const int64_t begins = hystgen_along(here, c->input) +
+                               (c->rose == here->rising ? 0 : t->segment[here->k + 1u].way);
         x = begins < x ? begins : x;
     }
     return (int32_t)hystgen_along(here, x);
 }
 
 /* The sum of the plays for the next input; `next` is where another one begins to follow. */
-HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                       hystgen_kink_t *kink, int32_t *next, int32_t to)
+HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here,
+                                       hystgen_corner_t *corner, hystgen_kink_t *kink,
+                                       int32_t *next, int32_t to)
 {
-    if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) { /* the same plays follow */
-        const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)to;
+    if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) {
+        /* the same plays follow */
+        const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input
+                                          : (uint32_t)here->input - (uint32_t)to;
         const int64_t moved = (int64_t)hystgen_wide(t->segment[here->k].slope, way);
         here->output = here->rising ? here->output + moved : here->output - moved;
         here->input = to;
@@ -148,10 +161,12 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing. Short
-   of `next`, an output as the present move sees it, the same plays are known to follow. */
-HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                  int64_t output, int64_t next, hystgen_kink_t *kink)
+/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns,
+   moves nothing. Short of `next`, an output as the present move sees it, the same plays are known
+   to follow. */
+HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
+                                  hystgen_corner_t *corner, int64_t output, int64_t next,
+                                  hystgen_kink_t *kink)
 {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
@@ -166,30 +181,36 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
     }
     const hystgen_segment_t *s = &t->segment[kink->k];
     const int64_t on = hystgen_along(here, output - kink->output);
-    const int64_t x = hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
+    const int64_t x =
+        hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
     const int64_t most = t->range[here->rising];
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left. */
+/* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners
+ * are left. */
 static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                   const hystgen_corner_t *corner, unsigned int depth, unsigned int k)
+                                   const hystgen_corner_t *corner, unsigned int depth,
+                                   unsigned int k)
 {
     if (depth == 0) {
-        return (int64_t)1 << 62;
+        return HYSTGEN_FAR;
     }
     const hystgen_corner_t *c = &corner[depth - 1u];
-    return hystgen_along(here, c->output) + (c->rose == here->rising ? 0 : t->segment[k + 1u].reach);
+    return hystgen_along(here, c->output) +
+           (c->rose == here->rising ? 0 : t->segment[k + 1u].reach);
 }
 
-/* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it, at
-   which another one begins to follow. */
-HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                             hystgen_kink_t *kink, int32_t to)
+/* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
+   the move sees it, at which another one begins to follow. */
+HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here,
+                                             hystgen_corner_t *corner, hystgen_kink_t *kink,
+                                             int32_t to)
 {
     int64_t next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
     int64_t moved = hystgen_gained(t, here, kink, to);
-    if (moved < 0 || hystgen_along(here, kink->output) + moved > next) { /* by rounding, or it was limited */
+    if (moved < 0 || hystgen_along(here, kink->output) + moved > next) {
+        /* by rounding, or it was limited */
         hystgen_find_input(t, here, corner, to, kink);
         next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
         moved = hystgen_gained(t, here, kink, to);
@@ -198,10 +219,10 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
     return next;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its own, as if left by
-   a move that ended where the play begins to follow. */
-HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here, hystgen_corner_t *corner,
-                                  const int32_t *play, unsigned int step)
+/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its
+   own, as if left by a move that ended where the play begins to follow. */
+HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
+                                  hystgen_corner_t *corner, const int32_t *play, unsigned int step)
 {
     int64_t aside = t->offset; /* what the plays above play k give */
     unsigned int k;
@@ -209,7 +230,7 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *her
     for (k = t->n; k > 0; --k) {
         const hystgen_segment_t *s = &t->segment[k];
         const int64_t w = play[step > 0 ? k : 0u];
-        here->rising = w + s->way / 2u <= 2147483647;
+        here->rising = w + s->way / 2u <= HYSTGEN_LARGEST;
         here->input = (int32_t)(w + hystgen_along(here, s->way / 2u));
         here->output = aside + w * (int64_t)s->slope + hystgen_along(here, s->reach / 2);
         here->k = (uint_least16_t)k;

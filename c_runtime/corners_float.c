@@ -29,20 +29,23 @@ HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m)
 }
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
-HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner)
+HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                        hystgen_corner_t *corner)
 {
     const hystgen_segment_t *s = &t->segment[m->here.k];
     const hystgen_real_t room = t->limit[!m->here.rising] + hystgen_along(m, m->here.output);
     hystgen_corner_t *c = &corner[m->here.depth];
     c->output = m->here.output;
     c->pass[m->here.rising] = hystgen_along(m, m->here.input);
-    c->pass[!m->here.rising] = s->reach > room ? HYSTGEN_REAL_MAX : s->way - c->pass[m->here.rising];
+    c->pass[!m->here.rising] =
+        s->reach > room ? HYSTGEN_REAL_MAX : s->way - c->pass[m->here.rising];
     c->top = m->here.k;
     c->rose = m->here.rising;
     m->here.depth = (uint_least16_t)(m->here.depth + 1u);
 }
 
-static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner)
+static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
+                              hystgen_corner_t *corner)
 {
     if (m->here.k > 0) {
         hystgen_leave_corner(t, m, corner);
@@ -53,8 +56,10 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m, hyst
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of segment 1. */
-static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k, unsigned int last, hystgen_real_t x)
+/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of
+ * segment 1. */
+static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
+                                         unsigned int last, hystgen_real_t x)
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
@@ -66,9 +71,11 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
     return k;
 }
 
-/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if that comes first. */
-HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m, const hystgen_corner_t *corner,
-                                          hystgen_real_t output, hystgen_real_t input)
+/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if
+ * that comes first. */
+HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                          const hystgen_corner_t *corner, hystgen_real_t output,
+                                          hystgen_real_t input)
 {
     const hystgen_corner_t *c = &corner[m->here.depth - 1u];
     hystgen_real_t reach = hystgen_along(m, output - c->output);
@@ -87,8 +94,8 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
 }
 
 /* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
-HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
-                                           hystgen_real_t output)
+HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                           hystgen_corner_t *corner, hystgen_real_t output)
 {
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
         hystgen_turn_back(t, m, corner);
@@ -96,7 +103,8 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
-        const hystgen_real_t reach = corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
+        const hystgen_real_t reach =
+            corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
         const bool passed = hystgen_along(m, output - corner[middle].output) >= reach;
         m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
         m->here.k = passed ? corner[middle].top : m->here.k;
@@ -106,9 +114,10 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
-/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop them there. */
-HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
-                                          hystgen_real_t input)
+/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop
+ * them there. */
+HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                          hystgen_corner_t *corner, hystgen_real_t input)
 {
     hystgen_real_t x = hystgen_along(m, input);
     if (x < hystgen_along(m, m->here.input)) {
@@ -133,7 +142,8 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     hystgen_real_t cap = c->pass[rising];
     hystgen_real_t next = cap;
     unsigned int k = m->here.k;
-    if (c->rose == rising) { /* no play follows before the input is back at the corner, then all of its block do */
+    if (c->rose == rising) {
+        /* no play follows before the input is back at the corner, then all of its block do */
         m->begin = hystgen_along(m, cap);
         m->start = c->output;
     } else {
@@ -146,7 +156,8 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         next = s[1].way - c->pass[!rising];
         cap = t->segment[c->top].way - c->pass[!rising];
         const hystgen_real_t room = t->inside[rising] - hystgen_along(m, m->base);
-        if (t->segment[c->top].reach > room) { /* gains fall from segment to segment: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) {
+            /* gains fall from segment to segment: the limit lies here or beyond */
             cap = hystgen_along(m, m->begin) + (room - s->reach) * s->slope;
         }
     }
@@ -155,7 +166,8 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     if (hystgen_along(m, output) > t->limit[rising]) {
         return false;
     }
-    const bool back = hystgen_along(m, output) < hystgen_along(m, m->here.output); /* by rounding: no move leads back */
+    const bool back = hystgen_along(m, output) <
+                      hystgen_along(m, m->here.output); /* by rounding: no move leads back */
     cap = back ? x : cap;
     m->here.output = back ? m->here.output : output;
     cap = t->range[rising] < cap ? t->range[rising] : cap;
@@ -166,8 +178,10 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     return true;
 }
 
-/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a search is faster. */
-HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_real_t input)
+/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a
+ * search is faster. */
+HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                          hystgen_real_t input)
 {
     const hystgen_real_t way = hystgen_along(m, input - m->from);
     unsigned int k = m->here.k;
@@ -192,8 +206,8 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 }
 
 /* The sum of the plays for the next input; a NaN moves nothing. */
-HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
-                                              hystgen_real_t input)
+HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                              hystgen_corner_t *corner, hystgen_real_t input)
 {
     if (m->here.rising ? input > m->here.input : input < m->here.input) {
         if (m->here.rising ? input < m->next : input > m->next) {
@@ -201,7 +215,8 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
             m->here.output = m->start + (input - m->begin) * m->gain;
             return m->here.output;
         }
-        if ((m->here.rising ? input < m->cap : input > m->cap) && hystgen_move_in_block(t, m, input)) {
+        if ((m->here.rising ? input < m->cap : input > m->cap) &&
+            hystgen_move_in_block(t, m, input)) {
             return m->here.output;
         }
     }
@@ -211,9 +226,10 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, as if left by a move that ended where the play begins to follow. */
-HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, hystgen_corner_t *corner,
-                                  const hystgen_start_t *start)
+/* Start memory. Each play is a block of its own, as if left by a move that ended where the play
+ * begins to follow. */
+HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
+                                  hystgen_corner_t *corner, const hystgen_start_t *start)
 {
     unsigned int k;
     corner[0].output = start->bottom.output;
@@ -226,8 +242,10 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m, 
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = start->center[start->step > 0 ? k : 0u][0] + hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
-        m->here.output = start->center[start->step > 0 ? k : 0u][1] + hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
+        m->here.input = start->center[start->step > 0 ? k : 0u][0] +
+                        hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
+        m->here.output = start->center[start->step > 0 ? k : 0u][1] +
+                         hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
     }
     m->here.k = 0;

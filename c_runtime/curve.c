@@ -9,10 +9,12 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits)
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
-/* Value at x of a function that is given as polynomials c_0 + c_1 h + c_2 h^2 + ... on pieces, h = 0 .. 1 along each:
-   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from degree 0. */
-HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
-                                  unsigned int pieces, unsigned int degree, int32_t x)
+/* Value at x of a function that is given as polynomials c_0 + c_1 h + c_2 h^2 + ... on pieces, h =
+   0 .. 1 along each: where the pieces begin, the left shifts that stretch them to 2^31, and their
+   coefficients from degree 0. */
+HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
+                                  const int32_t *coefficient, unsigned int pieces,
+                                  unsigned int degree, int32_t x)
 {
     unsigned int low = 0;
     unsigned int high = pieces - 1u;
@@ -37,10 +39,10 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, con
     return y;
 }
 
-/* Drive code for an input w of the plays that the drive range does not give: its end, and one code more where that is
-   not just rounding; tells whether w is more than an envelope can give. */
-HYSTGEN_API hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min,
-                                           int32_t drive_max, bool *limited)
+/* Drive code for an input w of the plays that the drive range does not give: its end, and one code
+   more where that is not just rounding; tells whether w is more than an envelope can give. */
+HYSTGEN_API hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w,
+                                           int32_t drive_min, int32_t drive_max, bool *limited)
 {
     if (w > e->last) {
         *limited = w > e->most && w > e->envelope_most;

@@ -1,10 +1,11 @@
 #include "hystgen_runtime.h"
 
-/* (atanh((y - a3) / a0) - a2) / a1; an argument that no x can reach is limited, and said to be. */
-HYSTGEN_API hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_real_t y, bool *limited)
+/* (atanh((y - a3) / a0) - a2) / a1; an argument that no x can reach is limited, and `limited` set.
+ */
+HYSTGEN_API hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_real_t y,
+                                                    bool *limited)
 {
     hystgen_real_t argument = (y - e->a3) * e->inverse_a0;
-    *limited = false;
     if (argument > e->limit) {
         argument = e->limit;
         *limited = true;

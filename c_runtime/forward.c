@@ -11,7 +11,8 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
         v = v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : HYSTGEN_DRIVE_MAX;
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, v) + HYSTGEN_OFFSET;
+    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, v) +
+           HYSTGEN_OFFSET;
 }
 
 static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start)
@@ -29,11 +30,4 @@ void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
 {
     hystgen_forward_begin(self, &hystgen_forward_start[1]);
     (void)hystgen_forward_step(self, v);
-}
-
-unsigned int hystgen_forward_status(hystgen_forward_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

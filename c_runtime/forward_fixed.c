@@ -7,9 +7,9 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
     if (inside != v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    const int32_t to = hystgen_front(inside);
-    const int64_t sum =
-        hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner, &self->kink, &self->next, to);
+    const int32_t to = hystgen_front_forward(inside);
+    const int64_t sum = hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner,
+                                           &self->kink, &self->next, to);
     return hystgen_code(sum, &self->status);
 }
 
@@ -29,11 +29,4 @@ void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
 {
     hystgen_forward_begin(self, hystgen_model_zero, 0);
     (void)hystgen_forward_step(self, v);
-}
-
-unsigned int hystgen_forward_status(hystgen_forward_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

@@ -13,11 +13,13 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
     }
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
-    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, hystgen_front(v, self->ascending)) +
+    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner,
+                              hystgen_front_forward(v, self->ascending)) +
            HYSTGEN_OFFSET;
 }
 
-static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start, const hystgen_drive_t *first)
+static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start,
+                                  const hystgen_drive_t *first)
 {
     hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, start);
     self->drive = first->drive;
@@ -34,11 +36,4 @@ void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
 {
     hystgen_forward_begin(self, &hystgen_forward_start[1], &hystgen_forward_drive[1]);
     (void)hystgen_forward_step(self, v);
-}
-
-unsigned int hystgen_forward_status(hystgen_forward_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

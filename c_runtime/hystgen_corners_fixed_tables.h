@@ -1,12 +1,19 @@
 #ifndef HYSTGEN_CORNERS_FIXED_TABLES_H
 #define HYSTGEN_CORNERS_FIXED_TABLES_H
 
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a line. */
+/* An output that none reaches. */
+#define HYSTGEN_FAR ((int64_t)1 << 62)
+
+/* The largest input of the plays. */
+#define HYSTGEN_LARGEST 2147483647
+
+/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
+ * line. */
 typedef struct {
-    int64_t reach;           /* of the output: 2 z_k */
-    uint32_t way;            /* of the input: 2 r_k */
-    uint32_t slope;          /* of the output over the input from there on: p_0 + ... + p_k */
-    uint32_t reciprocal;     /* 2^(32 + shift) / slope */
+    int64_t reach;       /* of the output: 2 z_k */
+    uint32_t way;        /* of the input: 2 r_k */
+    uint32_t slope;      /* of the output over the input from there on: p_0 + ... + p_k */
+    uint32_t reciprocal; /* 2^(32 + shift) / slope */
     uint8_t shift;
 } hystgen_segment_t;
 
@@ -14,8 +21,8 @@ typedef struct {
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2];                 /* ends of falling [0] moves, with signs changed, and of rising [1] ones */
-    uint_least16_t n;                 /* plays without play 0 */
+    int64_t range[2]; /* ends of falling [0] moves, with signs changed, and of rising [1] ones */
+    uint_least16_t n; /* plays without play 0 */
 } hystgen_curve_t;
 
 /* The drive that a start memory stands for, within its range. */

@@ -1,28 +1,31 @@
 #ifndef HYSTGEN_CORNERS_TABLES_H
 #define HYSTGEN_CORNERS_TABLES_H
 
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a line. */
+/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
+ * line. */
 typedef struct {
-    hystgen_real_t way;      /* of the input: 2 r_k of the drive, or 2 z_k of the output */
-    hystgen_real_t reach;    /* of the output, the other one of them */
-    hystgen_real_t gain;     /* of the output over the input from there on */
-    hystgen_real_t slope;    /* 1 / gain */
+    hystgen_real_t way;   /* of the input: 2 r_k of the drive, or 2 z_k of the output */
+    hystgen_real_t reach; /* of the output, the other one of them */
+    hystgen_real_t gain;  /* of the output over the input from there on */
+    hystgen_real_t slope; /* 1 / gain */
 } hystgen_segment_t;
 
 /* One operator; [0] is for falling moves, with signs changed, [1] for rising ones. */
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     hystgen_real_t limit[2];          /* of the output */
-    hystgen_real_t inside[2];         /* outputs up to here stay within the limit whatever rounding does */
-    hystgen_real_t range[2];          /* of the input */
+    hystgen_real_t inside[2]; /* outputs up to here stay within the limit whatever rounding does */
+    hystgen_real_t range[2];  /* of the input */
 } hystgen_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does. */
+/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does,
+   one for each play (step 1), or one for all where they hold the same (step 0). Plays up to `risen`
+   are left by rising moves, the others by falling ones. */
 typedef struct {
-    const hystgen_real_t (*center)[2]; /* one for each play (step 1), or one for all where they hold the same (0) */
+    const hystgen_real_t (*center)[2];
     uint_least16_t step;
-    uint_least16_t risen;              /* plays up to this one are left by rising moves, the others by falling ones */
-    hystgen_corner_t bottom;           /* plays from its `top` on cannot move within the range */
+    uint_least16_t risen;
+    hystgen_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } hystgen_start_t;
 
 /* The drive that a start memory stands for, within its range, and the input of the plays there. */

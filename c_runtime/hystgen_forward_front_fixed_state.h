@@ -4,11 +4,11 @@
 /* One forward operator: drive in, output out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
-    int32_t next;            /* input of the plays at which another one begins to follow */
-    hystgen_real_t drive;    /* of the last step */
-    bool ascending;          /* direction of the drive's last move */
+    int32_t next;         /* input of the plays at which another one begins to follow */
+    hystgen_real_t drive; /* of the last step */
+    bool ascending;       /* direction of the drive's last move */
     unsigned int status;
-    hystgen_kink_t kink;     /* of the present step; here rather than on the stack */
+    hystgen_kink_t kink; /* of the present step; here rather than on the stack */
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_forward_t;
 

@@ -4,15 +4,15 @@
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
-    int32_t before;           /* input of the plays before the last step, where that was a usual one */
-    int32_t next;             /* reference short of which steps are usual, as the present move sees it */
+    int32_t before; /* input of the plays before the last step, where that was a usual one */
+    int32_t next;   /* reference short of which steps are usual, as the present move sees it */
     hystgen_real_t reference; /* of the last step */
     bool usual;               /* in the last step the same plays followed */
     bool repeat;              /* the last answer still stands for `reference` */
     uint_least8_t bits;       /* status of that answer */
     unsigned int status;
-    hystgen_place_t undo;     /* where the plays were before the last step, unless that was a usual one */
-    hystgen_kink_t kink;      /* of the present step; here rather than on the stack */
+    hystgen_place_t undo; /* where the plays were before the last step, if not a usual one */
+    hystgen_kink_t kink;  /* of the present step; here rather than on the stack */
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_inverse_t;
 

@@ -4,7 +4,7 @@
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_plays_t plays;
-    hystgen_place_t undo;    /* where the plays were before the last step, unless that went on along a line */
+    hystgen_place_t undo;    /* where the plays were before the last step, if not along a line */
     hystgen_real_t before;   /* input before such a step, else the present one */
     hystgen_real_t returned; /* by the last step, if another drive was committed since */
     bool stepped;            /* a step has answered */

@@ -9,7 +9,8 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     unsigned int bits = 0;
     hystgen_copy_place(&self->undo, &m->here);
     if (!(u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX)) {
-        bits = u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX ? HYSTGEN_STATUS_INPUT_CLAMPED : HYSTGEN_STATUS_HELD;
+        bits = u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX ? HYSTGEN_STATUS_INPUT_CLAMPED
+                                                               : HYSTGEN_STATUS_HELD;
         x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
     }
     if (bits == HYSTGEN_STATUS_HELD) { /* no number: the last answer once more */
@@ -18,8 +19,10 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
         }
     } else if (m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
         bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
-    } else if ((x < m->here.input || x > m->here.input) && !hystgen_move_to_input(t, m, self->corner, x)) {
-        hystgen_stop_in_block(t, m, self->corner, m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
+    } else if ((x < m->here.input || x > m->here.input) &&
+               !hystgen_move_to_input(t, m, self->corner, x)) {
+        hystgen_stop_in_block(t, m, self->corner,
+                              m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
         m->limited = true;
         bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
@@ -30,19 +33,22 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return m->here.output;
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive in
-   its place. While `limited` is set, references beyond `input` have the same answer, a limit of the drive.
-   stepped  committed  the memory is at      a commit replaces     a NaN answers, and leaves in memory
-   no       no         the start drive       nothing               the start drive
-   no       yes        the committed drive   the committed drive   the committed drive
-   yes      no         the last answer       the last answer       the last answer
-   yes      yes        the committed drive   the committed drive   the last answer, `returned` */
+/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
+   puts the applied drive in its place. While `limited` is set, references beyond `input` have the
+   same answer, a limit of the drive.
+
+   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   no       no         the start drive      nothing              the start drive
+   no       yes        the committed drive  the committed drive  the committed drive
+   yes      no         the last answer      the last answer      the last answer
+   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
     if (m->here.rising ? x > m->here.input : x < m->here.input) {
-        if (m->here.rising ? x < m->next : x > m->next) { /* the usual sample: the same plays follow */
+        if (m->here.rising ? x < m->next : x > m->next) {
+            /* the usual sample: the same plays follow */
             self->before = m->here.input;
             m->here.input = x;
             m->here.output = m->start + (x - m->begin) * m->gain;
@@ -72,7 +78,8 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
         self->returned = m->here.output;
     }
     self->committed = true;
-    if (self->before < m->here.input || self->before > m->here.input) { /* the last step went on along its line */
+    if (self->before < m->here.input || self->before > m->here.input) {
+        /* the last step went on along its line */
         hystgen_copy_place(&self->undo, &m->here);
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
@@ -104,11 +111,4 @@ void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_inverse_begin(self, &hystgen_inverse_start[1]);
     (void)hystgen_inverse_step(self, u);
-}
-
-unsigned int hystgen_inverse_status(hystgen_inverse_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

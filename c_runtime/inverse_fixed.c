@@ -1,11 +1,7 @@
 #include "hystgen_runtime.h"
 
-static hystgen_real_t hystgen_inverse_clamp(hystgen_reach_t u)
-{
-    return (hystgen_real_t)(u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX : u);
-}
-
-/* A reference as the present move sees it: ~u is one less than -u, and never less than the least number. */
+/* A reference as the present move sees it: ~u is one less than -u, and never less than the least
+ * number. */
 static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_t u)
 {
     return self->here.rising ? u : ~u;
@@ -14,21 +10,25 @@ static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_
 /* No step is usual until another search; the next one begins here. */
 static void hystgen_inverse_stay(hystgen_inverse_t *self)
 {
-    self->next = -2147483647 - 1;
+    self->next = -HYSTGEN_LARGEST - 1;
     self->usual = false;
 }
 
-/* Steps are usual up to the next kink or limit, less what rounding can add; none is from before the least reference. */
+/* Steps are usual up to the next kink or limit, less what rounding can add; none is from before the
+ * least reference. */
 HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const hystgen_place_t *here = &self->here;
-    const int32_t most = hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
-    const int32_t end = hystgen_front(here->rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
-    const uint32_t room = here->rising ? (uint32_t)end - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)end;
+    const int32_t most =
+        hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
+    const int32_t end = hystgen_front_forward(here->rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
+    const uint32_t room = here->rising ? (uint32_t)end - (uint32_t)here->input
+                                       : (uint32_t)here->input - (uint32_t)end;
     const int64_t more = (int64_t)hystgen_wide(hystgen_model_curve.segment[here->k].slope, room);
     const int64_t last = here->rising ? here->output + more : more - here->output;
     const int64_t usual = ((next < last ? next : last) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;
-    const int64_t least = (int64_t)(here->rising ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) * ((int64_t)1 << HYSTGEN_FRACTION);
+    const int64_t least = (int64_t)(here->rising ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) *
+                          ((int64_t)1 << HYSTGEN_FRACTION);
     if (usual > self->next && (here->rising ? here->output >= least : here->output <= least)) {
         self->next = usual < most ? (int32_t)usual : most;
     }
@@ -45,16 +45,17 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
         self->reference = u;
         self->repeat = true;
         self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
-        const int64_t w =
-            hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, -((int64_t)1 << 62), &self->kink);
+        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output,
+                                        -HYSTGEN_FAR, &self->kink);
         const hystgen_reach_t v = hystgen_front_inverse((hystgen_reach_t)w);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         if (inside != v) {
             self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
         }
         hystgen_inverse_stay(self);
-        const int64_t next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink,
-                                                      hystgen_front(inside));
+        const int64_t next =
+            hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink,
+                                     hystgen_front_forward(inside));
         if (self->bits == 0) {
             hystgen_inverse_look_ahead(self, next);
         }
@@ -63,8 +64,8 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return (hystgen_real_t)hystgen_front_inverse(self->here.input);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive
-   in its place.
+/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
+   puts the applied drive in its place.
 
    last call   the memory is at      a commit replaces     the same reference once more
    init        the start memory      nothing               is solved for
@@ -75,13 +76,15 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     hystgen_place_t *here = &self->here;
     const int64_t output = (int64_t)u * ((int64_t)1 << HYSTGEN_FRACTION);
     const int64_t on = here->rising ? output - here->output : here->output - output;
-    if (hystgen_inverse_sees(self, u) < self->next && on > 0 && u != self->reference) { /* usual: the same plays follow */
+    if (hystgen_inverse_sees(self, u) < self->next && on > 0 && u != self->reference) {
+        /* usual: the same plays follow */
         const hystgen_segment_t *s = &hystgen_model_curve.segment[here->k];
         const int64_t step = hystgen_over_slope(on, s->reciprocal, s->shift);
         const int64_t w = here->rising ? here->input + step : here->input - step;
         const hystgen_real_t v = (hystgen_real_t)hystgen_front_inverse((hystgen_reach_t)w);
-        const int32_t to = hystgen_front(v);
-        const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input : (uint32_t)here->input - (uint32_t)to;
+        const int32_t to = hystgen_front_forward(v);
+        const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input
+                                          : (uint32_t)here->input - (uint32_t)to;
         const int64_t left = hystgen_inverse_left(on, s->slope, way);
         self->before = here->input;
         self->usual = true;
@@ -108,7 +111,8 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);
     self->repeat = false;
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink, hystgen_front(v));
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink,
+                          hystgen_front_forward(v));
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step)
@@ -132,11 +136,4 @@ void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_inverse_begin(self, hystgen_model_zero, 0);
     (void)hystgen_inverse_step(self, u);
-}
-
-unsigned int hystgen_inverse_status(hystgen_inverse_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

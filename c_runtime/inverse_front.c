@@ -8,7 +8,7 @@ static void hystgen_inverse_keep(hystgen_inverse_t *self)
     self->undo_ascending = self->ascending;
 }
 
-/* The actuator is at drive v, which decides the direction of its move and so the branch. */
+/* The actuator is at drive v; the direction is that of its move. */
 static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
 {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
@@ -23,7 +23,7 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     hystgen_inverse_arrive(self, v);
-    const hystgen_real_t w = hystgen_front(v, self->ascending);
+    const hystgen_real_t w = hystgen_front_forward(v, self->ascending);
     if (w < self->plays.here.output || w > self->plays.here.output) {
         hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, w);
     }
@@ -40,15 +40,14 @@ static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self)
     return self->drive;
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit, a limit or a drive that holds takes the step back
-   and puts the applied drive in its place.
+/* One sample. The memory takes the answer for applied at once; a commit, a limit or a drive that
+   holds takes the step back and puts the applied drive in its place.
 
-   stepped  committed   the memory is at        a commit puts another     a NaN answers and leaves
-                                                drive in place of
-   no       no          the start drive         nothing                   the start drive
-   no       yes         the committed drive     the committed drive       the committed drive
-   yes      no          the last answer         the last answer           the last answer
-   yes      yes         the committed drive     the committed drive       the last answer, `returned` */
+   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   no       no         the start drive      nothing              the start drive
+   no       yes        the committed drive  the committed drive  the committed drive
+   yes      no         the last answer      the last answer      the last answer
+   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
     if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
@@ -56,15 +55,18 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     }
     hystgen_inverse_keep(self);
     if (!self->repeat || u < self->reference || u > self->reference) {
-        const hystgen_real_t level = u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX : u;
-        const hystgen_real_t w =
-            hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, level - HYSTGEN_OFFSET);
-        const hystgen_real_t v = hystgen_inverse_choose(self, level, w);
+        const hystgen_real_t level = u < HYSTGEN_OUTPUT_MIN   ? HYSTGEN_OUTPUT_MIN
+                                     : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX
+                                                              : u;
+        const hystgen_real_t w = hystgen_plays_step(&hystgen_inverse_curve, &self->plays,
+                                                    self->corner, level - HYSTGEN_OFFSET);
+        const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->limited);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
         self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
-        if (clamped || (inside <= self->drive && inside >= self->drive)) { /* the plays are not where w is */
+        if (clamped || (inside <= self->drive && inside >= self->drive)) {
+            /* the plays are not where w is */
             self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
             hystgen_inverse_replace(self, inside);
         } else {
@@ -98,7 +100,8 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     hystgen_inverse_replace(self, v);
 }
 
-HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start, const hystgen_drive_t *first)
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start,
+                                         const hystgen_drive_t *first)
 {
     hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
     self->level = self->plays.here.input + HYSTGEN_OFFSET;
@@ -124,11 +127,4 @@ void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_inverse_begin(self, &hystgen_inverse_start[1], &hystgen_inverse_drive[1]);
     (void)hystgen_inverse_step(self, u);
-}
-
-unsigned int hystgen_inverse_status(hystgen_inverse_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

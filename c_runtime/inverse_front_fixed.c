@@ -1,10 +1,5 @@
 #include "hystgen_runtime.h"
 
-static hystgen_real_t hystgen_inverse_clamp(hystgen_reach_t u)
-{
-    return (hystgen_real_t)(u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX : u);
-}
-
 /* The next step begins here. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self)
 {
@@ -13,16 +8,16 @@ static void hystgen_inverse_keep(hystgen_inverse_t *self)
     self->undo_ascending = self->ascending;
 }
 
-/* The actuator is at drive v, which decides the direction of its move and so the branch; the input of the plays. */
+/* The actuator is at drive v; the direction is that of its move. Returns the input of the plays. */
 HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
 {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
-    return hystgen_front(v, self->ascending);
+    return hystgen_front_forward(v, self->ascending);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and puts the applied drive
-   in its place.
+/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
+   puts the applied drive in its place.
 
    last call   the memory is at      a commit replaces     the same reference once more
    init        the start memory      nothing               is solved for
@@ -37,9 +32,10 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         self->reference = u;
         self->repeat = true;
         self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
-        const int64_t w =
-            hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output, self->next, &self->kink);
-        const hystgen_reach_t v = hystgen_inverse_choose(self, level, (hystgen_reach_t)w);
+        const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output,
+                                        self->next, &self->kink);
+        const hystgen_reach_t v =
+            hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &self->limited);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         self->level = level;
         if (self->limited) {
@@ -49,7 +45,8 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
             self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
         }
         const int32_t to = hystgen_inverse_arrive(self, inside);
-        self->next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner, &self->kink, to);
+        self->next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner,
+                                              &self->kink, to);
     }
     self->status |= self->bits;
     return self->drive;
@@ -65,8 +62,9 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     self->repeat = false;
-    self->next = -((int64_t)1 << 62);
-    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink, hystgen_inverse_arrive(self, v));
+    self->next = -HYSTGEN_FAR;
+    hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink,
+                          hystgen_inverse_arrive(self, v));
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step,
@@ -80,7 +78,7 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, 
     self->reference = 0;
     self->level = hystgen_code(self->here.output, &status);
     self->repeat = false;
-    self->next = -((int64_t)1 << 62);
+    self->next = -HYSTGEN_FAR;
     self->bits = 0;
     self->status = 0;
 }
@@ -94,11 +92,4 @@ void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_inverse_begin(self, hystgen_model_zero, 0, &hystgen_inverse_drive[1]);
     (void)hystgen_inverse_step(self, u);
-}
-
-unsigned int hystgen_inverse_status(hystgen_inverse_t *self)
-{
-    const unsigned int status = self->status;
-    self->status = 0;
-    return status;
 }

@@ -4,21 +4,27 @@
 static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending)
 {
     const hystgen_real_t inside = hystgen_clamp_drive(v);
-    return inside > self->drive ? ascending : inside < self->drive ? !ascending : self->ascending == ascending;
+    return inside > self->drive   ? ascending
+           : inside < self->drive ? !ascending
+                                  : self->ascending == ascending;
 }
 
-/* The drive that gives w on the branch of its own move: that of the reference's move is tried first, then the other one,
-   and where neither fits the drive holds; `limited` is set where an envelope cannot give w. */
-HYSTGEN_APART_IN_FLOAT hystgen_reach_t hystgen_inverse_choose(hystgen_inverse_t *self, hystgen_real_t level, hystgen_reach_t w)
+/* The drive that gives w on the branch of its own move: that of the reference's move is tried
+   first, then the other one, and where neither fits the drive holds; `limited` tells whether no
+   drive at all gives w. */
+HYSTGEN_APART_IN_FLOAT hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
+                                                              hystgen_real_t level,
+                                                              hystgen_reach_t w, bool *limited)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
-    hystgen_reach_t v = hystgen_front_inverse(w, up, &self->limited);
+    hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
     if (!hystgen_inverse_fits(self, v, up)) {
         const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_drive(v) - self->drive;
-        if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) { /* back by rounding alone */
+        if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) {
+            /* back by rounding alone */
             v = self->drive;
         } else {
-            v = hystgen_front_inverse(w, !up, &self->limited);
+            v = hystgen_front_inverse(w, !up, limited);
             v = hystgen_inverse_fits(self, v, !up) ? v : self->drive;
         }
     }

@@ -1,9 +1,9 @@
 #include "hystgen_runtime.h"
 
-/* The textbook engine: every play is visited in every sample. Stores go through volatile where a compiler would
-   otherwise call memset or memcpy, which a freestanding target need not have. */
-
-HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w)
+/* The textbook engine: every play is visited in every sample. Stores go through volatile where a
+   compiler would otherwise call memset or memcpy, which a freestanding target need not have. */
+HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play,
+                                   hystgen_play_t w)
 {
     volatile hystgen_play_t *entry = play;
     unsigned int i;
@@ -12,7 +12,8 @@ HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *pl
     }
 }
 
-HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play, const hystgen_play_t *start)
+HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play,
+                                    const hystgen_play_t *start)
 {
     volatile hystgen_play_t *entry = play;
     unsigned int i;
@@ -22,7 +23,8 @@ HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *p
 }
 
 /* play_r[w] = max(w - r, min(w + r, play)) */
-HYSTGEN_API void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w)
+HYSTGEN_FIXED_KERNEL void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_play_t *play,
+                                              hystgen_play_t w)
 {
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {

@@ -1,9 +1,10 @@
 #include "hystgen_runtime.h"
 
-/* The input of the plays that gives `output`: starts with every play following and lets go of the largest
-   thresholds until the solution has really reached the play that follows last. A play that was let go did not follow,
-   so the answer is kept from passing the input at which it would: a rounding error of `output` is divided by the slope
-   before that input, which may be small, and must not run on along the steeper slope behind it. */
+/* The input of the plays that gives `output`: starts with every play following and lets go of the
+   largest thresholds until the solution has really reached the play that follows last. A play that
+   was let go did not follow, so the answer is kept from passing the input at which it would: a
+   rounding error of `output` is divided by the slope before that input, which may be small, and
+   must not run on along the steeper slope behind it. */
 HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_real_t *play,
                                               hystgen_real_t output)
 {
@@ -13,8 +14,10 @@ HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const h
     unsigned int k;
     for (k = t->n + 1u; k > 0; --k) {
         const unsigned int last = k - 1u;
-        const hystgen_real_t first = rising ? play[last] + t->threshold[last] : play[last] - t->threshold[last];
-        const hystgen_real_t w = (output - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
+        const hystgen_real_t first =
+            rising ? play[last] + t->threshold[last] : play[last] - t->threshold[last];
+        const hystgen_real_t w =
+            (output - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
         if (rising ? w >= first : w <= first) {
             return k <= t->n && (rising ? w > next : w < next) ? next : w;
         }

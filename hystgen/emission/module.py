@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 import textwrap
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -14,7 +15,8 @@ from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.basics.version import __version__
 from hystgen.chain.static import StaticModel
-from hystgen.emission import banner, cost, numbers, runtime, selftest
+from hystgen.emission import banner, cost, layout, numbers, runtime, selftest
+from hystgen.emission.layout import define
 from hystgen.emission.options import Options
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
@@ -73,15 +75,18 @@ def files(parameters: Parameters, cascade: StaticModel, options: Options) -> dic
         file = f"{name}_selftest{ending}"
         top = _banner(values, file, about, details)
         made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
-    return {file: banner.seal(_tidy(text)) for file, text in made.items()}
+    return {file: banner.seal(_tidy(layout.fit(text))) for file, text in made.items()}
 
 
 def _implementation(values: SimpleNamespace) -> str:
     """The operators with all that they need of the run time, but what a shared one has."""
-    kind = "fixed" if values.fixed else "float"
-    if values.engine == "loop":
-        return render("step.c.j2", values, tables=render(f"tables_{kind}.c.j2", values))
-    return render("corners.c.j2", values, tables=render(f"tables_corners_{kind}.c.j2", values))
+    family: runtime.Family = values.family
+    opening, apart, closing = (
+        runtime.verbatim(files, values.name, family, values.name)
+        for files in (family.opening, (*family.soft(values.kernels), "apart.h"), family.closing)
+    )
+    parts = (opening, apart, values.kernels, render("tables.c.j2", values), values.operators, closing)
+    return "\n".join(parts)
 
 
 def _tidy(text: str) -> str:
@@ -97,7 +102,15 @@ def _tidy(text: str) -> str:
 
 
 def _banner(values: SimpleNamespace, file: str, what: str, details: Sequence[str] = ()) -> str:
-    return render("banner.c.j2", values, file=file, what=what, details=details).rstrip("\n")
+    width = layout.WIDTH - len(" * ")
+    lines = []
+    for line in details:
+        hang = " " * 8 if line.startswith(" ") else ""
+        lines += textwrap.wrap(line, width, subsequent_indent=hang, break_on_hyphens=False) or [""]
+    whole = re.sub(r"(--\w+) ", "\\1\0", values.command)  # an option and its value stay together
+    command = textwrap.wrap(whole, width - len("     \\"), subsequent_indent=" " * 4, break_on_hyphens=False)
+    more = {"file": file, "what": what, "details": lines, "command": " \\\n *     ".join(command).replace("\0", " ")}
+    return render("banner.c.j2", values, **more).rstrip("\n")
 
 
 def _arithmetic(arithmetic: str) -> dict[str, Any]:
@@ -106,10 +119,7 @@ def _arithmetic(arithmetic: str) -> dict[str, Any]:
         "family": family,
         "fixed": family.fixed,
         "real": family.real,
-        "reach": family.reach,
-        "FLT": "FLT" if family.real == "float" else "DBL",
-        "mantissa": 24 if family.real == "float" else 53,
-        "soft": runtime.SOFT.get(family.bits),
+        "includes": family.includes,
         "runtime_file": f"hystgen_runtime_{family.bits}",
         "runtime_version": runtime.VERSION,
     }
@@ -129,20 +139,26 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         sha256="does not depend on any",
     )
     file = about["runtime_file"]
-    types = "\n".join(runtime.types(header, (), prefix, family) for header in (*family.states, *family.tables))
+
+    def whole(*names: str) -> str:
+        return runtime.verbatim(names, file, family, prefix)
+
+    kernels = runtime.render(runtime.kernel_pieces(family), prefix, family, static=False)
     return {
         f"{file}.h": render(
             "runtime.h.j2",
             values,
             banner=_banner(values, f"{file}.h", f"kernels shared by all {arithmetic} models"),
-            types=types,
+            build=whole(family.build),
+            typedefs=[(family.real, "real_t"), *((kind, own) for own, kind in family.types.items())],
+            types=runtime.all_types((*family.states, *family.tables), prefix, family),
             prototypes=runtime.prototypes(prefix, family),
         ),
         f"{file}.c": render(
             "runtime.c.j2",
             values,
             banner=_banner(values, f"{file}.c", f"see {file}.h"),
-            kernels=runtime.render(runtime.kernel_pieces(family), prefix, family, static=False),
+            implementation="\n".join([whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels, whole(*family.closing)]),
         ),
     }
 
@@ -173,20 +189,96 @@ def _values(parameters: Parameters, cascade: StaticModel, options: Options) -> S
         inverse=options.inverse,
         branches=cascade.branches_differ,
     )
-    values.state_types = values.operator_types = values.operators = ""
+    family: runtime.Family = values.family
+    variant = runtime.Variant(
+        options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list
+    )
+    operators = [op for op in ("forward", "inverse") if getattr(options, op)]
+    most = max(n, 1) if values.fixed else n + 1
+    glue = render("front.c.j2", values) if values.stages else ""
+    pieces = runtime.operator_pieces(variant, operators, glue)
+    kernels = runtime.needed(
+        [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
+    )
+    values.operators = runtime.render_operators(pieces, name, most, prefix, family)
+    values.states = runtime.render_operators(runtime.state_pieces(variant, operators), name, most, prefix, family)
     if corners and not shared:
-        headers = values.family.states
-        values.state_types = "\n".join(runtime.types(header, (), prefix, values.family) for header in headers)
-    if corners:
-        states, sources = _operator_files(values, options)
-        most = max(n, 1) if values.fixed else n + 1
-        values.operator_types = runtime.operators(states, name, most, prefix, values.family)
-        values.operators = runtime.operators(sources, name, most, prefix, values.family)
-    kernels = _kernels(values, options)
-    values.kernels = "" if shared else kernels
-    values.cost = _cost(cascade, options, values, kernels)
+        values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
+    values.api = runtime.api(operators, name, prefix, family)
+    values.build = runtime.verbatim([family.build], name, family, name)
+    values.typedefs = _typedefs(values)
+    values.limits = _limits(values)
+    values.status = _status(values)
+    values.macros = _macros(values)
+    text = runtime.render(kernels, prefix, family, static=True)
+    values.kernels = "" if shared else text
+    values.cost = _cost(cascade, options, values, text)
     values.details = _details(parameters, cascade, options, values)
     return values
+
+
+def _typedefs(values: SimpleNamespace) -> list[str]:
+    """The types of a model's numbers, those of plays and sums too unless a shared run time has them."""
+    real = f"typedef {values.real} {values.name}_real_t;"
+    if not values.fixed:
+        return [f"/* {values.units.drive_words}; {values.units.output_words} */", real]
+    codes = (
+        f"/* Codes: a drive code is {values.NAME}_DRIVE_LSB{values.units.drive}, an output code "
+        f"{values.NAME}_OUTPUT_LSB{values.units.output} */"
+    )
+    words = "/* Inputs of the plays, where plays start to follow, and outputs before they are rounded */"
+    types = [f"typedef {kind} {values.name}_{own};" for own, kind in values.family.types.items()]
+    return [codes, real, *([] if values.shared else [words, *types])]
+
+
+def _limits(values: SimpleNamespace) -> list[str]:
+    """The macros of the header that a model's numbers are in."""
+    bound = "against the double model, "
+    lsb = "_LSB" * values.fixed
+    drive, output = ("drive codes", "output codes") if values.fixed else (
+        f"drive{values.units.drive}", f"output{values.units.output}"
+    )  # fmt: skip
+    found = [("N_PLAYS", str(values.n), "")]
+    if values.fixed:
+        found += [("DRIVE_LSB", values.drive_lsb, "physical units a code; code 0 is 0"),
+                  ("OUTPUT_LSB", values.output_lsb, "")]  # fmt: skip
+    found += [
+        ("DRIVE_MIN", values.drive_min, drive),
+        ("DRIVE_MAX", values.drive_max, ""),
+        ("OUTPUT_MIN", values.output_min, f"{output}, over every drive history in range"),
+        ("OUTPUT_MAX", values.output_max, ""),
+    ]
+    if values.forward:
+        found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
+    if values.inverse:
+        found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
+    if values.inverse and values.branches:
+        words = "the same while both take the same branch"
+        found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
+    return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
+
+
+def _status(values: SimpleNamespace) -> list[str]:
+    """The bits of the status functions."""
+    limited = "inverse: the drive was limited to the drive range"
+    found = [
+        ("INPUT_CLAMPED", 1, "the input was out of range and was limited"),
+        ("OUTPUT_CLAMPED", 2, limited + "; forward: the output to its codes" * values.saturates),
+        ("HELD", 4, "never set: every code is a number" if values.fixed
+         else "NaN or infinite input: the last answer was held"),
+        ("DOMAIN", 8, "inverse: the argument of an envelope was limited" if values.envelopes
+         else "never set: no envelope limits an argument"),
+    ]  # fmt: skip
+    return [define(f"{values.NAME}_STATUS_{name}", f"{bit}u", comment) for name, bit, comment in found]
+
+
+def _macros(values: SimpleNamespace) -> list[str]:
+    """The numbers of the model that its functions name, those that none names left out."""
+    return [
+        define(f"{values.NAME}_{name}", value, comment)
+        for name, value, comment in values.constants
+        if f"{values.NAME}_{name}" in values.operators
+    ]
 
 
 def _command(name: str, options: Options) -> str:
@@ -201,84 +293,6 @@ def _units(parameters: Parameters) -> SimpleNamespace:
         drive_words=f"Drive in {drive}" if drive else "Drive in the units of the parameter file",
         output_words=f"output and reference in {output}" if output else "output and reference likewise",
     )
-
-
-def _operator_files(values: SimpleNamespace, options: Options) -> tuple[list[str], list[str]]:
-    """The files of the run time that have the operators of the corner engine: their types, and their functions."""
-    front = "_front" if values.fronts else ""
-    kind = "_fixed" if values.fixed else ""
-    states, sources = [], ["clamp_fixed.c"] if values.fixed else []
-    if options.forward:
-        states.append(f"hystgen_forward{front}{kind}_state.h")
-        sources.append(f"forward{front}{kind}.c")
-    if options.inverse:
-        states.append(f"hystgen_inverse{front}{kind}_state.h")
-        if not values.fixed:
-            sources.append("clamp_drive.c")
-        if values.fronts:
-            sources.append("inverse_two_branches.c" if values.branches else "inverse_one_branch.c")
-        elif values.fixed:
-            sources.append("inverse_finer.c" if values.fine else "inverse_whole.c")
-        sources.append(f"inverse{front}{kind}.c")
-    return states, sources
-
-
-def _corner_roots(values: SimpleNamespace, options: Options) -> set[str]:
-    """The functions of the run time that the operators of the corner engine call, but those of the front."""
-    roots = {"hystgen_start"}
-    if values.fixed:
-        if options.forward:
-            roots.add("hystgen_plays_step")
-        if options.inverse:
-            roots |= {"hystgen_copy_place", "hystgen_move_to_input", "hystgen_solve", "hystgen_move_to_solution"}
-            if not values.fronts:
-                roots |= {"hystgen_wide", "hystgen_over_slope"}
-        return roots
-    if options.forward or values.fronts:
-        roots.add("hystgen_plays_step")
-    if options.inverse:
-        kernels = ("move_to_output", "move_to_input", "move_in_block", "forget_line", "copy_place")
-        roots |= {f"hystgen_{kernel}" for kernel in kernels}
-    return roots
-
-
-def _loop_roots(values: SimpleNamespace, options: Options) -> set[str]:
-    """The same of engine loop."""
-    roots = {"hystgen_loop_rest", "hystgen_loop_absorb"}
-    if values.start_list:
-        roots.add("hystgen_loop_start")
-    if options.forward or values.branches:
-        roots.add("hystgen_loop_output")
-    if options.inverse:
-        roots.add("hystgen_loop_solve")
-    return roots
-
-
-def _kernels(values: SimpleNamespace, options: Options) -> str:
-    """What the model needs of the run time, for a file of its own."""
-    family: runtime.Family = values.family
-    corners = options.engine == "corners"
-    roots = _corner_roots(values, options) if corners else _loop_roots(values, options)
-    types = {f"hystgen_{stage['kind']}_t" for stage in values.stages}
-    if corners:
-        types |= {"hystgen_segment_t", "hystgen_curve_t", *(() if values.fixed else ("hystgen_start_t",))}
-        types |= {"hystgen_drive_t"} if values.fronts else set()
-    else:
-        types.add("hystgen_tables_t")
-    for stage in values.stages:
-        roots |= {f"hystgen_{stage['kind']}_{way}" for way in ("forward", *(["inverse"] if options.inverse else []))}
-    if values.fixed:
-        if options.forward or values.branches or (corners and values.fronts):
-            roots.add("hystgen_nearest")
-        if values.fronts:
-            roots |= {"hystgen_nearest", "hystgen_curve", "hystgen_beyond"} if options.inverse else {"hystgen_curve"}
-            types |= {"hystgen_ends_t"} if options.inverse else set()
-    pieces = runtime.needed(runtime.kernel_pieces(family), sorted(roots))
-    headers = family.tables if corners else family.tables[-1:]
-    if corners and values.fixed and not types & {"hystgen_ends_t"}:
-        headers = headers[:1]
-    text = "\n".join(runtime.types(header, types, values.rt, family) for header in headers)
-    return text + "\n" + runtime.render(pieces, values.rt, family, static=True)
 
 
 def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
@@ -335,5 +349,5 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
         *avr,
         "",
-        *textwrap.wrap(use, 108),
+        use,
     ]

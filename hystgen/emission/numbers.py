@@ -16,8 +16,9 @@ from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.options import Options
-from hystgen.emission.text import literal, operand, structure, table
+from hystgen.emission.text import WIDTH, literal, operand, structure, table
 from hystgen.front.curve import FORWARD, INVERSE
+from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
 from hystgen.plays.corners.memory import BOTTOM, Curve, Start
@@ -30,30 +31,31 @@ def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefi
     return _fixed_fields(parameters, cascade, options, prefix)
 
 
-def _limits(numbers: Tables | FixedTables) -> dict[str, Any]:
-    """The places of `limits` that both kinds of arithmetic have."""
+def _limits(numbers: Tables | FixedTables, more: Sequence[tuple[str, str, str]] = ()) -> dict[str, Any]:
+    """What both kinds of arithmetic have; `constants` are macros that functions may name, with `more` of them."""
     limits = numbers.limits
-    largest = limits[slots.CODE_MAX] if isinstance(numbers, FixedTables) else math.inf
     return {
         "numbers": numbers,
-        # no code of the type lies beyond: a comparison would be always false
-        "drive_can_exceed": limits[slots.DRIVE_MAX] < largest,
-        "output_can_exceed": limits[slots.OUTPUT_MAX] < largest,
         "drive_min": operand(limits[slots.DRIVE_MIN]),
         "drive_max": operand(limits[slots.DRIVE_MAX]),
         "output_min": operand(limits[slots.OUTPUT_MIN]),
         "output_max": operand(limits[slots.OUTPUT_MAX]),
-        "offset": operand(limits[slots.OFFSET]),
-        "start": literal(numbers.start[0]),
         "start_list": len(numbers.start) > 1,
-        "first_moves": {
-            op: {
-                call: (literal(numbers.applied[j]), "true" if numbers.ascending[j] else "false")
-                for call, j in (("init", first), ("reset", first + 1))
-            }
-            for op, first in (("forward", 0), ("inverse", 2))
-        },
-        "hold": operand(limits[slots.HOLD]),
+        "constants": [
+            ("OFFSET", operand(limits[slots.OFFSET]), "part of every output"),
+            ("START", operand(numbers.start[0]), "what each play holds after init"),
+            *(
+                (f"{op}_{call}_{what}", value, comment)
+                for op, first in (("FORWARD", 0), ("INVERSE", 2))
+                for call, j in (("INIT", first), ("RESET", first + 1))
+                for what, value, comment in (
+                    ("DRIVE", operand(numbers.applied[j]), "that the plays stand for then"),
+                    ("ASCENDING", "true" if numbers.ascending[j] else "false", "and the direction it came from"),
+                )
+            ),
+            ("HOLD", operand(limits[slots.HOLD]), "a drive that is stepped back by no more is held"),
+            *more,
+        ],
     }
 
 
@@ -64,43 +66,56 @@ def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options
     dtype = numbers.threshold.dtype.type
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
-    engine = _corner_fields(numbers, name, prefix, options) if corners else _loop_fields(numbers, name, prefix, options)
+    arrays = (_corner_fields if corners else _loop_fields)(numbers, name, prefix, options)
+    own = [] if corners else [_loop_tables(_loop_pointers(numbers, name, options), numbers, name, prefix)]
     return {
         **_limits(numbers),
-        **engine,
+        "arrays": arrays,
+        "beside": [*own, *(array for stage in stages for array in stage["arrays"])],
         "stages": stages,
         "fronts": bool(stages),
+        "finer": False,
         "envelopes": any(stage["kind"] == "envelope" for stage in stages),
         "forward_max_error": operand(float_tables.upward(bounds.forward, dtype)),
         "inverse_max_error": operand(float_tables.upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(float_tables.upward(bounds.rounding, dtype)) if options.inverse else "",
-        "wide_t": f"{name}_real_t",
-        "play_t": f"{name}_real_t",
         "saturates": False,
         "precision": [],
     }
 
 
-def _loop_fields(numbers: Tables, name: str, prefix: str, options: Options) -> dict[str, Any]:
-    """The tables of engine loop: arrays in one structure, pointers to them, and the start memory."""
+_COLUMNS = (
+    ("threshold", "threshold", True),
+    ("inverse_slope", "reciprocal", False),
+    ("weight", "weight", True),
+    ("lift", "lift", False),
+)
+"""Fields of the tables of engine loop, what their arrays are called, and whether both operators read them."""
+
+
+def _loop_fields(numbers: Tables, name: str, prefix: str, options: Options) -> list[str]:
+    """The tables of engine loop: arrays in one structure, and the start memory."""
     real_t = f"{prefix}_real_t"
-    columns = [
-        ("threshold", "threshold", True),
-        ("inverse_slope", "reciprocal", options.inverse),
-        ("weight", "weight", True),
-        ("lift", "lift", options.inverse),
-    ]
-    used = {field: own for field, own, wanted in columns if wanted}
-    members = [(own, list(getattr(numbers, field))) for field, own in used.items()]
+    members = [(own, list(getattr(numbers, field))) for field, own, both in _COLUMNS if both or options.inverse]
     arrays = [structure(real_t, f"{name}_play", members)]
-    fields = ("threshold", "weight", "lift", "inverse_slope")
-    pointers = [f"{name}_play.{used[field]}" if field in used else "NULL" for field in fields]
     if len(numbers.start) > 1:
-        arrays.append(table(real_t, f"{name}_start", list(numbers.start)))
-    return {"arrays": arrays, "pointers": pointers}
+        arrays.append(table(real_t, f"{name}_model_start", list(numbers.start)))
+    return arrays
 
 
-def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> dict[str, Any]:
+def _loop_pointers(numbers: Tables, name: str, options: Options) -> list[str]:
+    """Pointers to these arrays, NULL for those that nothing reads."""
+    places = {field: f"{name}_play.{own}" for field, own, both in _COLUMNS if both or options.inverse}
+    return [places.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
+
+
+def _loop_tables(pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str) -> str:
+    """What points to the tables of engine loop."""
+    entries = _lines([*pointers, str(len(numbers.threshold) - 1)])
+    return f"static const {prefix}_tables_t {name}_model_tables = {{\n{entries}\n}};\n"
+
+
+def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> list[str]:
     """The tables of engine corners, one operator after the other."""
     arrays = []
     front = len(numbers.stage_kind) > 0
@@ -118,13 +133,13 @@ def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) ->
                     for j in (first, first + 1)
                 )
                 arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
-    return {"arrays": arrays, "pointers": []}
+    return arrays
 
 
 def _lines(entries: Sequence[str]) -> str:
     """Entries of a table, none of them broken, on as few lines as they take."""
     whole = ", ".join(entry.replace(" ", "\0") for entry in entries)
-    lines = textwrap.wrap(whole, 112, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
+    lines = textwrap.wrap(whole, WIDTH, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
     return "\n".join(lines).replace("\0", " ")
 
 
@@ -157,20 +172,23 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
 
 
 def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:
+    """A stage of the memoryless part: its kind, its tables, and how the chain names them and what they limit."""
     data = numbers.stage_data[int(numbers.stage_first[j]) :]
-    own = f"{name}_stage_{j + 1}"
+    own = f"stage_{j + 1}"
+    prefix = real_t.removesuffix("real_t")
     if numbers.stage_kind[j] == slots.TANH:
         ascending, descending = data[:7], data[7:14]
-        if np.array_equal(ascending, descending):
-            branches = [{"name": own, "numbers": [literal(x) for x in ascending]}]
-            place = f"&{own}"
-        else:
-            branches = [
-                {"name": f"{own}_ascending", "numbers": [literal(x) for x in ascending]},
-                {"name": f"{own}_descending", "numbers": [literal(x) for x in descending]},
-            ]
-            place = f"ascending ? &{own}_ascending : &{own}_descending"
-        return {"kind": "envelope", "branches": branches, "table": place}
+        branches = {own: ascending}
+        place = f"&hystgen_{own}"
+        if not np.array_equal(ascending, descending):
+            branches = {f"{own}_ascending": ascending, f"{own}_descending": descending}
+            place = f"ascending ? &hystgen_{own}_ascending : &hystgen_{own}_descending"
+        words = "/* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */\n"
+        arrays = [
+            f"{words}static const {prefix}envelope_t {name}_{branch} = {{\n{_lines(list(map(literal, row)))}\n}};\n"
+            for branch, row in branches.items()
+        ]
+        return {"kind": "envelope", "arrays": arrays, "table": place, "limited": ", limited"}
     n = int(numbers.stage_size[j])
     arrays, pointers, first = [], [], 0
     parts = (("break_x", n), ("break_y", n), ("anchor_x", n + 1), ("anchor_y", n + 1), ("slope", n + 1))
@@ -179,10 +197,13 @@ def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) ->
         if unused or not size:
             pointers.append("NULL")
         else:
-            pointers.append(f"{own}_{part}")
-            arrays.append(table(real_t, f"{own}_{part}", list(data[first : first + size])))
+            pointers.append(f"{name}_{own}_{part}")
+            arrays.append(table(real_t, f"{name}_{own}_{part}", list(data[first : first + size])))
         first += size
-    return {"kind": "dead_zone", "name": own, "arrays": arrays, "pointers": pointers, "n": n, "table": f"&{own}"}
+    entries = _lines([*pointers, str(n)])
+    words = "/* the straight pieces of the dead-zone sum */\n"
+    arrays.append(f"{words}static const {prefix}dead_zone_t {name}_{own} = {{\n{entries}\n}};\n")
+    return {"kind": "dead_zone", "arrays": arrays, "table": f"&hystgen_{own}", "limited": ""}
 
 
 def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
@@ -190,7 +211,9 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
     corners = options.engine == "corners"
     numbers, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
     limits = numbers.limits
-    engine = (_fixed_corner_fields if corners else _fixed_loop_fields)(numbers, name, prefix, options)
+    arrays = (_fixed_corner_fields if corners else _fixed_loop_fields)(numbers, name, prefix, options)
+    own = [] if corners else [_loop_tables(_fixed_loop_pointers(numbers, name, options), numbers, name, prefix)]
+    curves, counts = _curves(numbers, name, prefix, options) if numbers.fronts else ([], [])
     fine = int(limits[slots.FINE])
     units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in units)
@@ -213,48 +236,64 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
         f"{form.sum_bits} fraction bits of an output code",
     ]
     return {
-        **_limits(numbers),
-        **engine,
+        **_limits(numbers, _fixed_constants(numbers) + counts),
+        "arrays": arrays,
+        "beside": [*own, *curves],
         "stages": [],
         "fronts": bool(numbers.fronts),
-        "fine": fine,
-        "fine_factor": 2**fine,
-        "fraction": int(limits[slots.FRACTION]),
-        "code_max": int(limits[slots.CODE_MAX]),
+        "envelopes": any(isinstance(stage, TanhEnvelope) for stage in cascade.stages),
+        "finer": fine > 0,
         "saturates": bool(limits[slots.SATURATED] == limits[slots.CODE_MAX]),
-        "curves": _curves(numbers, name, options) if numbers.fronts else {},
         "drive_lsb": _physical(form.drive_lsb),
         "output_lsb": _physical(form.output_lsb),
         "forward_max_error": _decimal(form.forward_error),
         "inverse_max_error": _decimal(form.inverse_error) if options.inverse and form.inverse_error else "",
         "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
-        "shy": int(limits[slots.SHY]),
-        "half_code": 2**fine // 2,
-        "wide_t": f"{prefix}_reach_t",
-        "play_t": f"{prefix}_play_t",
         "precision": precision,
     }
 
 
-def _fixed_loop_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> dict[str, Any]:
-    """The tables of engine loop, pointers to them (NULL to those that nothing reads), and the start memory."""
-    columns = [
-        ("threshold", f"{prefix}_play_t", True),
-        ("weight", "int32_t", True),
-        ("slope", "int32_t", options.inverse),
-        ("reciprocal", "uint32_t", options.inverse),
-        ("shift", "uint8_t", options.inverse),
+def _fixed_constants(numbers: FixedTables) -> list[tuple[str, str, str]]:
+    """Numbers that functions name in fixed point alone."""
+    limits = numbers.limits
+    step = int(len(numbers.start) > 1)
+    shy = "output codes that rounding can add: half a drive code, and an inexact reciprocal"
+    return [
+        ("START_STEP", str(step), "entries from play to play; reset takes 0 for each"),
+        ("CODE_MAX", literal(limits[slots.CODE_MAX]), "the largest code of either sign"),
+        ("FRACTION", f"{limits[slots.FRACTION]}u", "bits of a sum below an output code"),
+        ("FINE", f"{limits[slots.FINE]}u", "bits of an input of the plays below a drive code"),
+        ("SHY", literal(limits[slots.SHY]), shy),
     ]
-    arrays = [table(kind, f"{name}_{field}", list(getattr(numbers, field))) for field, kind, used in columns if used]
+
+
+_FIXED_COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
+                  ("reciprocal", "uint32_t", False), ("shift", "uint8_t", False))  # fmt: skip
+"""Fields of the tables of engine loop in fixed point, their types, and whether both operators read them."""
+
+
+def _fixed_loop_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> list[str]:
+    """The tables of engine loop and the start memory."""
+    play_t = f"{prefix}_play_t"
+    arrays = [
+        table(play_t if kind == "play_t" else kind, f"{name}_{field}", list(getattr(numbers, field)))
+        for field, kind, both in _FIXED_COLUMNS
+        if both or options.inverse
+    ]
     if len(numbers.start) > 1:
-        arrays.append(table(f"{prefix}_play_t", f"{name}_start", list(numbers.start)))
+        arrays.append(table(play_t, f"{name}_model_start", list(numbers.start)))
+    return arrays
+
+
+def _fixed_loop_pointers(numbers: FixedTables, name: str, options: Options) -> list[str]:
+    """Pointers to these tables, NULL for those that nothing reads, and the ends of the input of the plays."""
     margin = numbers.limits[slots.MARGIN]
     ends = (numbers.limits[slots.PLAY_MIN] - margin, numbers.limits[slots.PLAY_MAX] + margin)
-    pointers = [f"{name}_{field}" if used else "NULL" for field, _, used in columns]
-    return {"arrays": arrays, "pointers": [*pointers, *map(literal, ends)]}
+    pointers = [f"{name}_{field}" if both or options.inverse else "NULL" for field, _, both in _FIXED_COLUMNS]
+    return [*pointers, *map(literal, ends)]
 
 
-def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> dict[str, Any]:
+def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> list[str]:
     """The tables of engine corners: one curve for both operators, and what a start memory is made of."""
     limits = numbers.limits
     never = (numbers.reach[-1], numbers.way[-1], 0, 0, 1)
@@ -276,7 +315,7 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
                 for j in (first, first + 1)
             )
             arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
-    return {"arrays": arrays, "pointers": []}
+    return arrays
 
 
 def _physical(x: Any) -> str:
@@ -289,9 +328,12 @@ def _decimal(x: float) -> str:
     return repr(math.ceil(x * 10**digits) / 10**digits)
 
 
-def _curves(numbers: FixedTables, name: str, options: Options) -> dict[str, dict[str, Any]]:
-    """The curves of the memoryless part that are used: forward, and back where there is an inverse."""
-    found = {}
+def _curves(
+    numbers: FixedTables, name: str, prefix: str, options: Options
+) -> tuple[list[str], list[tuple[str, str, str]]]:
+    """The curves of the memoryless part that are used, forward, and back where there is an inverse; their sizes."""
+    arrays = []
+    counts = [("DEGREE", f"{numbers.coefficient.shape[1] - 1}u", "of the polynomials of every curve")]
     directions = (("_ascending", 0), ("_descending", 1)) if numbers.branches else (("", 0),)
     kinds = (("front", FORWARD), ("back", INVERSE)) if options.inverse else (("front", FORWARD),)
     for kind, first in kinds:
@@ -300,20 +342,18 @@ def _curves(numbers: FixedTables, name: str, options: Options) -> dict[str, dict
             own = f"{name}_{kind}{direction}"
             here = int(numbers.first[which])
             there = here + int(numbers.pieces[which])
-            degree = numbers.coefficient.shape[1] - 1
-            arrays = [
-                table("int32_t", f"{own}_knot", list(numbers.knot[here:there])),
+            words = "/* w = G[v] */\n" if kind == "front" else "/* v = G^-1[w] */\n"
+            arrays += [
+                words + table("int32_t", f"{own}_knot", list(numbers.knot[here:there])),
                 table("uint8_t", f"{own}_scale", list(numbers.scale[here:there])),
                 table("int32_t", f"{own}_coefficient", list(numbers.coefficient[here:there].ravel())),
             ]
-            (low, high), (under, over) = numbers.domain[which], numbers.edge[which]
-            ends = [*numbers.argument[which], low - under, high + over, low, high]
-            found[f"{kind}{direction}"] = {
-                "name": f"{kind}{direction}",
-                "kind": kind,
-                "arrays": arrays,
-                "curve": f"{own}_knot, {own}_scale, {own}_coefficient, {there - here}, {degree}",
-                "ends": ", ".join(literal(end) for end in ends) if kind == "back" else "",
-                "below": int(numbers.below[which]),
-            }
-    return found
+            counts.append((f"{kind}{direction}_PIECES".upper(), f"{there - here}u", ""))
+            if kind == "back":
+                (low, high), (under, over) = numbers.domain[which], numbers.edge[which]
+                ends = [*numbers.argument[which], low - under, high + over, low, high]
+                entries = _lines(list(map(literal, ends)))
+                arrays.append(f"static const {prefix}_ends_t {own}_ends = {{\n{entries}\n}};\n")
+    if options.inverse:
+        counts.append(("BELOW", f"{int(numbers.below[INVERSE])}u", "bits of a curve back below a drive code"))
+    return arrays, counts

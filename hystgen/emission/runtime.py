@@ -1,19 +1,18 @@
-"""The hand-written kernels of `c_runtime/`, as text to be carried by emitted files.
+"""The hand-written C of `c_runtime/`, as text to be carried by emitted files.
 
-A kernel file is a sequence of top-level pieces (functions, tables, types). Only the pieces that a model needs are
-carried, under the model's own prefix.
+A file is a sequence of top-level pieces (functions, tables, types, constants). Only the pieces that a model needs are
+carried. What a run time defines, which models may share, has its prefix; all else has the model's name.
 """
 
 from __future__ import annotations
 
 import functools
-import itertools
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-VERSION = 1  # of the interface between emitted models and a shared run time
+VERSION = 2  # of the interface between emitted models and a shared run time
 
 FLOAT_KERNELS = (
     "tanh_{bits}.c",
@@ -39,13 +38,14 @@ FIXED_KERNELS = (
 class Family:
     """How an arithmetic appears in C: `bits` names it, `real` is the type of inputs and answers.
 
-    In floating point every number has that type, and `real_max` is its largest; in fixed point `reach` is that of where
-    plays start to follow.
+    In floating point every number has that type, `macros` is what <float.h> calls it and `mantissa` its bits; in fixed
+    point `reach` is the type of where plays start to follow.
     """
 
     bits: str
     real: str
-    real_max: str = ""
+    macros: str = ""
+    mantissa: int = 0
     reach: str = ""
 
     @property
@@ -54,9 +54,24 @@ class Family:
         return bool(self.reach)
 
     @property
-    def half(self) -> str:
-        """1/2 as a number of a floating type."""
-        return "0.5f" if self.real == "float" else "0.5"
+    def constants(self) -> dict[str, str]:
+        """What `hystgen_runtime.h` defines and emitted code names directly."""
+        return {} if self.fixed else {
+            "HYSTGEN_REAL_MAX": f"{self.macros}_MAX",
+            "HYSTGEN_REAL_MANT_DIG": f"{self.macros}_MANT_DIG",
+            "HYSTGEN_REAL_BITS": str(self.mantissa),
+            "HYSTGEN_HALF": "0.5f" if self.real == "float" else "0.5",
+        }  # fmt: skip
+
+    @property
+    def types(self) -> dict[str, str]:
+        """Types of the run time beside `real_t`."""
+        return {"play_t": "int32_t", "reach_t": self.reach, "sum_t": "int64_t"} if self.fixed else {}
+
+    @property
+    def includes(self) -> tuple[str, ...]:
+        """Headers of the language that code needs."""
+        return (*(() if self.fixed else ("float",)), "stdbool", "stddef", "stdint")
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -70,22 +85,89 @@ class Family:
         """The headers of the run time that have the types of its memory."""
         return ("hystgen_corners_fixed_state.h",) if self.fixed else ("hystgen_corners_state.h",)
 
+    @property
+    def kernels(self) -> tuple[str, ...]:
+        """The headers of the run time that have the prototypes of its kernels."""
+        return (f"hystgen_kernels_{'fixed' if self.fixed else 'float'}.h", "hystgen_kernels_loop.h")
+
+    @property
+    def build(self) -> str:
+        """The header that checks how code is built."""
+        return "build_fixed.h" if self.fixed else "build_float.h"
+
+    def soft(self, kernels: str) -> tuple[str, ...]:
+        """The header that finds out what float arithmetic costs, where these kernels ask for it."""
+        return (f"soft_float{self.bits[1:]}.h",) if "HYSTGEN_SOFT_FLOAT" in kernels else ()
+
+    @property
+    def opening(self) -> tuple[str, ...]:
+        """What stands before all code of a file; `closing` behind it."""
+        double = ("constants_double.h",) if self.real == "double" else ()
+        return () if self.fixed else ("rounding_begin.h", *double)
+
+    @property
+    def closing(self) -> tuple[str, ...]:
+        """What stands behind all code of a file."""
+        return () if self.fixed else ("rounding_end.h",)
+
 
 FAMILIES = {
-    "float32": Family("f32", "float", "FLT_MAX"),
-    "float64": Family("f64", "double", "DBL_MAX"),
+    "float32": Family("f32", "float", "FLT", 24),
+    "float64": Family("f64", "double", "DBL", 53),
     "q31": Family("q31", "int32_t", reach="int64_t"),
     "q15": Family("q15", "int16_t", reach="int32_t"),
 }
 
 
-SOFT = {
-    "f32": "(defined(__arm__) && !defined(__ARM_FP))"
-    " || (defined(__riscv) && !defined(__riscv_flen)) || defined(__AVR__)",
-    "f64": "(defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0))"
-    " || (defined(__riscv) && (!defined(__riscv_flen) || __riscv_flen < 64)) || defined(__AVR__)",
-}
-"""HYSTGEN_SOFT_FLOAT: where each operation of a number is a call of a library."""
+@dataclass(frozen=True)
+class Variant:
+    """The kind of a model, which decides on the files of the run time that its operators are made of.
+
+    `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
+    drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value.
+    """
+
+    engine: str
+    fixed: bool
+    fronts: bool
+    branches: bool
+    finer: bool = False
+    saturates: bool = False
+    start_list: bool = False
+
+    def state(self, operator: str) -> str:
+        """The header with the type of an instance."""
+        if self.engine == "loop":
+            return f"hystgen_loop_{operator}{'_branches' * self.branches}_state.h"
+        return f"hystgen_{operator}{'_front' * self.fronts}{'_fixed' * self.fixed}_state.h"
+
+    def sources(self) -> tuple[str, ...]:
+        """The files with the functions of both operators."""
+        files = ["clamp.c"]
+        if self.fixed:
+            files.append("code_saturating.c" if self.saturates else "code.c")
+        if self.fronts:
+            if self.fixed:
+                files.append("front_two_curves.c" if self.branches else "front_curve.c")
+            files.append("inverse_two_branches.c" if self.branches else "inverse_one_branch.c")
+        elif self.fixed or self.engine == "loop":
+            files.append("front_finer.c" if self.finer else "front_none.c")
+        return (*files, *(self._loop() if self.engine == "loop" else self._corners()), "status.c")
+
+    def _loop(self) -> tuple[str, ...]:
+        front = "branches" if self.branches else "front" if self.fronts else "plain"
+        return (
+            "loop_start_list.c" if self.start_list else "loop_start.c",
+            f"loop_{front}.c",
+            "loop.c",
+            "loop_fixed.c" if self.fixed else "loop_float.c",
+            *(() if self.branches else ("loop_one_branch.c",)),
+        )
+
+    def _corners(self) -> tuple[str, ...]:
+        kind = "_front" * self.fronts + "_fixed" * self.fixed
+        usual = ("inverse_finer.c" if self.finer else "inverse_whole.c",) if kind == "_fixed" else ()
+        return (f"forward{kind}.c", *usual, f"inverse{kind}.c")
 
 
 def data_folder(name: str) -> Path:
@@ -104,8 +186,12 @@ class Piece:
     uses: frozenset[str]
 
 
+_COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
+_NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
+
+
 def split_pieces(source: str) -> list[Piece]:
-    """The top-level pieces of a kernel file, preprocessor lines left out."""
+    """The top-level pieces of a file, and of lines of the preprocessor the constants."""
     pieces = []
     lines: list[str] = []
     depth = 0
@@ -119,27 +205,31 @@ def split_pieces(source: str) -> list[Piece]:
         code = re.sub(r"/\*.*?\*/", "", code)
         if "/*" in code:
             code, comment = code.partition("/*")[0], True
-        if not depth and (line.startswith("#") or (not lines and not line.strip())):
+        constant = not depth and bool(re.match(r"#define \w+ .", line))
+        if not depth and not constant and line.startswith("#"):
+            lines = []
+            continue
+        if not depth and not inside and not line.strip():  # a comment above it is about the file
+            lines = []
             continue
         lines.append(line)
         depth += code.count("{") - code.count("}")
-        if not depth and re.search(r"[};]\s*$", code):
+        if constant or (not depth and re.search(r"[};]\s*$", code)):
             text = "\n".join(lines) + "\n"
-            names = re.findall(r"\bhystgen_\w+", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))
             own = _defined_name(text)
-            pieces.append(Piece(own, text, frozenset(names) - {own}))
+            pieces.append(Piece(own, text, frozenset(_NAME.findall(_COMMENT.sub("", text))) - {own}))
             lines = []
     return pieces
 
 
 def _defined_name(text: str) -> str:
-    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    code = _COMMENT.sub("", text)
     typedef = re.search(r"}\s*(hystgen_\w+);\s*$", code)
     if typedef and "typedef" in code:
         return typedef.group(1)
-    declared = re.search(r"(hystgen_\w+)\s*[\[(]", code)
+    declared = re.search(r"#define (HYSTGEN_\w+)|(hystgen_\w+)\s*[\[(]", code)
     assert declared, f"no name in: {text}"
-    return declared.group(1)
+    return declared.group(1) or declared.group(2)
 
 
 @functools.cache
@@ -147,88 +237,123 @@ def _read(name: str) -> str:
     return (data_folder("c_runtime") / name).read_text(encoding="utf-8")
 
 
+def _pieces(files: Iterable[str]) -> list[Piece]:
+    return [piece for file in files for piece in split_pieces(_read(file))]
+
+
 def kernel_pieces(family: Family) -> list[Piece]:
     """Every piece of every kernel file of an arithmetic, callees before callers."""
     files = FIXED_KERNELS if family.fixed else FLOAT_KERNELS
-    return [piece for name in files for piece in split_pieces(_read(name.format(bits=family.bits)))]
+    return _pieces(name.format(bits=family.bits) for name in files)
+
+
+def table_pieces(family: Family) -> list[Piece]:
+    """The types of an arithmetic's tables."""
+    return _pieces(family.tables)
+
+
+def operator_pieces(variant: Variant, operators: Iterable[str], glue: str) -> list[Piece]:
+    """The functions of a model's operators, with those that `glue` defines for it."""
+    wanted = [piece.name for op in operators for piece in _pieces([f"hystgen_{op}_api.h"])]
+    return needed([*split_pieces(glue), *_pieces(variant.sources())], wanted)
+
+
+def state_pieces(variant: Variant, operators: Iterable[str]) -> list[Piece]:
+    """The types of instances."""
+    return _pieces(variant.state(op) for op in operators)
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
-    """The pieces that `roots` lead to, in file order. Raises KeyError for a root that no piece defines."""
+    """The pieces that `roots` lead to, in their order, but each behind those that it uses."""
     by_name = {piece.name: piece for piece in pieces}
     wanted: set[str] = set()
-    queue = list(roots)
-    for root in queue:
-        by_name[root]
+    queue = [name for name in roots if name in by_name]
     while queue:
         name = queue.pop()
-        if name in by_name and name not in wanted:
+        if name not in wanted:
             wanted.add(name)
-            queue.extend(by_name[name].uses)
-    return [piece for piece in by_name.values() if piece.name in wanted]
+            queue.extend(by_name[name].uses & by_name.keys())
+    placed: dict[str, Piece] = {}
+
+    def place(piece: Piece) -> None:
+        for used in by_name.values():
+            if used.name in piece.uses and used.name not in placed:
+                place(used)
+        placed[piece.name] = piece
+
+    for piece in by_name.values():
+        if piece.name in wanted and piece.name not in placed:
+            place(piece)
+    return list(placed.values())
+
+
+def used(pieces: Iterable[Piece]) -> set[str]:
+    """All names that the pieces use."""
+    return {name for piece in pieces for name in piece.uses}
 
 
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
-    """The pieces as C text under `prefix`; `static` for files that carry them as their own."""
+    """Kernels as C text under `prefix`; `static` for files that carry them as their own."""
     text = "\n".join(piece.text for piece in pieces)
+    text = text.replace("HYSTGEN_FIXED_KERNEL ", "HYSTGEN_KERNEL " if family.fixed else "HYSTGEN_API ")
     text = text.replace("HYSTGEN_API ", "static " if static else "")
     text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
-    return _named(text, prefix, family)
+    return _named(text, prefix, family, prefix)
 
 
-OPERATOR = re.compile(r"\bhystgen_((?:inverse|forward|front|clamp_drive|code|model)\w*)")
-"""What belongs to a model and not to a run time that models may share."""
-
-
-def operators(files: Sequence[str], name: str, corners: int, prefix: str, family: Family) -> str:
-    """Operators of files of the run time as C text of the model `name`; their kernels are named after `prefix`."""
-    pieces = [piece for file in files for piece in split_pieces(_read(file))]
-    text = OPERATOR.sub(rf"{name}_\1", "\n".join(piece.text for piece in pieces))
+def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: str, family: Family) -> str:
+    """Operators, or the types of their instances, as C text of the model `name` with the run time `prefix`."""
+    text = "\n".join(piece.text for piece in pieces)
     text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
 
 
-def _named(text: str, prefix: str, family: Family, name: str | None = None) -> str:
+def api(operators: Iterable[str], name: str, prefix: str, family: Family) -> str:
+    """Prototypes of a model's functions."""
+    text = "\n".join("".join(piece.text for piece in _pieces([f"hystgen_{op}_api.h"])) for op in operators)
+    return _named(text, prefix, family, name)
+
+
+def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
+    """Whole files, as they stand, of the module `name`; `owner` is named in messages."""
+    text = "\n".join(map(_read, files)).replace('"hystgen: ', f'"{owner}: ')
+    return _named(text, name, family, name)
+
+
+@functools.cache
+def _own(family: Family) -> frozenset[str]:
+    """The names that a run time defines."""
+    pieces = [*kernel_pieces(family), *_pieces((*family.tables, *family.states))]
+    return frozenset([*(piece.name for piece in pieces), *(f"hystgen_{kind}" for kind in family.types)])
+
+
+def _named(text: str, prefix: str, family: Family, name: str) -> str:
+    """The text with the names of a model and of its run time."""
     if not family.fixed:  # one type for everything
         text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
-        text = text.replace("HYSTGEN_REAL_MAX", family.real_max).replace("HYSTGEN_HALF", family.half)
-        text = text.replace("#if HYSTGEN_SOFT_FLOAT", f"#if {SOFT[family.bits]}")
-    return aligned(text.replace("hystgen_", prefix + "_").replace("HYSTGEN_", (name or prefix).upper() + "_"))
+    for constant, value in family.constants.items():
+        text = text.replace(constant, value)
+    own = _own(family)
+
+    def renamed(found: re.Match[str]) -> str:
+        before = prefix if found[0] in own else name
+        upper = found[0].startswith("HYSTGEN")
+        return (before.upper() if upper else before) + found[0][len("hystgen") :]
+
+    return _NAME.sub(renamed, text)
 
 
-def aligned(text: str) -> str:
-    """C text whose lines inside parentheses begin below the first character in them, as before names were put in."""
-    lines = []
-    opened: list[int] = []  # columns behind the parentheses that are open
-    comment = False
-    for line in text.splitlines():
-        written = " " * opened[-1] + line.lstrip() if opened and not comment else line
-        lines.append(written)
-        for at, pair in enumerate(itertools.pairwise(written + " ")):
-            if comment:
-                comment = pair != ("*", "/")
-            elif pair == ("/", "*"):
-                comment = True
-            elif pair[0] == "(":
-                opened.append(at + 1)
-            elif pair[0] == ")":
-                opened.pop()
-    return "\n".join(lines) + "\n" if text.endswith("\n") else "\n".join(lines)
+def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
+    """Type definitions."""
+    return _named("\n".join(piece.text for piece in pieces), prefix, family, prefix)
 
 
-def types(file: str, wanted: Iterable[str], prefix: str, family: Family) -> str:
-    """Type definitions of a header of the run time, those named in `wanted` (all of them when empty)."""
-    pieces = split_pieces(_read(file))
-    chosen = set(wanted) or {piece.name for piece in pieces}
-    return _named("\n".join(piece.text for piece in pieces if piece.name in chosen), prefix, family)
+def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
+    """Every type definition of headers of the run time."""
+    return types(_pieces(files), prefix, family)
 
 
 def prototypes(prefix: str, family: Family) -> str:
     """Prototypes of all kernels."""
-    _, _, text = _read("hystgen_runtime.h").partition('#include "hystgen_tables_fixed.h"')
-    fixed, _, others = text.partition("#else")
-    _, _, others = others.partition('#include "hystgen_tables_float.h"')
-    floating, _, both = others.partition("#endif")
-    pieces = split_pieces((fixed if family.fixed else floating) + both)
-    return _named("".join(piece.text for piece in pieces), prefix, family)
+    return _named("".join(piece.text for piece in _pieces(family.kernels)), prefix, family, prefix)

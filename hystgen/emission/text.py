@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-WIDTH = 110
+WIDTH = 100
 
 
 def literal(x: Any) -> str:

@@ -1,6 +1,0 @@
-#include "hystgen_runtime.h"
-
-static hystgen_real_t hystgen_clamp_drive(hystgen_reach_t v)
-{
-    return (hystgen_real_t)(v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : v > HYSTGEN_DRIVE_MAX ? HYSTGEN_DRIVE_MAX : v);
-}

@@ -1,0 +1,13 @@
+#ifndef HYSTGEN_LOOP_FORWARD_BRANCHES_STATE_H
+#define HYSTGEN_LOOP_FORWARD_BRANCHES_STATE_H
+
+/* One forward operator: drive in, output out. Plain data, owned by the caller. */
+typedef struct {
+    hystgen_real_t drive;  /* seen last */
+    hystgen_real_t answer; /* output returned last */
+    bool ascending;        /* direction of the drive's last move */
+    unsigned int status;
+    hystgen_play_t play[HYSTGEN_N_PLAYS + 1]; /* play 0 is the input of the plays */
+} hystgen_forward_t;
+
+#endif

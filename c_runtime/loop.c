@@ -1,0 +1,90 @@
+#include "hystgen_runtime.h"
+
+/* Operators of engine loop: what all arithmetics and memoryless parts have in common. */
+
+/* The actuator has seen drive v. */
+static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
+{
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_forward_arrive(self, v));
+}
+
+/* What init and reset have in common once the plays are set. */
+static void hystgen_forward_begin(hystgen_forward_t *self)
+{
+    self->status = 0;
+    self->answer = hystgen_forward_output(self);
+    self->status = 0; /* no step has answered yet */
+}
+
+/* The actuator has seen drive v. */
+static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_inverse_arrive(self, v));
+}
+
+/* Returns drive v and leaves it pending: the next step takes it, or what was committed, into the
+ * memory. */
+static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    self->answer = v;
+    self->pending = v;
+    self->has_pending = true;
+    self->stepped = true;
+    return v;
+}
+
+/* What is pending is what the actuator has seen. */
+static void hystgen_inverse_take(hystgen_inverse_t *self)
+{
+    if (self->has_pending) {
+        hystgen_inverse_absorb(self, self->pending);
+        self->has_pending = false;
+    }
+}
+
+/* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
+static hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u,
+                                             hystgen_real_t level, unsigned int bits)
+{
+    if (self->repeat && u >= self->reference && u <= self->reference) {
+        self->status |= self->bits;
+        return hystgen_inverse_answer(self, self->answer);
+    }
+    self->reference = u;
+    self->repeat = true;
+    self->bits = bits;
+    const hystgen_reach_t v =
+        hystgen_inverse_drive(self, level, hystgen_inverse_solve(self, level));
+    const hystgen_real_t inside = hystgen_clamp_drive(v);
+    if (inside < v || inside > v) {
+        self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    }
+    self->status |= self->bits;
+    return hystgen_inverse_answer(self, inside);
+}
+
+/* Drive v, which is `applied` once it is limited, is pending in place of the last answer. */
+static void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t applied,
+                                    hystgen_real_t v)
+{
+    if (v < applied || v > applied) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    self->repeat = false;
+    self->pending = v;
+    self->has_pending = true;
+}
+
+/* What init and reset have in common once the plays are set; they stand for this drive. */
+static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive)
+{
+    self->pending = drive;
+    self->drive = drive;
+    self->reference = 0;
+    self->answer = drive;
+    self->has_pending = false;
+    self->repeat = false;
+    self->stepped = false;
+    self->bits = 0;
+    self->status = 0;
+}
