@@ -81,7 +81,7 @@ class Model:
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
             raise UnsupportedEffectsError(
                 f"{what} of a model with effects ({names}) is not supported yet; remove model.effects, or simulate "
-                "the model forward in double precision"
+                "the model and its inverse in double precision"
             )
 
     def engine(
