@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,6 +26,7 @@ from hystgen.parameters.files import Parameters, load_parameters
 
 if TYPE_CHECKING:
     from hystgen.chain.chain import Chain
+    from hystgen.compensator.chained import Compensator
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
 
@@ -79,7 +81,7 @@ class Model:
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
             raise UnsupportedEffectsError(
                 f"{what} of a model with effects ({names}) is not supported yet; remove model.effects, or simulate "
-                "the model forward in double precision"
+                "the model and its inverse in double precision"
             )
 
     def engine(
@@ -170,9 +172,18 @@ class Model:
 
     def inverse(self) -> InverseModel:
         """The compensator. Raises NotInvertibleError with the reasons and ranges, UnsupportedEffectsError."""
-        self.need_static("the inverse")
-        self.cascade.inverse()
+        if self.effects:
+            self.compensator  # noqa: B018  raises
+        else:
+            self.cascade.inverse()
         return InverseModel(self)
+
+    @cached_property
+    def compensator(self) -> Compensator:
+        """The inverse in double precision of a model with effects; raises as `inverse`."""
+        from hystgen.compensator.chained import Compensator
+
+        return Compensator(self.chain)
 
 
 @dataclass(frozen=True)
@@ -182,10 +193,27 @@ class InverseModel:
     forward: Model
 
     def simulate(
-        self, u: ArrayLike, arithmetic: str | None = None, clamp: bool = False, engine: str | None = None
+        self,
+        u: ArrayLike,
+        arithmetic: str | None = None,
+        clamp: bool = False,
+        engine: str | None = None,
+        *,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
     ) -> NDArray[Any]:
-        """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`."""
-        return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
+        """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
+
+        With effects the whole reference is known: delays and modes take it before its time, and everything is at rest
+        at the first sample. What a mode leaves is its reference's fourth difference over 6, what a lag leaves a quarter
+        of the second difference of the drive behind it; all else is exact.
+        """
+        if not self.forward.effects:
+            return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
+        if arithmetic is not None:
+            self.forward.need_static("the bit reference")
+        ends = self.forward.cascade.input_range if clamp else (-math.inf, math.inf)
+        return self.forward.compensator.drives(self.forward.run(u, t, extra), ends)
 
     def inverse(self) -> Model:
         """The model that this compensates."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.chain.chain import join
 from hystgen.compensator.session import Session
 from hystgen.model import Model
 from hystgen.plays import slots
@@ -32,6 +33,8 @@ def simulate_records(
     """
     if operator == "inverse":
         model.inverse()
+    if model.effects and arithmetic is None and operator == "inverse":
+        return _compensated(model, records, history, rest)
     if model.effects and arithmetic is None:
         runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
         answers = model.chain.simulate(runs, history)
@@ -45,6 +48,26 @@ def simulate_records(
         signal = record.columns()["v" if operator == "forward" else "u"]
         samples, status = session.run(signal)
         found.append((samples, _remarks(record.name, session, operator, signal, status)))
+    return found
+
+
+def _compensated(
+    model: Model, records: Sequence[Record], history: Sequence[float], rest: float
+) -> list[tuple[NDArray[Any], list[str]]]:
+    """Drives for the references of records that are one session, of a model with effects."""
+    runs = [model.run(record.columns()["u"], record.t, record.extra, rest=rest) for record in records]
+    session = join(runs, history)
+    low, high = ends = model.cascade.input_range
+    asked = np.zeros(len(session.run.t), dtype=bool)
+    for part in session.parts:
+        asked[part] = True
+    drives = model.compensator.drives(session.run, ends, asked)
+    found = []
+    for record, part in zip(records, session.parts, strict=True):
+        v = drives[part]
+        limited = int(np.count_nonzero((v <= low) | (v >= high)))
+        said = [f"{record.name}: {limited} of {len(v)} drives were limited to input_range"] if limited else []
+        found.append((v, said))
     return found
 
 

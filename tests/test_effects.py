@@ -949,12 +949,12 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
 
 
 @pytest.mark.parametrize("ask", [
-    lambda m: m.inverse(), lambda m: hystgen.emit(m, "nowhere"), lambda m: hystgen.verify(m),
+    lambda m: m.inverse().simulate([0.0], "float32"), lambda m: hystgen.emit(m, "nowhere"), lambda m: hystgen.verify(m),
     lambda m: m.simulate([0.0], "float32"), lambda m: m.session(),
 ])  # fmt: skip
 def test_what_effects_do_not_have_yet_is_refused_by_name(ask: Callable[[hystgen.Model], Any]) -> None:
-    model = model_of("    - {name: lag, time_constant: 1}\n    - {name: drift, rate: 1}\n")
-    with pytest.raises(EffectsError, match=r"of a model with effects \(lag, drift\) is not supported yet"):
+    model = model_of("    - {name: lag, time_constant: 1}\n    - {name: creep, time_constants: [1], weights: [0.1]}\n")
+    with pytest.raises(EffectsError, match=r"of a model with effects \(lag, creep\) is not supported yet"):
         ask(model)
 
 
@@ -1185,16 +1185,17 @@ def test_simulate_warns_outside_the_range_and_needs_its_columns(
 
 def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     path = tmp_path / "stage.yaml"
-    path.write_text(FILE + "    - {name: lag, time_constant: 1}\n    - {name: drift, rate: 1}\n")
+    path.write_text(FILE + "    - {name: lag, time_constant: 1}\n    - {name: slew_limit, rate: 1}\n")
     data = written(tmp_path, "a.csv", *drive(20), u=np.zeros(20))
     out = tmp_path / "out"
     for words in (
         ("emit", path, "-o", out), ("emit", path, "-o", out, "--check"), ("verify", path),
-        ("simulate", path, data, "--operator", "inverse"), ("simulate", path, data, "--arithmetic", "q31"),
+        ("simulate", path, data, "--operator", "inverse", "--arithmetic", "float32"),
+        ("simulate", path, data, "--arithmetic", "q31"),
     ):  # fmt: skip
         code, said, err = run(*words)
         assert (code, said) == (1, "")
-        refusal = r"\S.* of a model with effects \(lag, drift\) is not supported yet; remove model.effects, .*"
+        refusal = r"\S.* of a model with effects \(lag, slew_limit\) is not supported yet; remove model.effects, .*"
         assert re.fullmatch(f"{path}: error: {refusal}", err)
         assert not out.exists()
 

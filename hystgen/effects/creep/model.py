@@ -141,11 +141,16 @@ class LogarithmicCreep(_Creep):
         places = math.log10(self.t_min) + (np.arange(n) + 0.5) * spacing
         return np.asarray(10.0**places, dtype=np.float64), self.per_decade * spacing
 
+    @property
+    def at_once(self) -> float:
+        """Share of a step that arrives at once: what makes its height full at t_0."""
+        tau, weight = self.spectrum()
+        return 1.0 - weight * float(np.sum(-np.expm1(-self.t0 / tau)))
+
     def filtered(self, h: Array, run: Run) -> Array:
         """The play sum with its creep."""
         tau, weight = self.spectrum()
-        at_t0 = weight * float(np.sum(-np.expm1(-self.t0 / tau)))
-        return (1.0 - at_t0) * h + _states(h, run, tau, np.full(len(tau), weight))
+        return self.at_once * h + _states(h, run, tau, np.full(len(tau), weight))
 
     def transients(self, run: Run) -> Array:
         """`exp(-t/tau_i)` for one time constant a decade, enough for any start of the spectrum."""

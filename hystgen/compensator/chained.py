@@ -1,0 +1,255 @@
+"""The inverse of a model with effects for a known reference, in double precision and for any sample times.
+
+One principle: the compensator keeps the actuator's states only. In each sample it solves for the drive from the output
+backwards, block by block, limits it, and absorbs forwards what is applied. What a block may not do without is seeing
+ahead: a delay and a mode take the reference before its time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from hystgen.basics.problems import EffectsError, NotInvertibleError, UnsupportedEffectsError
+from hystgen.chain.blocks import Block
+from hystgen.chain.chain import Chain
+from hystgen.chain.static import StaticModel
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.base import Array, Effect, Place, Run
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.rate_dependence.compensator import Movement
+from hystgen.effects.resonance.compensator import led
+from hystgen.effects.saturation.compensator import unsaturated
+
+EVEN = 1e-3
+"""Share of a step by which steps may differ for a mode's inverse, which takes them for equal: as much as its own error,
+`w0^2 T^2/12` with 60 samples a period."""
+
+ROUNDING = 1e-14
+"""Share of a number below which a change of it is rounding: some tens of roundings of 1.1e-16."""
+
+TURNS = 8
+"""Most repetitions of a sample in which the gain depends on the drive that is sought; each leaves a thousandth."""
+
+TAKEN_IN = frozenset({
+    "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",
+    "sensor_nonlinearity", "noncongruent",
+})  # fmt: skip
+
+
+class Actuator:
+    """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out."""
+
+    def __init__(self, static: StaticModel, effects: Sequence[Effect]) -> None:
+        pi = static.pi
+        self.static, self.bends = static, [effect for effect in effects if effect.bends_plays()]
+        self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
+        self.c, self.q = np.cumsum(self.p), np.cumsum(self.p * self.r)
+        mover = next((effect for effect in effects if effect.moves_plays()), None)
+        self.movement = None if mover is None else Movement(mover, self.r, self.p)  # type: ignore[arg-type]
+        self.start = np.array(pi.start)
+        self.plays = self.start.copy()
+        self.ascending = True
+        self.drive = float(static.front_inverse(float(pi.start[0]))) if static.start_is_defined else 0.0
+        self.advance(math.inf)
+
+    def advance(self, seconds: float) -> None:
+        """The plays move for this long."""
+        self.seconds = seconds
+
+    def moved(self, w: float) -> Array:
+        """Where the plays (n + 1) are once their input is at w."""
+        if self.movement is None or math.isinf(self.seconds):
+            return np.asarray(np.minimum(np.maximum(self.plays, w - self.r), w + self.r))
+        return self.movement.after(self.plays, float(self.plays[0]), w, self.seconds)
+
+    def total(self, rows: Array) -> float:
+        """The weighted sum of the rows, bent where an effect bends them."""
+        bent = rows[:, None]
+        for effect in self.bends:
+            bent = effect.bent(bent, self.r)
+        return float(self.p @ bent[:, 0])
+
+    def resting(self, y: float) -> float:
+        """The drive of the first move, from the start memory."""
+        return self.solve(y)
+
+    def rest(self, x: float) -> float:
+        """The first move, after which the plays are at rest."""
+        return self.absorb(x)
+
+    def solve(self, y: float) -> float:
+        """The drive on the branch of its own move: that of the output's move first, the other one next, else none."""
+        w = self._input(y)
+        if not self.static.branches_differ:
+            return float(self.static.front_inverse(w))
+        change = y - self.total(self.plays)
+        up = self.ascending if abs(change) <= ROUNDING * float(np.abs(self.p) @ np.abs(self.plays)) else change > 0.0
+        for ascending in (up, not up):
+            v = float(self.static.front_inverse(w, ascending))
+            back = abs(v - self.drive) <= ROUNDING * self.static.slope_ratio * max(abs(v), abs(self.drive))
+            if (v > self.drive) == ascending and not back:
+                return v
+            if back and ascending == self.ascending:  # stepped back by rounding alone, or stands still
+                return self.drive
+        return self.drive
+
+    def absorb(self, x: float) -> float:
+        """The plays follow; a move picks the branch."""
+        if x != self.drive:
+            self.ascending = x > self.drive
+        self.drive = x
+        self.plays = self.moved(float(self.static.front(x, self.ascending)))
+        return self.total(self.plays)
+
+    def _input(self, y: float) -> float:
+        """Input of the plays at which their sum is `y`."""
+        if self.movement is None and not self.bends:
+            return self._scan(y)
+        w = float(self.plays[0])
+        before = self.total(self.moved(w))
+        if y == before:
+            return w
+        way = (y - before) / float(self.p[0])  # no slope is below p_0 but where an effect bends the plays
+        for _ in range(64):
+            far = w + way
+            if (self.total(self.moved(far)) - y) * (before - y) <= 0.0:
+                scale = max(abs(w), abs(far))
+                return float(brentq(lambda x: self.total(self.moved(x)) - y, w, far, xtol=1e-16 * scale, rtol=1e-15))
+            way *= 2.0
+        raise EffectsError(f"no input of the plays gives {y:g}")
+
+    def _scan(self, y: float) -> float:
+        """The same for plays alone: on which piece of the curve that the move draws the sum is `y`."""
+        sign = 1.0 if y >= float(self.p @ self.plays) else -1.0
+        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # by the plays above each
+        inputs = self.plays + sign * self.r  # where each begins to follow
+        levels = self.c * inputs - sign * self.q + held
+        k = max(int(np.searchsorted(sign * levels, sign * y, side="right")) - 1, 0)
+        w = float((y - held[k] + sign * self.q[k]) / self.c[k])
+        return sign * max(sign * w, sign * float(inputs[k]))
+
+
+def refusal(effect: Effect) -> str:
+    """Why a compensator cannot take an effect in; empty where it can."""
+    if effect.name == "drift":
+        return "drift (a clock that runs alone; nothing says when it began)"
+    if effect.name == "thermal" and not effect.columns:
+        return "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's)"
+    if effect.name not in TAKEN_IN:
+        return f"{effect.name} (an effect of your own, which has no compensator)"
+    return ""
+
+
+class Compensator:
+    """Drives for a reference; a sensor's own nonlinearity is left out, the reference being true displacement.
+
+    Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
+    """
+
+    def __init__(self, chain: Chain) -> None:
+        static, effects = chain.cascade, chain.effects
+        creeping = [effect for effect in effects if isinstance(effect, creep.EFFECTS)]
+        missing = [*(reason for each in creeping for reason in creep.problems(each)), *static.inverse_problems()]
+        if missing:
+            raise NotInvertibleError(missing)
+        refused = [reason for effect in effects if (reason := refusal(effect))]
+        if refused:
+            raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
+        self.static, self.effects = static, effects
+        plays = [effect for effect in effects if effect.place is Place.PLAYS]
+        lags = [block for effect in self._called("lag") if (block := lag.block(effect))]
+        self.blocks: list[Block] = [*lags, Actuator(static, plays), *map(creep.block, creeping)]
+        self.slew = self._called("slew_limit")
+        self.modes = self._called("resonance")
+        self.delay = math.fsum(effect.time for effect in self._called("delay"))
+
+    def _called(self, name: str) -> list[Any]:
+        return [effect for effect in self.effects if effect.name == name]
+
+    def drives(self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None) -> Array:
+        """Drives (N,) within `ends` for the reference in `reference.v`.
+
+        `asked` (N,): where `reference.v` is a reference; it is a drive before the first of them, and between them the
+        drive holds. Everything is at rest at the first sample. After the last one the reference keeps its value.
+        """
+        asked = np.ones(len(reference.t), dtype=bool) if asked is None else asked
+        first = int(np.argmax(asked))
+        t, n = reference.t, len(reference.t)
+        gains = self._gains(reference)
+        targets = self._targets(reference, asked)
+        ageing_effects = self._called("ageing")
+        v = np.empty(n)
+        travelled = 0.0
+        for k in range(n):
+            seconds = float(t[k] - t[k - 1]) if k else 0.0
+            if k:
+                for block in self.blocks:
+                    block.advance(seconds)
+            before = float(v[k - 1]) if k else math.nan
+            drive = before
+            for _ in range(TURNS):
+                if not asked[k]:
+                    drive = float(reference.v[k]) if k < first else before
+                    break
+                last = drive
+                way = travelled + (abs(drive - before) if k else 0.0)
+                drive = self._solve(float(targets[k]), gains, k, [ageing.gain(e, way) for e in ageing_effects])
+                drive = min(max(self._slewed(drive, before, seconds), ends[0]), ends[1])
+                if drive == last or not ageing_effects:
+                    break
+            x = drive
+            for block in self.blocks:
+                x = block.absorb(x) if k else block.rest(x)
+            travelled += abs(drive - before) if k else 0.0
+            v[k] = drive
+        return v
+
+    def _solve(self, y: float, gains: Sequence[tuple[Array, Array]], k: int, aged: Sequence[float]) -> float:
+        for gain, offset in reversed(gains):
+            y = (y - float(offset[k])) / float(gain[k])
+        y = y / math.prod(aged)
+        for block in reversed(self.blocks):
+            y = block.solve(y) if k else block.resting(y)
+        return y
+
+    def _slewed(self, drive: float, before: float, seconds: float) -> float:
+        """The nearest drive that the amplifier reaches in this time."""
+        for effect in self.slew if seconds > 0.0 else ():
+            drive = min(max(drive, before - effect.falling_rate * seconds), before + effect.rate * seconds)
+        return drive
+
+    def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
+        """Gain and offset (N,) of each logged temperature, when the drive of a sample arrives."""
+        ahead = reference.t + self.delay
+        extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
+        later = Run(reference.t, reference.v, extra)
+        return [(effect.gain(later), effect.offset(later)) for effect in self._called("thermal")]
+
+    def _targets(self, reference: Run, asked: NDArray[np.bool_]) -> Array:
+        """What creep, or the gain behind it, has to give at each sample (N,) for the reference to arrive."""
+        wanted = reference.v - self.static.output_offset
+        for effect in reversed(self._called("saturation")):
+            wanted = unsaturated(effect, wanted)
+        t = reference.t
+        if not self.modes:
+            return np.asarray(np.interp(t + self.delay, t, wanted)) if self.delay else wanted
+        steps = np.diff(t)[asked[1:] & asked[:-1]]
+        step = float(np.median(steps)) if len(steps) else 1.0
+        if len(steps) and float(np.max(np.abs(steps - step))) > EVEN * step:
+            raise EffectsError("the inverse of a resonance needs samples at even times; resample the reference")
+
+        def given(modes: Sequence[Any], times: Array) -> Array:
+            """What the first of the modes in series has to be given."""
+            if not modes:
+                return np.asarray(np.interp(times, t, wanted))
+            before, now, after = (given(modes[1:], times + way) for way in (-step, 0.0, step))
+            return led(modes[0], before, now, after, step)
+
+        return given(self.modes, t + self.delay)

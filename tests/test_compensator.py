@@ -1,0 +1,236 @@
+"""The inverse of models with effects: composed with the forward model, which shares no code with it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hystgen
+from hystgen.basics.problems import EffectsError, NotInvertibleError
+from hystgen.cascade import PI, Cascade
+from hystgen.chain.chain import Chain
+from hystgen.compensator.chained import Compensator
+from hystgen.effects import Run, shapes
+from hystgen.effects.base import Array
+from hystgen.front.tanh.model import TanhEnvelope
+
+T, N = 1e-3, 900
+R = np.linspace(0.0, 27.0, 10)
+PLAYS = PI(R.tolist(), [0.24, *[0.02] * 9], (np.linspace(0.0, 9.0, 10)).tolist())
+WIDE = (-math.inf, math.inf)
+BENT = TanhEnvelope((60.0, 0.02, 0.1, -5.0), (60.0, 0.02, 0.1, -5.0))
+BRANCHES = TanhEnvelope((60.0, 0.02, 0.1, -5.0), (60.0, 0.02, 0.1, -4.0))
+FRONTS: dict[str, tuple[Any, ...]] = {"plays": (), "front": (BENT,), "two branches": (BRANCHES,)}
+
+
+def effect(name: str, which: int = 0, **numbers: Any) -> Any:
+    return shapes(name)[which](name=name, **numbers)
+
+
+CREEP = effect("creep", time_constants=(0.01, 0.1, 30.0), weights=(0.02, 0.03, 0.05))
+LOGARITHMIC = effect("creep", 1, shape="logarithmic", per_decade=0.02, t0=0.1, t_min=1e-3, t_max=1e4)
+TANH = effect("saturation", level=60.0)
+STOPS = effect("saturation", 2, shape="stops", lower=6.0, upper=12.0, give=0.1)
+THERMAL = effect("thermal", gain_per_degree=-0.002, offset_per_degree=0.01)
+BUMP = effect("noncongruent", 1, shape="centre", amplitude=0.4, centre=30.0, width=15.0)
+POLYNOMIALS = effect("noncongruent", coefficients=((0.05, -0.01),) * 9)
+RELAXING = effect("rate_dependence", 1, shape="relaxation", time_constant=5e-3)
+NONLINEAR = effect("rate_dependence", 1, shape="relaxation", time_constant=5e-3, exponent=2.0)
+BETAS = effect("rate_dependence", betas=(2e-4,) * 9)
+AGEING = [
+    effect("ageing", loss=0.01, travel=50.0),
+    effect("ageing", 1, shape="exponential", loss=0.05, travel=100.0),
+    effect("ageing", 2, shape="exponentials", losses=(0.02, 0.03), travels=(10.0, 200.0)),
+]
+SLEW = effect("slew_limit", rate=5000.0, falling_rate=4000.0)
+FAST_LAG = effect("lag", time_constant=0.2 * T)
+
+EXACT = {
+    "creep": [CREEP], "creep, logarithmic": [LOGARITHMIC], "tanh": [TANH], "stops": [STOPS], "thermal": [THERMAL],
+    "loop centre": [BUMP], "play functions": [POLYNOMIALS], "relaxation": [RELAXING], "dashpot": [NONLINEAR],
+    "thresholds": [BETAS], "slew": [SLEW], "fast lag": [FAST_LAG],
+    **{f"ageing {i}": [each] for i, each in enumerate(AGEING)},
+    "all": [FAST_LAG, SLEW, RELAXING, BUMP, LOGARITHMIC, THERMAL, AGEING[0], TANH],
+    "other shapes": [BETAS, POLYNOMIALS, CREEP, THERMAL, AGEING[2], STOPS],
+    "without lag": [SLEW, RELAXING, BUMP, LOGARITHMIC, THERMAL, TANH],
+}  # fmt: skip
+BLURRED = {name for name, effects in EXACT.items() if any(each.name in ("lag", "ageing") for each in effects)}
+"""Behind a lag the drive turns by rounding alone where the reference holds, and where the gain depends on the drive
+there may be none at a turn on either branch: with two branches these are not exact at single samples."""
+
+
+def times(uneven: bool = False) -> Array:
+    """Sample times, even or not."""
+    return np.cumsum(T * np.random.default_rng(4).uniform(0.5, 1.5, N)) if uneven else T * np.arange(N)
+
+
+def smooth(t: Array) -> Array:
+    """A reference that begins at rest, holds and returns."""
+    s = np.interp(t, [0.0, 0.02, 0.6, 0.8, 2.0], [0.0, 0.0, 0.58, 0.58, 1.78])
+    return 5.0 + 9.0 * (0.5 - 0.3 * np.cos(4.0 * np.pi * s) + 0.2 * np.sin(3.0 * s) ** 3)
+
+
+def both(effects: list[Any], stages: tuple[Any, ...], t: Array, u: Array) -> tuple[Array, Array]:
+    """Drives of the inverse, and what the forward model makes of them."""
+    chain = Chain(Cascade(PLAYS, stages, 1.0, (0.0, 100.0)), effects)
+    warm = {"temperature": 20.0 + 3.0 * np.sin(5.0 * t)}
+    v = Compensator(chain).drives(Run(t, u, warm), WIDE)
+    return v, chain.simulate([Run(t, v, warm)])[0]
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+@pytest.mark.parametrize("front", FRONTS)
+@pytest.mark.parametrize("name", EXACT)
+def test_what_is_promised_exactly_comes_out_at_every_sample(name: str, front: str, uneven: bool) -> None:
+    t = times(uneven)
+    _, y = both(EXACT[name], FRONTS[front], t, smooth(t))
+    wrong = np.abs(y - smooth(t)) > 1e-12 * 9.0
+    assert np.mean(wrong) <= 0.03 * (front == "two branches" and name in BLURRED)
+
+
+@pytest.mark.parametrize("name", ["creep", "creep, logarithmic", "relaxation", "loop centre", "tanh"])
+def test_steps_of_the_reference_are_taken_at_once(name: str) -> None:
+    t = times()
+    u = smooth(t) + np.where((t % 0.1) < 0.03, 2.0, 0.0)
+    _, y = both(EXACT[name], (), t, u)
+    assert float(np.max(np.abs(y - u))) <= 1e-12 * 9.0
+
+
+def test_a_lag_leaves_its_share_of_the_second_difference() -> None:
+    t, tau = times(), 10.0 * T
+    v, y = both([effect("lag", time_constant=tau)], (), t, smooth(t))
+    chain = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [])
+    wanted = Compensator(chain).drives(Run(t, smooth(t), {}), WIDE)  # the drive behind the lag
+    theta = (1.0 - np.exp(-T / tau)) ** -1 * (tau / T * -np.expm1(-T / tau) - np.exp(-T / tau))
+    most = float(np.sum(PLAYS.weights)) * theta**2 * float(np.max(np.abs(np.diff(wanted, 2))))
+    assert 1e-4 < float(np.max(np.abs(y - smooth(t)))) <= most
+    static = chain.simulate([Run(t, _lagged(wanted, tau), {})])[0]
+    assert float(np.std(y - smooth(t))) < 0.01 * float(np.std(static - smooth(t)))
+    assert np.all(np.isfinite(v))
+
+
+def _lagged(v: Array, tau: float) -> Array:
+    """`tau a' + a = v` for straight v, by 200 small steps a sample."""
+    a, out = v[0], [v[0]]
+    for before, after in itertools.pairwise(v):
+        for k in range(200):
+            a += (before + (after - before) * (k + 0.5) / 200 - a) * T / 200 / tau
+        out.append(a)
+    return np.array(out)
+
+
+def test_a_lag_answers_limits_without_a_trace() -> None:
+    """Drives that were limited are what the lag has seen: soon after the last of them nothing is left of it."""
+    t = times()
+    chain = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [effect("lag", time_constant=3.0 * T)])
+    u = np.where(t < 0.7, 3.0, 6.0)
+    v = Compensator(chain).drives(Run(t, u, {}), (0.0, 30.0))
+    y = chain.simulate([Run(t, v, {})])[0]
+    limited = np.flatnonzero(v == 30.0)
+    assert 0 < len(limited) < 20
+    assert float(np.max(np.abs(y - u)[limited[-1] + 5 :])) < 1e-12 * 9.0
+    assert float(np.max(y)) < 6.0 + 0.25 * 3.0  # a step's second difference times theta^2, as without limits
+
+
+@pytest.mark.parametrize("shift", [0.0, 2.6, 7.0])
+def test_a_delay_is_met_ahead_of_time(shift: float) -> None:
+    t = times()
+    _, y = both([effect("delay", time=shift * T), CREEP], (), t, smooth(t))
+    inside = slice(0, N - 9)  # the last drives are for a reference beyond the end
+    curvature = float(np.max(np.abs(np.diff(both([CREEP], (), t, smooth(t))[0], 2))))
+    slope = 1.1 * float(np.sum(PLAYS.weights))
+    assert float(np.max(np.abs(y - smooth(t))[inside])) <= slope * curvature / 4 * (shift % 1 > 0) + 1e-12 * 9.0
+
+
+def test_a_mode_arrives_as_the_mean_of_three_samples() -> None:
+    t = times()
+    mode = effect("resonance", frequency=20.0, damping=0.02)
+    _, y = both([mode], (), t, smooth(t))
+    sides = np.pad(smooth(t), 1, mode="edge")
+    expected = (sides[:-2] + 4.0 * sides[1:-1] + sides[2:]) / 6.0
+    assert float(np.max(np.abs(y - expected))) < 2e-3 * 9.0
+    static = both([], (), t, smooth(t))[0]
+    rung = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [mode]).simulate([Run(t, static, {})])[0]
+    assert float(np.std(y - smooth(t))) < 0.02 * float(np.std(rung - smooth(t)))
+    with pytest.raises(EffectsError, match="even times"):
+        both([mode], (), times(uneven=True), smooth(times(uneven=True)))
+
+
+def test_thresholds_that_grow_too_fast_are_stood_in_for() -> None:
+    """Their own inverse would chatter: drives are as smooth as those of the static one."""
+    t = times()
+    fast = effect("rate_dependence", betas=(5.0 * T,) * 9)
+    v, y = both([fast], (), t, smooth(t))
+    static = both([], (), t, smooth(t))[0]
+    rough = [float(np.max(np.abs(np.diff(each, 2)))) for each in (v, static)]
+    assert rough[0] < 2.0 * rough[1]
+    plain = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [fast]).simulate([Run(t, static, {})])[0]
+    assert float(np.std(y - smooth(t))) < 0.3 * float(np.std(plain - smooth(t)))
+
+
+FILE = """\
+hystgen: 1
+name: stage_x
+sample_time: 0.001
+input_range: [0, 100]
+model:
+  pi: {thresholds: [0, 5, 10, 20], weights: [0.1, 0.02, 0.02, 0.03]}
+  effects:
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Callable[[str], hystgen.Model]:
+    def of(effects: str) -> hystgen.Model:
+        (tmp_path / "stage_x.yaml").write_text(FILE + effects)
+        return hystgen.load(tmp_path / "stage_x.yaml")
+
+    return of
+
+
+def test_what_has_no_inverse_says_why(model: Callable[[str], hystgen.Model]) -> None:
+    for effects, kind, said in (
+        ("    - {name: drift, rate: 1}\n", EffectsError, r"cannot take in drift \(a clock"),
+        (
+            "    - {name: thermal, source: self_heating, time_constant: 10, heating: 1.0e-5}\n",
+            EffectsError, "own heat",
+        ),
+        (
+            "    - {name: creep, shape: logarithmic, per_decade: 0.3, t0: 1000, t_min: 1.0e-3, t_max: 1000}\n",
+            NotInvertibleError, "nothing of a step arrives at once",
+        ),
+    ):  # fmt: skip
+        with pytest.raises(kind, match=said):
+            model(effects).inverse()
+        assert np.all(np.isfinite(model(effects).simulate([0.0, 1.0, 2.0])))
+
+
+def test_records_are_one_session(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+    """Drives of `simulate --operator inverse`, simulated forwards, are the references; limits are counted."""
+    (tmp_path / "stage_x.yaml").write_text(FILE + "    - {name: creep, time_constants: [0.2], weights: [0.05]}\n")
+    t = T * np.arange(400)
+    references = []
+    for k, name in enumerate(("one.csv", "two.csv")):
+        u = 6.0 + 4.0 * np.sin(20.0 * t + k) * t
+        references.append(u)
+        np.savetxt(tmp_path / name, np.column_stack([t, u]), delimiter=",", header="t,u", comments="", fmt="%.17g")
+    files = [tmp_path / "one.csv", tmp_path / "two.csv"]
+    code, _, err = run(
+        "simulate", tmp_path / "stage_x.yaml", *files, "--operator", "inverse", "-o", tmp_path / "v", "--history",
+        "50,0", "--rest", "0.1",
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    made = [tmp_path / "v" / file.name for file in files]
+    code, _, err = run(
+        "simulate", tmp_path / "stage_x.yaml", *made, "-o", tmp_path / "y", "--history", "50,0", "--rest", "0.1"
+    )
+    assert (code, err) == (0, "")
+    for file, u in zip(files, references, strict=True):
+        y = np.loadtxt(tmp_path / "y" / file.name, delimiter=",", skiprows=1)
+        assert float(np.max(np.abs(y[:, -1] - u))) < 1e-6 * 9.0
