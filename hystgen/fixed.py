@@ -158,9 +158,9 @@ def output(t: FixedTables, s: State) -> Any:
     return code
 
 
-def solve(t: FixedTables, s: State, u: Any) -> Any:
-    """Input of the plays that gives output code u."""
-    return loop_solve(t, s, (u << t.limits[FRACTION]) - t.limits[OFFSET])
+def inverse_solve(t: FixedTables, s: State, level: Any) -> Any:
+    """Input of the plays that gives output code `level`."""
+    return loop_solve(t, s, (level << t.limits[FRACTION]) - t.limits[OFFSET])
 
 
 def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
@@ -171,7 +171,7 @@ def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
 SHARED: list[Callable[..., Any]] = [nearest, over_slope, curve, front_forward, front_inverse]
 """What both engines have."""
 
-_OWN: list[Callable[..., Any]] = [*SHARED, going, loop_solve, output, solve, finite]
+_OWN: list[Callable[..., Any]] = [*SHARED, going, loop_solve, output, inverse_solve, finite]
 _REPLACED = {function.__name__ for function in (*_OWN, *reference.FRONT)}
 _COMMON = [function for function in reference.COMPILED if function.__name__ not in _REPLACED]
 _PLAYS = {"loop_rest", "loop_start", "loop_absorb", "loop_output"}

@@ -1,8 +1,9 @@
 """The bit reference of engine loop: the emitted C, operation for operation, in Python.
 
-Every function has its counterpart in `c_runtime/` or in the step template, mostly of the same name, and computes the
-same operations in the same order in the same arithmetic, so that results are compared for equal bits. That of engine
-corners is in `hystgen.corners`, and shares the memoryless part and the tables.
+Every function has its counterpart of the same name in `c_runtime/` and computes the same operations in the same order
+in the same arithmetic, so that results are compared for equal bits. What both operators do alike C has for each of them
+(`forward_begin`, `inverse_begin`); here it is written once (`begin`). That of engine corners is in `hystgen.corners`,
+and shares the memoryless part and the tables.
 
 The functions know nothing of numpy's or numba's types: they run as plain Python on scalars of the arrays they are
 given, or compiled (see `hystgen.compiled`). Real constants come out of arrays because a literal would not have the
@@ -31,7 +32,7 @@ HOLD, REAL_MAX, ZERO = 7, 8, 9
 CORNERS, LOOP = 0, 1
 TANH, DEAD_ZONE = 0, 1
 
-PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
+PENDING, DRIVE, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
 ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5
 
 INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN = 1, 2, 4, 8
@@ -223,7 +224,7 @@ def front_inverse(t: Tables, w: Any, ascending: int) -> tuple[Any, int]:
     return v, limited
 
 
-# ---------------------------------------------------------------- the step template
+# ---------------------------------------------------------------- loop*.c, clamp.c, inverse_*_branch*.c
 
 
 def output(t: Tables, s: State) -> Any:
@@ -231,21 +232,21 @@ def output(t: Tables, s: State) -> Any:
     return loop_output(t, s) + t.limits[OFFSET]
 
 
-def solve(t: Tables, s: State, u: Any) -> Any:
-    """Input of the plays that gives u, offset included."""
-    return loop_solve(t, s, u - t.limits[OFFSET])
+def inverse_solve(t: Tables, s: State, level: Any) -> Any:
+    """Input of the plays that gives output `level`."""
+    return loop_solve(t, s, level - t.limits[OFFSET])
 
 
 def begin(t: Tables, s: State, which: int) -> None:
     """What init and reset have in common once the plays are set; `which` as in `Tables.applied`."""
-    applied = t.applied[which]
+    drive = t.applied[which]
     s.counts[ASCENDING] = t.ascending[which]
     s.counts[HAS_PENDING] = 0
     s.counts[REPEAT] = 0
     s.counts[STEPPED] = 0
     s.counts[BITS] = 0
-    s.real[PENDING] = applied
-    s.real[APPLIED] = applied
+    s.real[PENDING] = drive
+    s.real[DRIVE] = drive
     s.real[LEVEL] = output(t, s)
     s.counts[STATUS] = 0
     s.real[REFERENCE] = s.real[LEVEL]
@@ -261,45 +262,25 @@ def init(t: Tables, s: State, inverse: int) -> None:
     begin(t, s, 2 * inverse)
 
 
-def see_drive(t: Tables, s: State, v: Any) -> None:
-    """The actuator sees drive v: its own move picks the branch."""
+def arrive(t: Tables, s: State, v: Any) -> Any:
+    """The actuator is at drive v, whose own move picks the branch; the input of the plays."""
     if t.branches:
-        if v > s.real[APPLIED]:
+        if v > s.real[DRIVE]:
             s.counts[ASCENDING] = 1
-        elif v < s.real[APPLIED]:
+        elif v < s.real[DRIVE]:
             s.counts[ASCENDING] = 0
-    s.real[APPLIED] = v
-    loop_absorb(t, s, front_forward(t, v, s.counts[ASCENDING]))
+    s.real[DRIVE] = v
+    return front_forward(t, v, s.counts[ASCENDING])
+
+
+def absorb(t: Tables, s: State, v: Any) -> None:
+    """The actuator has seen drive v."""
+    loop_absorb(t, s, arrive(t, s, v))
 
 
 def finite(t: Tables, x: Any) -> bool:
     """Neither NaN nor infinite."""
     return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])
-
-
-def forward_step(t: Tables, s: State, v: Any) -> Any:
-    """One sample of the forward operator."""
-    if not finite(t, v):
-        s.counts[STATUS] |= HELD
-        return s.real[ANSWER]
-    if v < t.limits[DRIVE_MIN]:
-        v = t.limits[DRIVE_MIN]
-        s.counts[STATUS] |= INPUT_CLAMPED
-    elif v > t.limits[DRIVE_MAX]:
-        v = t.limits[DRIVE_MAX]
-        s.counts[STATUS] |= INPUT_CLAMPED
-    see_drive(t, s, v)
-    s.real[ANSWER] = output(t, s)
-    return s.real[ANSWER]
-
-
-def answer(s: State, v: Any) -> Any:
-    """Leave drive v pending and return it."""
-    s.real[ANSWER] = v
-    s.real[PENDING] = v
-    s.counts[HAS_PENDING] = 1
-    s.counts[STEPPED] = 1
-    return v
 
 
 def clamp_drive(t: Tables, v: Any) -> Any:
@@ -311,66 +292,115 @@ def clamp_drive(t: Tables, v: Any) -> Any:
     return v
 
 
-def fits(s: State, v: Any, ascending: int) -> bool:
+def inverse_clamp(t: Tables, u: Any) -> Any:
+    """u inside the output range."""
+    if u < t.limits[OUTPUT_MIN]:
+        return t.limits[OUTPUT_MIN]
+    if u > t.limits[OUTPUT_MAX]:
+        return t.limits[OUTPUT_MAX]
+    return u
+
+
+def forward_step(t: Tables, s: State, v: Any) -> Any:
+    """One sample of the forward operator."""
+    if not finite(t, v):
+        s.counts[STATUS] |= HELD
+        return s.real[ANSWER]
+    inside = clamp_drive(t, v)
+    if inside != v:
+        s.counts[STATUS] |= INPUT_CLAMPED
+    absorb(t, s, inside)
+    s.real[ANSWER] = output(t, s)
+    return s.real[ANSWER]
+
+
+def inverse_answer(s: State, v: Any) -> Any:
+    """Leave drive v pending and return it."""
+    s.real[ANSWER] = v
+    s.real[PENDING] = v
+    s.counts[HAS_PENDING] = 1
+    s.counts[STEPPED] = 1
+    return v
+
+
+def inverse_take(t: Tables, s: State) -> None:
+    """What is pending is what the actuator has seen."""
+    if s.counts[HAS_PENDING]:
+        absorb(t, s, s.real[PENDING])
+        s.counts[HAS_PENDING] = 0
+
+
+def inverse_fits(t: Tables, s: State, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
-    if v == s.real[APPLIED]:
+    inside = clamp_drive(t, v)
+    if inside == s.real[DRIVE]:
         return bool(s.counts[ASCENDING] == ascending)
-    return bool((v > s.real[APPLIED]) == (ascending != 0))
+    return bool((inside > s.real[DRIVE]) == (ascending != 0))
 
 
-def choose_branch(t: Tables, s: State, u: Any, w: Any) -> tuple[Any, int]:
-    """The drive on the branch of its own move: that of u's move first, the other one next, else no move."""
+def inverse_choose(t: Tables, s: State, level: Any, w: Any) -> tuple[Any, int]:
+    """The drive on the branch of its own move: that of the reference's move first, then the other one, else no move."""
+    if not t.branches:
+        return front_inverse(t, w, 1)
     up = s.counts[ASCENDING]
-    if u > s.real[LEVEL]:
+    if level > s.real[LEVEL]:
         up = 1
-    elif u < s.real[LEVEL]:
+    elif level < s.real[LEVEL]:
         up = 0
     v, limited = front_inverse(t, w, up)
-    if fits(s, clamp_drive(t, v), up):
+    if inverse_fits(t, s, v, up):
         return v, limited
-    back = clamp_drive(t, v) - s.real[APPLIED]
+    back = clamp_drive(t, v) - s.real[DRIVE]
     if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
-        return s.real[APPLIED], limited
+        return s.real[DRIVE], limited
     v, limited = front_inverse(t, w, 1 - up)
-    if fits(s, clamp_drive(t, v), 1 - up):
+    if inverse_fits(t, s, v, 1 - up):
         return v, limited
-    return s.real[APPLIED], limited
+    return s.real[DRIVE], limited
+
+
+def inverse_drive(t: Tables, s: State, level: Any, w: Any) -> Any:
+    """The drive that gives w."""
+    v, limited = inverse_choose(t, s, level, w)
+    s.real[LEVEL] = level
+    if limited:
+        s.counts[BITS] |= DOMAIN
+    return v
+
+
+def inverse_search(t: Tables, s: State, u: Any, level: Any, bits: int) -> Any:
+    """Answer reference u, which is `level` once it is limited; `bits` is its status so far."""
+    if s.counts[REPEAT] and u == s.real[REFERENCE]:
+        s.counts[STATUS] |= s.counts[BITS]
+        return inverse_answer(s, s.real[ANSWER])
+    s.real[REFERENCE] = u
+    s.counts[REPEAT] = 1
+    s.counts[BITS] = bits
+    v = inverse_drive(t, s, level, inverse_solve(t, s, level))
+    inside = clamp_drive(t, v)
+    if inside != v:
+        s.counts[BITS] |= OUTPUT_CLAMPED
+    s.counts[STATUS] |= s.counts[BITS]
+    return inverse_answer(s, inside)
 
 
 def inverse_step(t: Tables, s: State, u: Any) -> Any:
     """One sample of the inverse operator."""
-    if s.counts[HAS_PENDING]:
-        see_drive(t, s, s.real[PENDING])
-        s.counts[HAS_PENDING] = 0
+    inverse_take(t, s)
     if not finite(t, u):
         s.counts[STATUS] |= HELD
-        return answer(s, s.real[ANSWER] if s.counts[STEPPED] else s.real[APPLIED])
-    if s.counts[REPEAT] and u == s.real[REFERENCE]:
-        s.counts[STATUS] |= s.counts[BITS]
-        return answer(s, s.real[ANSWER])
-    bits = 0
-    s.real[REFERENCE] = u
-    s.counts[REPEAT] = 1
-    if u < t.limits[OUTPUT_MIN]:
-        u = t.limits[OUTPUT_MIN]
-        bits = bits | INPUT_CLAMPED
-    elif u > t.limits[OUTPUT_MAX]:
-        u = t.limits[OUTPUT_MAX]
-        bits = bits | INPUT_CLAMPED
-    w = solve(t, s, u)
-    if t.branches:
-        v, limited = choose_branch(t, s, u, w)
-    else:
-        v, limited = front_inverse(t, w, 1)
-    s.real[LEVEL] = u
-    if limited:
-        bits = bits | DOMAIN
-    inside = clamp_drive(t, v)
-    if inside != v:
-        bits = bits | OUTPUT_CLAMPED
-    s.counts[BITS] = bits
-    s.counts[STATUS] |= bits
-    return answer(s, inside)
+        return inverse_answer(s, s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE])
+    level = inverse_clamp(t, u)
+    return inverse_search(t, s, u, level, 0 if level == u else INPUT_CLAMPED)
+
+
+def inverse_replace(s: State, applied: Any, v: Any) -> None:
+    """Drive v, which is `applied` once it is limited, is pending in place of the last answer."""
+    if v != applied:
+        s.counts[STATUS] |= INPUT_CLAMPED
+    s.counts[REPEAT] = 0
+    s.real[PENDING] = v
+    s.counts[HAS_PENDING] = 1
 
 
 def inverse_commit(t: Tables, s: State, applied: Any) -> None:
@@ -378,12 +408,7 @@ def inverse_commit(t: Tables, s: State, applied: Any) -> None:
     if not finite(t, applied):
         s.counts[STATUS] |= HELD
         return
-    v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
-    if v != applied:
-        s.counts[STATUS] |= INPUT_CLAMPED
-    s.real[PENDING] = v
-    s.counts[HAS_PENDING] = 1
-    s.counts[REPEAT] = 0
+    inverse_replace(s, applied, clamp_drive(t, applied) + t.limits[ZERO])  # no drive is -0
 
 
 def reset(t: Tables, s: State, inverse: int) -> None:
@@ -413,16 +438,20 @@ def run(t: Tables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, 
 
 def visit(t: Tables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
     """Let the actuator be at drive v before the next sample."""
-    see_drive(t, s, v)
+    absorb(t, s, v)
     s.real[LEVEL] = output(t, s)
 
 
 FRONT: list[Callable[..., Any]] = [envelope_forward, envelope_inverse, dead_zone, front_forward, front_inverse]
 
 COMPILED: list[Callable[..., Any]] = [
-    loop_rest, loop_start, loop_absorb, loop_output, loop_solve, *FRONT, output, solve, begin, init, see_drive, finite,
-    forward_step, answer, clamp_drive, fits, choose_branch, inverse_step, inverse_commit, reset, visit, run,
+    loop_rest, loop_start, loop_absorb, loop_output, loop_solve, *FRONT, output, inverse_solve, begin, init, arrive,
+    absorb, finite, clamp_drive, inverse_clamp, forward_step, inverse_answer, inverse_take, inverse_fits,
+    inverse_choose, inverse_drive, inverse_search, inverse_step, inverse_replace, inverse_commit, reset, visit, run,
 ]  # fmt: skip  (callees before callers)
 
 # What every sample goes through
-INLINED: set[Callable[..., Any]] = {output, solve, see_drive, finite, forward_step, answer, clamp_drive}
+INLINED: set[Callable[..., Any]] = {
+    output, inverse_solve, arrive, absorb, finite, forward_step, inverse_answer, inverse_take, inverse_search,
+    clamp_drive, inverse_clamp,
+}  # fmt: skip
