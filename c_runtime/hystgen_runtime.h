@@ -33,14 +33,12 @@ typedef double hystgen_real_t;
 #define HYSTGEN_REAL_MAX DBL_MAX
 #define HYSTGEN_REAL_MANT_DIG DBL_MANT_DIG
 #define HYSTGEN_REAL_BITS 53
-#define HYSTGEN_HALF 0.5
 #include "soft_float64.h"
 #else
 typedef float hystgen_real_t;
 #define HYSTGEN_REAL_MAX FLT_MAX
 #define HYSTGEN_REAL_MANT_DIG FLT_MANT_DIG
 #define HYSTGEN_REAL_BITS 24
-#define HYSTGEN_HALF 0.5f
 #include "soft_float32.h"
 #endif
 typedef hystgen_real_t hystgen_play_t;

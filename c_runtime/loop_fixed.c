@@ -1,47 +1,32 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: what fixed point does, whose sums are finer than codes. */
-
-static hystgen_real_t hystgen_forward_output(hystgen_forward_t *self)
-{
-    return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
-                        &self->status);
-}
+/* Operators of engine loop: what is a sample in fixed point, where every code is a number. */
 
 /* One sample. */
 hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
 {
-    const hystgen_real_t inside = hystgen_clamp_drive(v);
-    if (inside != v) {
+    const hystgen_reach_t asked = v;
+    if (asked < HYSTGEN_DRIVE_MIN || asked > HYSTGEN_DRIVE_MAX) {
+        v = hystgen_clamp_drive(v);
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    hystgen_forward_absorb(self, inside);
+    hystgen_forward_absorb(self, v);
     self->answer = hystgen_forward_output(self);
     return self->answer;
-}
-
-static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
-{
-    unsigned int status = 0; /* of what no step has answered */
-    return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
-                        &status);
-}
-
-/* Input of the plays that gives output code `level`. */
-HYSTGEN_APART hystgen_reach_t hystgen_inverse_solve(const hystgen_inverse_t *self,
-                                                    hystgen_real_t level)
-{
-    const hystgen_sum_t output =
-        (hystgen_sum_t)level * ((hystgen_sum_t)1 << HYSTGEN_FRACTION) - HYSTGEN_OFFSET;
-    return hystgen_loop_solve(&hystgen_model_tables, self->play, output);
 }
 
 /* One sample. */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
-    const hystgen_real_t level = hystgen_inverse_clamp(u);
+    const hystgen_reach_t asked = u;
+    hystgen_real_t level = u;
+    unsigned int bits = 0;
     hystgen_inverse_take(self);
-    return hystgen_inverse_search(self, u, level, level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u);
+    if (asked < HYSTGEN_OUTPUT_MIN || asked > HYSTGEN_OUTPUT_MAX) {
+        level = hystgen_inverse_clamp(u);
+        bits = HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    return hystgen_inverse_search(self, u, level, bits);
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)

@@ -1,15 +1,10 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: what floating point does, which has numbers that are none. */
+/* Operators of engine loop: what is a sample in floating point, which has numbers that are none. */
 
 static bool hystgen_finite(hystgen_real_t x)
 {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
-}
-
-static hystgen_real_t hystgen_forward_output(const hystgen_forward_t *self)
-{
-    return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
 }
 
 /* One sample. */
@@ -26,17 +21,6 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
     hystgen_forward_absorb(self, v);
     self->answer = hystgen_forward_output(self);
     return self->answer;
-}
-
-static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
-{
-    return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
-}
-
-/* Input of the plays that gives output `level`. */
-static hystgen_real_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level)
-{
-    return hystgen_loop_solve(&hystgen_model_tables, self->play, level - HYSTGEN_OFFSET);
 }
 
 /* One sample. */

@@ -41,7 +41,7 @@ PLACES = [
 
 # Of modules without a memoryless part, whose usual sample does not look at the list
 USUAL_PLACES = [
-    (r"(    const uint32_t room = .*;\n)", 1, r"\1    GRANTED(room <= WAY);\n"),
+    (r"(    const uint32_t room = [^;]*;\n)", 1, r"\1    GRANTED(room <= WAY);\n"),
     (
         r"(        const int64_t w = here->rising \? here->input \+ step : here->input - step;\n)",
         1,

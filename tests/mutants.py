@@ -1,4 +1,4 @@
-"""Mutants of the templates and the run time: small faults that `verify` has to find, and those that are none.
+"""Mutants of the run time: small faults that `verify` has to find, and those that are none.
 
 Data to be amended with the sources: `old` has to stand in the file, once unless `count` says otherwise.
 """
@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 from modelfiles import FILES, PLAYS, head
 
-STEP = "templates/step.c.j2"
-CODES = "templates/front_fixed.c.j2"
+STEP = "c_runtime/loop_float.c"
+LOOP = "c_runtime/loop.c"
+CODES = "c_runtime/code_saturating.c"
 CORNERS = "c_runtime/corners_fixed.c"
 USUAL = "c_runtime/inverse_fixed.c"
 FRONT = "c_runtime/inverse_front_fixed.c"
@@ -156,21 +157,37 @@ KILLED = (
         "plain", "q15",
     ),
     Mutant(
-        "where plays follow is kept behind a commit", FRONT, "    self->next = -((int64_t)1 << 62);\n    hystgen_move",
+        "where plays follow is kept behind a commit", FRONT, "    self->next = -HYSTGEN_FAR;\n    hystgen_move",
         "    hystgen_move", "two_branches", "q31",
     ),
     Mutant(
-        "the low saturation code", CODES, "code < -{{ code_max }} ? -{{ code_max }} : code",
-        "code < -{{ code_max }} ? -{{ code_max }} - 1 : code", "far_low", "q15",
+        "the low saturation code", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX",
+        "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX - 1", "far_low", "q15",
     ),
     Mutant(
+<<<<<<< HEAD
         "halves of codes are rounded up on either side of 0", CODES, " - (w < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
     ),
     Mutant(
         "no saturation below", CODES, "code < -{{ code_max }} ? -{{ code_max }} : code", "code", "far_low", "q15",
+=======
+        "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX", "code < -HYSTGEN_CODE_MAX ? code", "far_low", "q15",
+>>>>>>> wt-c
     ),
     Mutant(
-        "no number before the first step", STEP, "self->stepped ? self->answer : self->applied", "self->answer",
+        "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",
+        "plain", "float32", "loop",
+    ),
+    Mutant(
+        "a committed drive answers the same reference, loop", LOOP, "    self->repeat = false;\n    self->pending = v;",
+        "    self->pending = v;", "plain", "q31", "loop",
+    ),
+    Mutant(
+        "what is pending stays out of the memory", LOOP, "hystgen_inverse_absorb(self, self->pending);",
+        "self->drive = self->pending;", "plain", "float32", "loop",
+    ),
+    Mutant(
+        "the limit of a reference counts as the reference", LOOP, "self->reference = u;", "self->reference = level;",
         "plain", "float32", "loop",
     ),
     Mutant(

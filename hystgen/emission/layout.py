@@ -57,16 +57,18 @@ def _fitted(lines: list[str]) -> Iterator[str]:
         line = lines[at]
         indent = line[: len(line) - len(line.lstrip())]
         if line.startswith("#"):
-            yield from _directive(line)
-            at += 1
+            end = at
+            while lines[end].endswith("\\"):
+                end += 1
+            yield from _directive(line) if end == at else lines[at : end + 1]
+            at = end + 1
         elif line.lstrip().startswith("/*"):
             end = next(i for i in range(at, len(lines)) if "*/" in lines[i])
             yield from _comment(lines[at : end + 1])
             at = end + 1
         elif re.search(r"= \{$", line):  # a table
             end = next(i for i in range(at, len(lines)) if lines[i].endswith("};"))
-            head = line.removesuffix(" {")
-            yield from ([*_broken(head, indent)[:-1], _broken(head, indent)[-1] + " {"] if len(line) > WIDTH else [line])
+            yield from _broken(line, indent)
             yield from lines[at + 1 : end + 1]
             at = end + 1
         else:
@@ -124,25 +126,31 @@ def _aligned(lines: list[str]) -> list[str]:
 
 def _broken(code: str, indent: str) -> list[str]:
     """Code on lines of WIDTH, broken where the fewest parentheses are open."""
+    inside = len(indent) + 4
     lines = []
     text = indent + code.strip()
     opened: list[int] = []  # columns behind parentheses of earlier lines that are still open
     while len(text) > WIDTH:
-        place, opened = _place(text, opened, len(indent) + 4)
+        found = _place(text, opened, inside)
+        if found is None:  # too far to the right
+            text, opened = " " * inside + text.lstrip(), [inside] * len(opened)
+            found = _place(text, opened, inside)
+        assert found, text
+        place, opened = found
         lines.append(text[:place].rstrip())
-        text = " " * (opened[-1] if opened else len(indent) + 4) + text[place:].lstrip()
+        text = " " * (opened[-1] if opened else inside) + text[place:].lstrip()
     return [*lines, text]
 
 
-def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]]:
-    """Where to break a line that is too long, and the parentheses that are open there."""
+def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]] | None:
+    """Where to break a line that is too long, and the parentheses that are open there; None for nowhere."""
     start = len(text) - len(text.lstrip())
     opened = list(before)
     stacks = []  # at each character
     for at, character in enumerate(text):
-        if character in ")]":
+        if character in ")]}" and opened:
             opened.pop()
-        if character in "([":
+        if character in "([{":
             opened.append(at + 1)
         stacks.append(list(opened))
     found = [
@@ -153,15 +161,22 @@ def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]]:
     ]
     fitting = [each for each in found if _rest_fits(text, each[2], (stacks[each[2] - 1] or [inside])[-1])]
     assigned = _ASSIGNED.search(text, start + 1, WIDTH)
-    if assigned and not before and (not fitting or (min(fitting)[0] == 0 and inside + len(text) - assigned.end() <= WIDTH)):
+    whole = assigned and inside + len(text) - assigned.end() <= WIDTH
+    if assigned and not before and (not fitting or (whole and min(fitting)[0] == 0)):
         return assigned.end(), []
     if fitting:
         depth, way, _ = min(fitting)
         place = max(end for d, w, end in fitting if (d, w) == (depth, way))
         return place, stacks[place - 1]
+    heads = [m.end() for m in re.finditer(r"(?<=\w) (?=[\w*])", text) if m.end() <= WIDTH and not stacks[m.start()]]
     bracket = re.compile(r"\w\(").search(text, start, WIDTH)
-    place = bracket.end() if bracket else max(end for _, _, end in found)
-    return place, [*stacks[place - 1][:-1], inside] if bracket else stacks[place - 1]
+    if heads and not before and (start == 0 or not bracket):  # between a type and a name
+        return heads[-1], []
+    if bracket:
+        return bracket.end(), [*stacks[bracket.end() - 1][:-1], inside]
+    cast = re.compile(r"_t\)(?=\w)").search(text, start, WIDTH)
+    last = cast.end() if cast else max((end for _, _, end in found), default=0)
+    return (last, stacks[last - 1]) if last else None
 
 
 def _rest_fits(text: str, place: int, column: int) -> bool:
@@ -197,9 +212,15 @@ def _directive(line: str) -> Iterator[str]:
     elif macro:
         yield from _comment([macro[2]])
         yield macro[1]
+    elif line.startswith("#error"):
+        words = textwrap.wrap(line.partition(" ")[2].strip('"'), WIDTH - len('#error " " \\'), break_long_words=False)
+        inside = [*(f'"{part} "' for part in words[:-1]), f'"{words[-1]}"']
+        yield from _continued([f"#error {inside[0]}", *(f"       {part}" for part in inside[1:])])
     else:
-        assert line.startswith("#error"), line
-        words = textwrap.wrap(line.partition(" ")[2].strip('"'), WIDTH - 12, break_long_words=False)
-        quoted = [f'"{part} "' for part in words[:-1]] + [f'"{words[-1]}"']
-        yield from (f"{'#error' if not i else '      '} {part}" + (" \\" if i + 1 < len(quoted) else "")
-                    for i, part in enumerate(quoted))  # fmt: skip
+        yield from _continued(textwrap.wrap(line, WIDTH - len(" \\"), subsequent_indent=" " * 4))
+
+
+def _continued(lines: list[str]) -> Iterator[str]:
+    """Lines that are one to the preprocessor."""
+    yield from (f"{line} \\" for line in lines[:-1])
+    yield lines[-1]

@@ -45,7 +45,7 @@ def files(parameters: Parameters, cascade: StaticModel, options: Options) -> dic
     """File names and their ASCII text. Raises NotInvertibleError and tables.FormatError."""
     if options.inverse and cascade.inverse_problems():
         raise NotInvertibleError(cascade.inverse_problems())
-    values = _values(parameters, cascade, options)
+    values = values_of(parameters, cascade, options)
     name, shared = parameters.name, options.layout == "shared-runtime"
     single = options.layout == "single-header"
 
@@ -163,7 +163,8 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
     }
 
 
-def _values(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
+def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
+    """What the templates are filled with, and what the cost is counted from."""
     name = parameters.name
     about = _arithmetic(options.arithmetic)
     shared = options.layout == "shared-runtime"
@@ -190,18 +191,18 @@ def _values(parameters: Parameters, cascade: StaticModel, options: Options) -> S
         branches=cascade.branches_differ,
     )
     family: runtime.Family = values.family
-    variant = runtime.Variant(
+    values.variant = runtime.Variant(
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list
     )
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
-    most = max(n, 1) if values.fixed else n + 1
-    glue = render("front.c.j2", values) if values.stages else ""
-    pieces = runtime.operator_pieces(variant, operators, glue)
+    values.corners = max(n, 1) if values.fixed else n + 1
+    values.glue = render("front.c.j2", values) if values.stages else ""
+    pieces = runtime.operator_pieces(values.variant, operators, values.glue)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
-    values.operators = runtime.render_operators(pieces, name, most, prefix, family)
-    values.states = runtime.render_operators(runtime.state_pieces(variant, operators), name, most, prefix, family)
+    values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
+    values.states = runtime.render_operators(runtime.state_pieces(values.variant, operators), name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
     values.api = runtime.api(operators, name, prefix, family)
@@ -297,7 +298,7 @@ def _units(parameters: Parameters) -> SimpleNamespace:
 
 def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
     """What the emitted model costs, as its banner says."""
-    found: cost.Cost = _values(parameters, cascade, options).cost
+    found: cost.Cost = values_of(parameters, cascade, options).cost
     return found
 
 

@@ -137,8 +137,9 @@ def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) ->
 
 
 def _lines(entries: Sequence[str]) -> str:
-    """Entries of a table, none of them broken, on as few lines as they take."""
-    whole = ", ".join(entry.replace(" ", "\0") for entry in entries)
+    """Entries of a table, none of them broken that fits in a line, on as few lines as they take."""
+    fitting = WIDTH - len("    ,")
+    whole = ", ".join(entry.replace(" ", "\0") if len(entry) <= fitting else entry for entry in entries)
     lines = textwrap.wrap(whole, WIDTH, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
     return "\n".join(lines).replace("\0", " ")
 
@@ -148,9 +149,10 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
     rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
     segments = _lines([f"{{{', '.join(map(literal, row))}}}" for row in rows])
     pairs = [f"{{{literal(pair[0])}, {literal(pair[1])}}}" for pair in (curve.limit, curve.inside, curve.range)]
+    entries = _lines([f"{own}_segment", *pairs])
     found = [
         f"static const {prefix}_segment_t {own}_segment[{len(curve.way)}] = {{\n{segments}\n}};\n",
-        f"static const {prefix}_curve_t {own}_curve = {{\n    {own}_segment, {', '.join(pairs)}\n}};\n",
+        f"static const {prefix}_curve_t {own}_curve = {{\n{entries}\n}};\n",
     ]
     before: dict[str, str] = {}
     memories = []
@@ -162,11 +164,11 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
             found.append(f"static const {prefix}_real_t {before[text]}[{len(points)}][2] = {{{text}}};\n")
         output, falling, rising = map(literal, start.bottom)
         memories.append(
-            f"    {{{before[text]}, {start.step}, {start.risen}, "
+            f"{{{before[text]}, {start.step}, {start.risen}, "
             f"{{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
         )
     found.append(
-        f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(memories) + "\n};\n"
+        f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(_lines([m]) for m in memories) + "\n};\n"
     )
     return found
 
@@ -301,10 +303,15 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
     rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in [*zip(*plays, strict=True), never])
     most = (limits[slots.MARGIN] - limits[slots.PLAY_MIN], limits[slots.PLAY_MAX] + limits[slots.MARGIN])
     ends = f"{{{', '.join(map(literal, most))}}}"
+<<<<<<< HEAD
     parts = f"{literal(limits[slots.OFFSET])}, {ends}, {len(numbers.threshold) - 1}"
+=======
+    n = len(numbers.threshold) - 1
+    parts = _lines([f"{name}_model_segment", literal(limits[reference.OFFSET]), ends, str(n)])
+>>>>>>> wt-c
     arrays = [
         f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
-        f"static const {prefix}_curve_t {name}_model_curve = {{\n    {name}_model_segment, {parts}\n}};\n",
+        f"static const {prefix}_curve_t {name}_model_curve = {{\n{parts}\n}};\n",
         table("int32_t", f"{name}_model_start", list(numbers.start)),
         table("int32_t", f"{name}_model_zero", list(numbers.zero)),
     ]

@@ -60,7 +60,6 @@ class Family:
             "HYSTGEN_REAL_MAX": f"{self.macros}_MAX",
             "HYSTGEN_REAL_MANT_DIG": f"{self.macros}_MANT_DIG",
             "HYSTGEN_REAL_BITS": str(self.mantissa),
-            "HYSTGEN_HALF": "0.5f" if self.real == "float" else "0.5",
         }  # fmt: skip
 
     @property
@@ -86,6 +85,11 @@ class Family:
         return ("hystgen_corners_fixed_state.h",) if self.fixed else ("hystgen_corners_state.h",)
 
     @property
+    def kernel_files(self) -> tuple[str, ...]:
+        """The files with its kernels, callees before callers."""
+        return tuple(file.format(bits=self.bits) for file in (FIXED_KERNELS if self.fixed else FLOAT_KERNELS))
+
+    @property
     def kernels(self) -> tuple[str, ...]:
         """The headers of the run time that have the prototypes of its kernels."""
         return (f"hystgen_kernels_{'fixed' if self.fixed else 'float'}.h", "hystgen_kernels_loop.h")
@@ -96,8 +100,8 @@ class Family:
         return "build_fixed.h" if self.fixed else "build_float.h"
 
     def soft(self, kernels: str) -> tuple[str, ...]:
-        """The header that finds out what float arithmetic costs, where these kernels ask for it."""
-        return (f"soft_float{self.bits[1:]}.h",) if "HYSTGEN_SOFT_FLOAT" in kernels else ()
+        """The header with what the corner engine asks of floating point, where it is among these kernels."""
+        return (f"soft_float{self.bits[1:]}.h",) if "_SOFT_FLOAT" in kernels else ()
 
     @property
     def opening(self) -> tuple[str, ...]:
@@ -156,12 +160,14 @@ class Variant:
 
     def _loop(self) -> tuple[str, ...]:
         front = "branches" if self.branches else "front" if self.fronts else "plain"
+        kind = "fixed" if self.fixed else "float"
         return (
             "loop_start_list.c" if self.start_list else "loop_start.c",
             f"loop_{front}.c",
+            f"loop_output_{kind}.c",
             "loop.c",
-            "loop_fixed.c" if self.fixed else "loop_float.c",
-            *(() if self.branches else ("loop_one_branch.c",)),
+            f"loop_{kind}.c",
+            "loop_two_branches.c" if self.branches else "loop_one_branch.c",
         )
 
     def _corners(self) -> tuple[str, ...]:
@@ -243,8 +249,7 @@ def _pieces(files: Iterable[str]) -> list[Piece]:
 
 def kernel_pieces(family: Family) -> list[Piece]:
     """Every piece of every kernel file of an arithmetic, callees before callers."""
-    files = FIXED_KERNELS if family.fixed else FLOAT_KERNELS
-    return _pieces(name.format(bits=family.bits) for name in files)
+    return _pieces(family.kernel_files)
 
 
 def table_pieces(family: Family) -> list[Piece]:
@@ -264,7 +269,7 @@ def state_pieces(variant: Variant, operators: Iterable[str]) -> list[Piece]:
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
-    """The pieces that `roots` lead to, in their order, but each behind those that it uses."""
+    """The pieces that `roots` lead to, in their order; names in `roots` that no piece has are of elsewhere."""
     by_name = {piece.name: piece for piece in pieces}
     wanted: set[str] = set()
     queue = [name for name in roots if name in by_name]
@@ -273,18 +278,7 @@ def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
         if name not in wanted:
             wanted.add(name)
             queue.extend(by_name[name].uses & by_name.keys())
-    placed: dict[str, Piece] = {}
-
-    def place(piece: Piece) -> None:
-        for used in by_name.values():
-            if used.name in piece.uses and used.name not in placed:
-                place(used)
-        placed[piece.name] = piece
-
-    for piece in by_name.values():
-        if piece.name in wanted and piece.name not in placed:
-            place(piece)
-    return list(placed.values())
+    return [piece for name, piece in by_name.items() if name in wanted]
 
 
 def used(pieces: Iterable[Piece]) -> set[str]:

@@ -1,0 +1,26 @@
+#include "hystgen_runtime.h"
+
+/* Operators of engine loop: outputs of the plays in fixed point, whose sums are finer than codes.
+ */
+
+static hystgen_real_t hystgen_forward_output(hystgen_forward_t *self)
+{
+    return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
+                        &self->status);
+}
+
+static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
+{
+    unsigned int status = 0; /* of what no step has answered */
+    return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
+                        &status);
+}
+
+/* Input of the plays that gives output code `level`. */
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_solve(const hystgen_inverse_t *self,
+                                                    hystgen_real_t level)
+{
+    const hystgen_sum_t output =
+        (hystgen_sum_t)level * ((hystgen_sum_t)1 << HYSTGEN_FRACTION) - HYSTGEN_OFFSET;
+    return hystgen_loop_solve(&hystgen_model_tables, self->play, output);
+}

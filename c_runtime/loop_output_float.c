@@ -1,0 +1,19 @@
+#include "hystgen_runtime.h"
+
+/* Operators of engine loop: outputs of the plays in floating point. */
+
+static hystgen_real_t hystgen_forward_output(const hystgen_forward_t *self)
+{
+    return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
+}
+
+static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
+{
+    return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
+}
+
+/* Input of the plays that gives output `level`. */
+static hystgen_real_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level)
+{
+    return hystgen_loop_solve(&hystgen_model_tables, self->play, level - HYSTGEN_OFFSET);
+}
