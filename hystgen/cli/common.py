@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 
-
 class Failed(click.ClickException):
     """A check that failed (exit code 1) or input that cannot be used (2); the message says everything."""
 

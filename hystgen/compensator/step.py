@@ -49,7 +49,7 @@ from hystgen.plays.slots import (
 
 
 class Operations(NamedTuple):
-    """What is done to an instance: `init`, `visit` and `run` as `of` has them, a step of each operator, the front."""
+    """What is done to an instance: `init`, `visit` and `run` as in `made_of`, a step of each operator, the front."""
 
     init: Callable[..., Any]
     visit: Callable[..., Any]
@@ -70,7 +70,6 @@ def answer(s: State, v: Any) -> Any:
     return v
 
 
-
 @jit(inline=True)
 def clamp_drive(t: Tables | FixedTables, v: Any) -> Any:
     """v inside the input range."""
@@ -81,7 +80,6 @@ def clamp_drive(t: Tables | FixedTables, v: Any) -> Any:
     return v
 
 
-
 @jit
 def fits(s: State, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
@@ -90,7 +88,7 @@ def fits(s: State, v: Any, ascending: int) -> bool:
     return bool((v > s.real[APPLIED]) == (ascending != 0))
 
 
-def of(
+def made_of(
     front_forward: Callable[..., Any],
     front_inverse: Callable[..., Any],
     output: Callable[..., Any],

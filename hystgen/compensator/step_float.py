@@ -16,12 +16,10 @@ def output(t: Tables, s: State) -> Any:
     return loop_output(t, s) + t.limits[OFFSET]
 
 
-
 @jit(inline=True)
 def solve(t: Tables, s: State, u: Any) -> Any:
     """Input of the plays that gives u, offset included."""
     return loop_solve(t, s, u - t.limits[OFFSET])
-
 
 
 @jit(inline=True)

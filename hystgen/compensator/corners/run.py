@@ -11,7 +11,7 @@ from hystgen.plays.corners.memory import STATUS, Reals
 from hystgen.plays.slots import OP_COMMIT, OP_INIT, OP_RESET, ZERO, Bytes
 
 
-def of(forward: ModuleType, inverting: ModuleType, front_forward: Any, front_inverse: Any) -> Operations:
+def made_of(forward: ModuleType, inverting: ModuleType, front_forward: Any, front_inverse: Any) -> Operations:
     """The operations of an operator each, from a module of this package that has its functions, and of the front."""
     forward_init, forward_reset, forward_step = forward.forward_init, forward.forward_reset, forward.forward_step
     inverse_init, inverse_reset, inverse_step = inverting.inverse_init, inverting.inverse_reset, inverting.inverse_step
