@@ -21,8 +21,8 @@ class _Ageing(Effect):
     name: Literal["ageing"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.GAIN
-    compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "a gain input to `step`"
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "exact, from the distance that the drive has travelled"
     timed: ClassVar[bool] = False
 
     @classmethod

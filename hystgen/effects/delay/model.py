@@ -27,7 +27,7 @@ class Delay(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     compensated: ClassVar[Compensated] = "none without preview"
-    compensation: ClassVar[str] = "preview of a known reference; otherwise named, not inverted"
+    compensation: ClassVar[str] = "the reference is read ahead of its time; without preview the motion is late"
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive `time` seconds earlier."""

@@ -17,7 +17,7 @@ class _Drift(Effect):
 
     place: ClassVar[Place] = Place.ADDED
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "none without a sensor; an offset input to `step`"
+    compensation: ClassVar[str] = "none without a sensor"
 
 
 class LinearDrift(_Drift):

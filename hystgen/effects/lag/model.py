@@ -25,7 +25,7 @@ class Lag(Effect):
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 2
     compensated: ClassVar[Compensated] = "approximate"
-    compensation: ClassVar[str] = "a lead with a pole that bounds the noise"
+    compensation: ClassVar[str] = "a lead, exact on ramps; a quarter of the second difference of the drive is left"
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""

@@ -77,7 +77,9 @@ class ThresholdRate(_RateDependence):
     )
 
     compensated: ClassVar[Compensated] = "exact"
-    compensation: ClassVar[str] = "exact while the thresholds stay ordered, else one implicit step a sample"
+    compensation: ClassVar[str] = (
+        "exact for betas below half a sample time; beyond, relaxing plays stand in, which lag as far behind on ramps"
+    )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """One beta a play."""
@@ -140,7 +142,7 @@ class RelaxingPlays(_RateDependence):
     )
 
     compensated: ClassVar[Compensated] = "exact"
-    compensation: ClassVar[str] = "one implicit step a sample"
+    compensation: ClassVar[str] = "exact: one equation a sample is solved"
 
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
         """Viscous plays."""

@@ -28,7 +28,7 @@ class Resonance(Effect):
     order: ClassVar[int] = 1
     repeatable: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "approximate"
-    compensation: ClassVar[str] = "a reference filter: notch or zero-vibration shaper, or the second-order inverse"
+    compensation: ClassVar[str] = "three samples of the reference around the present one: no ringing, no delay"
 
     def _factors(self, times: Array) -> tuple[Array, Array, Array]:
         """Times in radians of the undamped oscillation, and the decaying cosine and sine."""

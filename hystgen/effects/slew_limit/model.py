@@ -33,7 +33,7 @@ class SlewLimit(Effect):
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 1
     compensated: ClassVar[Compensated] = "none"
-    compensation: ClassVar[str] = "the reference is limited, and what was applied is committed"
+    compensation: ClassVar[str] = "the drive is kept within it, so that the memory is the actuator's"
 
     @model_validator(mode="after")
     def _same_rate(self) -> SlewLimit:

@@ -57,7 +57,7 @@ class LoggedThermal(_Thermal):
     timed: ClassVar[bool] = False
     columns: ClassVar[tuple[str, ...]] = (COLUMN,)
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "exact with a temperature input to `step`"
+    compensation: ClassVar[str] = "exact with the temperature beside the reference"
 
     def above(self, run: Run) -> Array:
         """The logged temperature above the reference."""
@@ -85,7 +85,7 @@ class _OwnHeat(_Thermal):
     time_constant: Positive = Field(description="tau, s", examples=[60.0])
 
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "flagged: the temperature is not measured"
+    compensation: ClassVar[str] = "none: the temperature is not measured"
 
     @abstractmethod
     def heat(self, run: Run) -> Array:
