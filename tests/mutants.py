@@ -165,14 +165,11 @@ KILLED = (
         "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX - 1", "far_low", "q15",
     ),
     Mutant(
-<<<<<<< HEAD
-        "halves of codes are rounded up on either side of 0", CODES, " - (w < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
+        "halves of codes are rounded up on either side of 0", CURVE, " - (x < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
     ),
     Mutant(
-        "no saturation below", CODES, "code < -{{ code_max }} ? -{{ code_max }} : code", "code", "far_low", "q15",
-=======
-        "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX", "code < -HYSTGEN_CODE_MAX ? code", "far_low", "q15",
->>>>>>> wt-c
+        "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX",
+        "code < -HYSTGEN_CODE_MAX ? code", "far_low", "q15",
     ),
     Mutant(
         "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from modelfiles import FILES
 
-from hystgen.api import Model, emit_options
 from hystgen.emission import module, runtime
-from hystgen.params import parse_parameters
+from hystgen.emission.calls import emit_options
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
 
 RUNTIME = runtime.data_folder("c_runtime")
 

@@ -39,7 +39,7 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
     ends = (curve if fixed else compensator).front_forward, (curve if fixed else compensator).front_inverse
     if loops:
         own = step_fixed if fixed else step_float
-        return step.made_of(*ends, own.output, own.solve, own.finite)
+        return step.made_of(*ends, own.output, own.inverse_solve, own.finite)
     if fixed:
         return run.made_of(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
     return run.made_of(forward_front, inverse_front, *ends) if front else run.made_of(forward, inverse, *ends)

@@ -1,7 +1,8 @@
 """One step of engine loop, and the operations around it: commit, reset, init.
 
-Every function has its counterpart in `c_runtime/` or in the step template, mostly of the same name. Engine corners has
-its own in `hystgen.compensator.corners`, and shares the memoryless part and the tables.
+Every function has its counterpart of the same name in `c_runtime/`. What both operators do alike C has for each of them
+(`forward_begin`, `inverse_begin`); here it is written once (`begin`). Engine corners has its own in
+`hystgen.compensator.corners`, and shares the memoryless part and the tables.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.loop import (
     ANSWER,
-    APPLIED,
     ASCENDING,
     BITS,
+    DRIVE,
     HAS_PENDING,
     LEVEL,
     PENDING,
@@ -61,7 +62,7 @@ class Operations(NamedTuple):
 
 
 @jit(inline=True)
-def answer(s: State, v: Any) -> Any:
+def inverse_answer(s: State, v: Any) -> Any:
     """Leave drive v pending and return it."""
     s.real[ANSWER] = v
     s.real[PENDING] = v
@@ -80,19 +81,40 @@ def clamp_drive(t: Tables | FixedTables, v: Any) -> Any:
     return v
 
 
+@jit(inline=True)
+def inverse_clamp(t: Tables | FixedTables, u: Any) -> Any:
+    """u inside the output range."""
+    if u < t.limits[OUTPUT_MIN]:
+        return t.limits[OUTPUT_MIN]
+    if u > t.limits[OUTPUT_MAX]:
+        return t.limits[OUTPUT_MAX]
+    return u
+
+
 @jit
-def fits(s: State, v: Any, ascending: int) -> bool:
+def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> bool:
     """Whether going to v is a move of the branch that v was computed on."""
-    if v == s.real[APPLIED]:
+    inside = clamp_drive(t, v)
+    if inside == s.real[DRIVE]:
         return bool(s.counts[ASCENDING] == ascending)
-    return bool((v > s.real[APPLIED]) == (ascending != 0))
+    return bool((inside > s.real[DRIVE]) == (ascending != 0))
+
+
+@jit
+def inverse_replace(s: State, applied: Any, v: Any) -> None:
+    """Drive v, which is `applied` once it is limited, is pending in place of the last answer."""
+    if v != applied:
+        s.counts[STATUS] |= INPUT_CLAMPED
+    s.counts[REPEAT] = 0
+    s.real[PENDING] = v
+    s.counts[HAS_PENDING] = 1
 
 
 def made_of(
     front_forward: Callable[..., Any],
     front_inverse: Callable[..., Any],
     output: Callable[..., Any],
-    solve: Callable[..., Any],
+    inverse_solve: Callable[..., Any],
     finite: Callable[..., Any],
 ) -> Operations:
     """The operations with the parts in which arithmetics differ: the memoryless part, the output for the memory as it
@@ -101,14 +123,14 @@ def made_of(
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
         """What init and reset have in common once the plays are set; `which` as in `Tables.applied`."""
-        applied = t.applied[which]
+        drive = t.applied[which]
         s.counts[ASCENDING] = t.ascending[which]
         s.counts[HAS_PENDING] = 0
         s.counts[REPEAT] = 0
         s.counts[STEPPED] = 0
         s.counts[BITS] = 0
-        s.real[PENDING] = applied
-        s.real[APPLIED] = applied
+        s.real[PENDING] = drive
+        s.real[DRIVE] = drive
         s.real[LEVEL] = output(t, s)
         s.counts[STATUS] = 0
         s.real[REFERENCE] = s.real[LEVEL]
@@ -130,20 +152,25 @@ def made_of(
         begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
-    def see_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
-        """The actuator sees drive v: its own move picks the branch."""
+    def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
+        """The actuator is at drive v, whose own move picks the branch; the input of the plays."""
         if t.branches:
-            if v > s.real[APPLIED]:
+            if v > s.real[DRIVE]:
                 s.counts[ASCENDING] = 1
-            elif v < s.real[APPLIED]:
+            elif v < s.real[DRIVE]:
                 s.counts[ASCENDING] = 0
-        s.real[APPLIED] = v
-        loop_absorb(t, s, front_forward(t, v, s.counts[ASCENDING]))
+        s.real[DRIVE] = v
+        return front_forward(t, v, s.counts[ASCENDING])
+
+    @jit(inline=True)
+    def absorb(t: Tables | FixedTables, s: State, v: Any) -> None:
+        """The actuator has seen drive v."""
+        loop_absorb(t, s, arrive(t, s, v))
 
     @jit
     def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
         """Let the actuator be at drive v before the next sample."""
-        see_drive(t, s, v)
+        absorb(t, s, v)
         s.real[LEVEL] = output(t, s)
 
     @jit(inline=True)
@@ -152,70 +179,76 @@ def made_of(
         if not finite(t, v):
             s.counts[STATUS] |= HELD
             return s.real[ANSWER]
-        if v < t.limits[DRIVE_MIN]:
-            v = t.limits[DRIVE_MIN]
+        inside = clamp_drive(t, v)
+        if inside != v:
             s.counts[STATUS] |= INPUT_CLAMPED
-        elif v > t.limits[DRIVE_MAX]:
-            v = t.limits[DRIVE_MAX]
-            s.counts[STATUS] |= INPUT_CLAMPED
-        see_drive(t, s, v)
+        absorb(t, s, inside)
         s.real[ANSWER] = output(t, s)
         return s.real[ANSWER]
 
     @jit
-    def choose_branch(t: Tables | FixedTables, s: State, u: Any, w: Any) -> tuple[Any, int]:
-        """The drive on the branch of its own move: that of u's move first, the other one next, else no move."""
+    def inverse_take(t: Tables | FixedTables, s: State) -> None:
+        """What is pending is what the actuator has seen."""
+        if s.counts[HAS_PENDING]:
+            absorb(t, s, s.real[PENDING])
+            s.counts[HAS_PENDING] = 0
+
+    @jit
+    def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
+        """The drive on the branch of its own move: that of the reference's move first, the other one next, else no
+        move."""
+        if not t.branches:
+            return front_inverse(t, w, 1)  # type: ignore[no-any-return]
         up = s.counts[ASCENDING]
-        if u > s.real[LEVEL]:
+        if level > s.real[LEVEL]:
             up = 1
-        elif u < s.real[LEVEL]:
+        elif level < s.real[LEVEL]:
             up = 0
         v, limited = front_inverse(t, w, up)
-        if fits(s, clamp_drive(t, v), up):
+        if inverse_fits(t, s, v, up):
             return v, limited
-        back = clamp_drive(t, v) - s.real[APPLIED]
+        back = clamp_drive(t, v) - s.real[DRIVE]
         if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
-            return s.real[APPLIED], limited
+            return s.real[DRIVE], limited
         v, limited = front_inverse(t, w, 1 - up)
-        if fits(s, clamp_drive(t, v), 1 - up):
+        if inverse_fits(t, s, v, 1 - up):
             return v, limited
-        return s.real[APPLIED], limited
+        return s.real[DRIVE], limited
+
+    @jit
+    def inverse_drive(t: Tables | FixedTables, s: State, level: Any, w: Any) -> Any:
+        """The drive that gives w."""
+        v, limited = inverse_choose(t, s, level, w)
+        s.real[LEVEL] = level
+        if limited:
+            s.counts[BITS] |= DOMAIN
+        return v
+
+    @jit(inline=True)
+    def inverse_search(t: Tables | FixedTables, s: State, u: Any, level: Any, bits: int) -> Any:
+        """Answer reference u, which is `level` once it is limited; `bits` is its status so far."""
+        if s.counts[REPEAT] and u == s.real[REFERENCE]:
+            s.counts[STATUS] |= s.counts[BITS]
+            return inverse_answer(s, s.real[ANSWER])
+        s.real[REFERENCE] = u
+        s.counts[REPEAT] = 1
+        s.counts[BITS] = bits
+        v = inverse_drive(t, s, level, inverse_solve(t, s, level))
+        inside = clamp_drive(t, v)
+        if inside != v:
+            s.counts[BITS] |= OUTPUT_CLAMPED
+        s.counts[STATUS] |= s.counts[BITS]
+        return inverse_answer(s, inside)
 
     @jit
     def inverse_step(t: Tables | FixedTables, s: State, u: Any) -> Any:
         """One sample of the inverse operator."""
-        if s.counts[HAS_PENDING]:
-            see_drive(t, s, s.real[PENDING])
-            s.counts[HAS_PENDING] = 0
+        inverse_take(t, s)
         if not finite(t, u):
             s.counts[STATUS] |= HELD
-            return answer(s, s.real[ANSWER] if s.counts[STEPPED] else s.real[APPLIED])
-        if s.counts[REPEAT] and u == s.real[REFERENCE]:
-            s.counts[STATUS] |= s.counts[BITS]
-            return answer(s, s.real[ANSWER])
-        bits = 0
-        s.real[REFERENCE] = u
-        s.counts[REPEAT] = 1
-        if u < t.limits[OUTPUT_MIN]:
-            u = t.limits[OUTPUT_MIN]
-            bits = bits | INPUT_CLAMPED
-        elif u > t.limits[OUTPUT_MAX]:
-            u = t.limits[OUTPUT_MAX]
-            bits = bits | INPUT_CLAMPED
-        w = solve(t, s, u)
-        if t.branches:
-            v, limited = choose_branch(t, s, u, w)
-        else:
-            v, limited = front_inverse(t, w, 1)
-        s.real[LEVEL] = u
-        if limited:
-            bits = bits | DOMAIN
-        inside = clamp_drive(t, v)
-        if inside != v:
-            bits = bits | OUTPUT_CLAMPED
-        s.counts[BITS] = bits
-        s.counts[STATUS] |= bits
-        return answer(s, inside)
+            return inverse_answer(s, s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE])
+        level = inverse_clamp(t, u)
+        return inverse_search(t, s, u, level, 0 if level == u else INPUT_CLAMPED)
 
     @jit
     def inverse_commit(t: Tables | FixedTables, s: State, applied: Any) -> None:
@@ -223,12 +256,7 @@ def made_of(
         if not finite(t, applied):
             s.counts[STATUS] |= HELD
             return
-        v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
-        if v != applied:
-            s.counts[STATUS] |= INPUT_CLAMPED
-        s.real[PENDING] = v
-        s.counts[HAS_PENDING] = 1
-        s.counts[REPEAT] = 0
+        inverse_replace(s, applied, clamp_drive(t, applied) + t.limits[ZERO])  # no drive is -0
 
     @jit
     def run(

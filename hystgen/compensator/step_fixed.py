@@ -25,9 +25,9 @@ def output(t: FixedTables, s: State) -> Any:
 
 
 @jit
-def solve(t: FixedTables, s: State, u: Any) -> Any:
-    """Input of the plays that gives output code u."""
-    return loop_solve(t, s, (u << t.limits[FRACTION]) - t.limits[OFFSET])
+def inverse_solve(t: FixedTables, s: State, level: Any) -> Any:
+    """Input of the plays that gives output code `level`."""
+    return loop_solve(t, s, (level << t.limits[FRACTION]) - t.limits[OFFSET])
 
 
 @jit

@@ -17,9 +17,9 @@ def output(t: Tables, s: State) -> Any:
 
 
 @jit(inline=True)
-def solve(t: Tables, s: State, u: Any) -> Any:
-    """Input of the plays that gives u, offset included."""
-    return loop_solve(t, s, u - t.limits[OFFSET])
+def inverse_solve(t: Tables, s: State, level: Any) -> Any:
+    """Input of the plays that gives output `level`."""
+    return loop_solve(t, s, level - t.limits[OFFSET])
 
 
 @jit(inline=True)

@@ -67,7 +67,7 @@ def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
     arrays = (_corner_fields if corners else _loop_fields)(numbers, name, prefix, options)
-    own = [] if corners else [_loop_tables(_loop_pointers(numbers, name, options), numbers, name, prefix)]
+    own = [] if corners else [_loop_tables(_loop_pointers(name, options), numbers, name, prefix)]
     return {
         **_limits(numbers),
         "arrays": arrays,
@@ -103,7 +103,7 @@ def _loop_fields(numbers: Tables, name: str, prefix: str, options: Options) -> l
     return arrays
 
 
-def _loop_pointers(numbers: Tables, name: str, options: Options) -> list[str]:
+def _loop_pointers(name: str, options: Options) -> list[str]:
     """Pointers to these arrays, NULL for those that nothing reads."""
     places = {field: f"{name}_play.{own}" for field, own, both in _COLUMNS if both or options.inverse}
     return [places.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
@@ -303,12 +303,8 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
     rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in [*zip(*plays, strict=True), never])
     most = (limits[slots.MARGIN] - limits[slots.PLAY_MIN], limits[slots.PLAY_MAX] + limits[slots.MARGIN])
     ends = f"{{{', '.join(map(literal, most))}}}"
-<<<<<<< HEAD
-    parts = f"{literal(limits[slots.OFFSET])}, {ends}, {len(numbers.threshold) - 1}"
-=======
     n = len(numbers.threshold) - 1
-    parts = _lines([f"{name}_model_segment", literal(limits[reference.OFFSET]), ends, str(n)])
->>>>>>> wt-c
+    parts = _lines([f"{name}_model_segment", literal(limits[slots.OFFSET]), ends, str(n)])
     arrays = [
         f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
         f"static const {prefix}_curve_t {name}_model_curve = {{\n{parts}\n}};\n",

@@ -16,7 +16,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.plays.slots import ZERO, Counts, Reals
 
-PENDING, APPLIED, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
+PENDING, DRIVE, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
 ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hystgen.effects.base import Array
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
-from hystgen.effects.recursions import code
+from hystgen.effects.recursions import relaxed
 
 
 class Movement:
@@ -44,7 +44,6 @@ class Movement:
             r = self.r[1:] + np.asarray(self.betas) * abs(w - x) / seconds
             out[1:] = np.clip(plays[1:], w - r, w + r)
             return out
-        relaxed = code().relaxed
         for i, tau in enumerate(self.taus, 1):
             if tau > 0.0:
                 out[i] = relaxed(x, w, seconds, self.r[i], tau, self.exponent, self.scale, plays[i])
