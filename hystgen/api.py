@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -331,11 +331,12 @@ def verify(source: Model | str | os.PathLike[str], **options: Any) -> Any:
 
 
 def diagnose(source: Model | str | os.PathLike[str], records: Any, **options: Any) -> Any:
-    """Find what a believed model is missing; see `hystgen.diagnosis.diagnose`."""
+    """Find what a nominal model is missing, with a report to write; see `hystgen.diagnosis.diagnose`."""
     from hystgen import diagnosis
+    from hystgen.report import diagnosis as report
 
     arguments.known_options("diagnose", diagnosis.diagnose, options)
-    return diagnosis.diagnose(source, records, **options)
+    return replace(diagnosis.diagnose(source, records, **options), page=report.html)
 
 
 def plan(source: Model | str | os.PathLike[str], **options: Any) -> Any:

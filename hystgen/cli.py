@@ -528,7 +528,7 @@ def diagnose(
         raise click.UsageError("Missing argument 'DATA...'; --plan writes drive records to measure")
     if max_rate is not None:
         raise click.UsageError("--max-rate is for drives; give --plan with it")
-    from hystgen import diagnosis
+    from hystgen import api, diagnosis
     from hystgen.effects import load_user_effects
     from hystgen.emission import files
     from hystgen.report import drawing
@@ -542,7 +542,7 @@ def diagnose(
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
-        found = diagnosis.diagnose(
+        found = api.diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
         for note in (*found.notes, *found.warnings):

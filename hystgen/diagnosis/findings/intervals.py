@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import structure
-from hystgen.diagnosis.structure import Fitted, Item
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import fits
+from hystgen.diagnosis.search.fits import Fitted
 from hystgen.effects.base import Effect
 from hystgen.identification import stage_content
 from hystgen.identification.uncertainty import correlation_time
@@ -63,7 +64,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     front = len(fitted.structure.front.straight)
     if not len(shape):
         return Sure({}, tuple({} for _ in fitted.structure.parts))
-    system = structure.linear(fitted.structure, items, shape, p).system.whole
+    system = fits.linear(fitted.structure, items, shape, p).system.whole
     n1 = len(p)
     active = np.flatnonzero(np.append(p > 0.0, np.ones(len(shape), dtype=bool)))
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)

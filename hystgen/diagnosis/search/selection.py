@@ -10,29 +10,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import decisions
-from hystgen.diagnosis import structure as fits
-from hystgen.diagnosis.believed import Prepared
-from hystgen.diagnosis.decisions import Merit
-from hystgen.diagnosis.options import Option
-from hystgen.diagnosis.structure import Fitted, Item, Structure
-from hystgen.diagnosis.thinning import everything, thinned
-from hystgen.diagnosis.trials import Records, Tried, free_numbers
+from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.preparing import Prepared
+from hystgen.diagnosis.data.thinning import everything, thinned
+from hystgen.diagnosis.search import acceptance, fits
+from hystgen.diagnosis.search import merit as judge
+from hystgen.diagnosis.search.acceptance import apart, is_noise
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.merit import Merit
+from hystgen.diagnosis.search.options import Option
+from hystgen.diagnosis.search.screening import Records, Tried, free_numbers
+from hystgen.diagnosis.search.structure import Structure
 from hystgen.identification import joint
 from hystgen.identification.fronts import Kept
 from hystgen.identification.weights import Weights
 
 Array = NDArray[np.float64]
-
-ROUNDS, RIVALS = 5, 3
-"""Effects that are added at most, and how many others of about the same use are tried in place of the latest."""
-
-EXCHANGE = 0.05
-"""Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
-
-EXCHANGES = 4
-"""At most so many times one effect takes the place of another."""
-
 
 @dataclass(frozen=True)
 class Found:
@@ -67,7 +60,7 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, believed: Array
     if believed is not None and base.actuator(start).bends:
         starts.append(believed)
     found = [fits.fit(base, quick, start, p) for p in starts]
-    return min(found, key=lambda each: fits.rms(each.errors(quick)))
+    return min(found, key=lambda each: rms(each.errors(quick)))
 
 
 def again(fitted: Fitted, ready: Prepared) -> Fitted:
@@ -86,7 +79,7 @@ def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcom
     found = outcome.found
     if not found:
         return replace(outcome, refitted=fitted, fitted=fitted), made
-    last = replace(found[-1], after=records.left(fitted))
+    last = replace(found[-1], after=records.residual(fitted))
     return replace(outcome, fitted=fitted, found=(*found[:-1], last)), made
 
 
@@ -100,11 +93,11 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
     none = now
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
-    gap = records.left(now)
+    gap = records.residual(now)
     latest: _Step | None = None
-    rounds = ROUNDS if decisions.bear_two(records) else 1
+    rounds = acceptance.MOST_EFFECTS if judge.bear_two(records) else 1
     for _ in range(rounds):
-        if not decisions.leaves_enough(now, records):
+        if not judge.leaves_enough(now, records):
             break
         step = _step(now, gap, records)
         if latest is not None and step is not None and not _explained(step, records):
@@ -131,11 +124,11 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
             latest = None
         if until(now):
             return Outcome(refitted, now, tuple(found), tuple(rankings))
-    if not decisions.borne_out(records.left(now), records):
+    if not judge.borne_out(records.residual(now), records):
         now, found = none, []
     if found:
         now = fits.fit(now.structure, records.full, now.shape, now.weights)
-        found[-1] = replace(found[-1], after=records.left(now))
+        found[-1] = replace(found[-1], after=records.residual(now))
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
@@ -167,13 +160,13 @@ def _step(
     if not tried:
         return None
     unsure = math.inf
-    for best in decisions.simplest_first(tried, records):
-        merit = decisions.merit_of(now, best, records, least)
+    for best in judge.simplest_first(tried, records):
+        merit = judge.merit_of(now, best, records, least)
         if merit is not None and merit.worth(gap, records):
-            if best.held_out > (1.0 + decisions.UNSURE) * unsure:
+            if best.held_out > (1.0 + acceptance.ALIKE) * unsure:
                 break
             return _Step(now, tried, best, merit)
-        if merit is None and decisions.removes(now, best, records, least):
+        if merit is None and judge.removes(now, best, records, least):
             unsure = min(unsure, best.held_out)
     return _Step(now, tried, tried[0], None)
 
@@ -181,7 +174,7 @@ def _step(
 def _explained(step: _Step, records: Records) -> bool:
     """Whether hardly more than noise is left: no other first effect can do better beside it, and `_exchanged` asks for
     each that does as well."""
-    return step.merit is not None and step.best.held_out <= decisions.AT_FLOOR * records.noise
+    return step.merit is not None and is_noise(step.best.held_out, records.noise)
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
@@ -191,25 +184,25 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     taken, or less, or no more by more numbers, it was the wrong one. Where the next one is itself one of them,
     `_exchanged` asks what else there is beside it.
     """
-    alike = decisions.rivals(latest.best, latest.tried, records)
+    alike = judge.rivals(latest.best, latest.tried, records)
     others = {each.name: each for each in reversed(alike)}  # of each name the best one
-    left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
+    follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
     if step.merit is not None:
-        left = [each for each in left if each.name != step.best.name]
+        follow = [each for each in follow if each.name != step.best.name]
     names = {each.name for each in step.tried}
 
     def pairs() -> Iterator[tuple[_Step, _Step]]:
-        for first in decisions.simplest_first(left, records):
-            merit = decisions.merit_of(latest.now, first, records)
+        for first in judge.simplest_first(follow, records):
+            merit = judge.merit_of(latest.now, first, records)
             then = _step(first.fitted, gap, records, lambda option: option.name in names) if merit is not None else None
             if then is not None and then.merit is not None:
                 yield replace(latest, best=first, merit=merit), then
 
     if step.merit is None:
-        enough = (1.0 - EXCHANGE) * records.left(step.now)
+        enough = (1.0 - acceptance.BETTER) * records.residual(step.now)
         return next((pair for pair in pairs() if pair[1].best.held_out <= enough), None)
     every = [*pairs(), (latest, step)]
-    enough = (1.0 + decisions.SIMPLER) * min(then.best.held_out for _, then in every)
+    enough = (1.0 + acceptance.BETTER) * min(then.best.held_out for _, then in every)
     good = [pair for pair in every if pair[1].best.held_out <= enough]
     chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))
     return None if chosen[1] is step else chosen
@@ -228,28 +221,28 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
     for first in one_of_each.values():
         if (
             first is not failed.tried[0]
-            and decisions.difference(fitted, first.fitted.errors(records.to_fit)) > decisions.SURE
+            and judge.difference(fitted, first.fitted.errors(records.to_fit)) > acceptance.P_SURE
         ):
             continue
-        second = _step(first.fitted, gap, records, least=decisions.ABOVE_NOISE)
+        second = _step(first.fitted, gap, records, least=acceptance.FIRST_REMOVES)
         if second is not None and second.merit is not None and second.best.name != first.name:
             seconds.append((first, second))
     for first, second in sorted(seconds, key=lambda pair: pair[1].best.held_out):
         alone = _without(second.best.fitted, first.name, records)
-        back = None if alone is None else _step(alone, gap, records, least=decisions.ABOVE_NOISE)
+        back = None if alone is None else _step(alone, gap, records, least=acceptance.FIRST_REMOVES)
         if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
             continue
-        merit = decisions.merit_of(failed.now, back.best, records)
+        merit = judge.merit_of(failed.now, back.best, records)
         if merit is not None and merit.worth(gap, records):
-            return replace(_found(second, records), before=gap, after=min(records.left(alone), gap)), back
+            return replace(_found(second, records), before=gap, after=min(records.residual(alone), gap)), back
     return None
 
 
 def _found(step: _Step, records: Records) -> Found:
     best, merit = step.best, step.merit
     assert merit is not None
-    rivals = tuple(dict.fromkeys([*best.names[1:], *decisions.left_open(step.now, best, step.tried, records)]))
-    return Found(best.name, best.option.label, records.left(step.now), best.held_out, merit.p_value, rivals)
+    rivals = tuple(dict.fromkeys([*best.names[1:], *judge.left_open(step.now, best, step.tried, records)]))
+    return Found(best.name, best.option.label, records.residual(step.now), best.held_out, merit.p_value, rivals)
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
@@ -272,8 +265,8 @@ def _without_needless(
         fitted = _without(now, found[k].name, records)
         if fitted is None:
             continue
-        with_it, without = records.left(now), records.left(fitted)
-        if decisions.apart(without, with_it) < 0.5 * decisions.ABOVE_NOISE * records.noise:
+        with_it, without = records.residual(now), records.residual(fitted)
+        if apart(without, with_it) < acceptance.NEEDLESS * records.noise:
             return _without_needless(fitted, _rest(found, k, without), records)
         less[found[k].name] = fitted
     return now, found, less
@@ -289,20 +282,20 @@ def _exchanged(
     where that is known; `names`: effects that were followed up so far, since one that was among the best beside none of
     the others is not worth another search.
     """
-    latest, left = found[-1].name, EXCHANGES
-    while left:
-        left -= 1
+    latest = found[-1].name
+    for _ in range(acceptance.MOST_EXCHANGES):
         for k, old in enumerate(found):
             fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
             if fitted is None:
                 continue
             start = _left_as_it_is(now, old.name, records)  # the others' numbers without any may be far from all others
-            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, decisions.ABOVE_NOISE)
+            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
             if not _gives_way(now, old.name, step.best, records):
-                if step.best.held_out <= (1.0 + decisions.UNSURE) * records.left(now):  # else it was not found again
+                # else it was not found again
+                if step.best.held_out <= (1.0 + acceptance.ALIKE) * records.residual(now):
                     alike = dict.fromkeys([other.name, *other.rivals])
                     found[k] = replace(old, rivals=tuple(name for name in alike if name != old.name))
                 continue
@@ -321,29 +314,30 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 
     Or as much with as many, where the catalogue has the other effect before that of this name.
     """
-    held, left, fewer = records.held, records.left(now), free_numbers(now, records.held) - best.numbers(records.held)
-    if best.held_out <= (1.0 - EXCHANGE) * left:
+    held, residual = records.held, records.residual(now)
+    fewer = free_numbers(now, held) - best.numbers(held)
+    if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
     if fewer == 0:
-        return best.held_out <= (1.0 + decisions.EQUAL) * left and decisions.place(best.name) < decisions.place(name)
-    return fewer > 0 and fits.rms(best.fitted.errors(held, now)) <= left
+        return best.held_out <= (1.0 + acceptance.EQUAL) * residual and judge.place(best.name) < judge.place(name)
+    return fewer > 0 and rms(best.fitted.errors(held, now)) <= residual
 
 
 def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
     """What was found, with the errors of the models before and after each; empty where one makes it no smaller."""
-    lefts = [records.left(now)]
+    residuals = [records.residual(now)]
     for each in reversed(found[1:]):
         smaller = _without(now, each.name, records)
         if smaller is None:
             return []
         now = smaller
-        lefts.append(records.left(now))
-    lefts = [gap, *reversed(lefts)]
-    if any(after >= before for before, after in itertools.pairwise(lefts)):
+        residuals.append(records.residual(now))
+    residuals = [gap, *reversed(residuals)]
+    if any(after >= before for before, after in itertools.pairwise(residuals)):
         return []
     return [
         replace(each, before=before, after=after)
-        for each, (before, after) in zip(found, itertools.pairwise(lefts), strict=True)
+        for each, (before, after) in zip(found, itertools.pairwise(residuals), strict=True)
     ]
 
 
