@@ -222,7 +222,7 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
         return Hypothesis(world, now.names - {name})
 
     monkeypatch.setattr(selection, "_without", without)
-    monkeypatch.setattr(selection, "_left_as_it_is", without)
+    monkeypatch.setattr(selection, "_without_refit", without)
     now: Any = Hypothesis(world, frozenset("wc"))
     gap = world.gap(Hypothesis(world, frozenset()))
     found = [

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page that says what is missing, how much it explains and what is left."""
+"""The report of a diagnosis: one page on what is missing, how much it explains, and what is left."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How far and how a compensator takes out what is a stage in front of the plays."""
+"""How exactly, and how, a compensator corrects a stage in front of the plays."""
 
 LONGER = 0.01
 """An error is visibly larger than another from this share on: two pixels of a bar."""
@@ -59,12 +59,12 @@ def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
 
 
 def _chance(p_value: float) -> str:
-    """It may be less than the least number that there is."""
+    """A p-value, which may be below the smallest double."""
     return f"{p_value:.1g}" if p_value > 0.0 else "< 1e-300"
 
 
 def _refitted(result: Result) -> list[Text]:
-    """What the second bar means where it is plainly longer than the first."""
+    """An explanation of the second bar where it is visibly longer than the first."""
     given, refitted = result.gap.as_given, result.gap.refitted
     if refitted.holdout <= (1.0 + LONGER) * given.holdout:
         return []
@@ -79,7 +79,7 @@ def _refitted(result: Result) -> list[Text]:
 
 
 def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
-    """`not_emitted`: why the compensators that the table speaks of cannot be had in C; empty where they can."""
+    """`not_emitted`: why the compensators in the table cannot be emitted as C; empty if they can."""
     if not result.effects:
         return [Text("No effect of the catalogue removes enough of the held-out error to get a name.")]
     unit = result.unit
@@ -111,14 +111,14 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
 
 
 def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
-    """The class of an entry, one of the effects that are there; None for a stage in front of the plays."""
+    """The class of an entry, among the effects of the model; None for a stage in front of the plays."""
     if effect.parameters.get("kind"):
         return None
     return next(type(each) for each in reversed(there) if each.name == effect.name)
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one a number; of equal lists the first one stands for all."""
+    """Rows of name, value, low and high, one a number; the first of equal lists stands for all."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
@@ -176,7 +176,7 @@ def _faults(result: Result) -> list[Text | Table]:
     seen = [each.entry() for each in result.unexplained if isinstance(each, Fault)]
     if not seen:
         disturbed = any(not isinstance(each, Structure) for each in result.unexplained)
-        return [Text("None in single samples; other disturbances are told above." if disturbed else "None were seen.")]
+        return [Text("None in single samples; disturbances are listed above." if disturbed else "None were seen.")]
     rows = [["record", "what", "times", "samples", "first at (s)", label("level", result.unit), "done"]]
     for each in sorted(seen, key=lambda one: (str(one["record"]), str(one["kind"]))):
         single = each["kind"] in ("saturated", "isolated_samples")

@@ -16,31 +16,31 @@ Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]
 
 MOVEMENTS = 5, 2**25
-"""Movements of the plays that are remembered for a record, and the bytes of them all."""
+"""Play movements that are remembered for a record, and their bytes in all."""
 
 DIFFERENCES = 12, 2**25
-"""The same of what hypotheses leave of a record: those followed up in a round are compared with each other."""
+"""The same for errors before the free offsets are fitted: hypotheses of a round are compared with each other."""
 
 COMPARISONS = 40, 2**23
-"""And of the errors by which they are compared, with what each leaves free in the record."""
+"""The same for errors with the free offsets and start states fitted."""
 
 
 class Recent:
-    """Arrays that were asked for lately, by what made them; no more than so many, and than so many bytes."""
+    """The arrays used last, by key: at most `most` of them and `most_bytes` in all."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self._most, self._most_bytes = most, most_bytes
         self._arrays: dict[object, Array] = {}
 
     def recalled(self, by: object) -> Array | None:
-        """What is remembered by this."""
+        """The array under a key, None without one."""
         if by not in self._arrays:
             return None
-        self._arrays[by] = found = self._arrays.pop(by)  # the latest one comes last
+        self._arrays[by] = found = self._arrays.pop(by)  # the one used last comes last
         return found
 
     def remember(self, by: object, found: Array) -> None:
-        """Remember it in place of what was asked for least lately."""
+        """Remember an array; the ones unused for longest give way."""
         arrays = self._arrays
         while arrays and (len(arrays) >= self._most or found.nbytes * (len(arrays) + 1) > self._most_bytes):
             del arrays[next(iter(arrays))]
@@ -52,9 +52,9 @@ class Recent:
 class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
-    `session`: all records on one time axis, where they are of one session, and `part` what of it is this record.
-    `moved`: how the plays moved lately, since most numbers of a search do not change it; `left`: what was left of it;
-    `errors`: that with what is free in it fitted away.
+    `session`: all records of a session on one time axis, if they are of one, and `part` this record's samples of it.
+    `moved`: the last movements of the plays, which most numbers of a search do not change; `left`: the last errors
+    before the free offsets are fitted; `errors`: the same behind that.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Item:
 
     @cached_property
     def compared(self) -> Samples:
-        """Where these are: a slice if they are evenly spread, since that picks without a copy."""
+        """Their places: a slice if they are evenly spaced, which picks without a copy."""
         found = np.flatnonzero(self.known)
         steps = np.diff(found)
         if not len(steps) or np.any(steps != steps[0]):
@@ -83,7 +83,7 @@ class Item:
         return slice(int(found[0]), int(found[-1]) + 1, int(steps[0]))
 
     def picked(self, rows: Array) -> Array:
-        """Of rows (k, N) those samples, with nothing between them."""
+        """The compared samples of rows (k, N), contiguous."""
         if isinstance(self.compared, slice):
             return np.ascontiguousarray(rows[:, self.compared])
         return rows.take(self.compared, axis=1)

@@ -83,7 +83,7 @@ P_REPEATED = 0.05
 Changed by: blind none."""
 
 P_DIFFERENT = 0.01
-"""[probability] Two effects whose difference is less likely by chance can be told apart. Changed by: blind pair."""
+"""[probability] Two effects whose difference is less likely by chance are separable. Changed by: blind pair."""
 
 BLOCK_MEMORIES = 2.0
 """[correlation times] Length of the blocks that a test takes as independent: neighbours are then hardly correlated.
@@ -98,7 +98,7 @@ SEEN_IN_FIT = 0.25
 an effect of held-out records alone may be another one's. Changed by: selection, blind pair."""
 
 ALIKE = 0.25
-"""[share of the held-out rms] Effects within this cannot be told apart, unless chance explains it with less than
+"""[share of the held-out rms] Effects within this are not separable, unless chance explains it with less than
 `P_DIFFERENT`. Changed by: blind single (names right or among the alternatives)."""
 
 BETTER = 0.05

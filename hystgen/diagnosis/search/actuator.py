@@ -24,19 +24,19 @@ Sums = dict[object, Array]
 ALL = slice(None)
 
 _MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
-"""Parts of the chain behind which the compared samples are picked: plays, filters behind them, others, output maps."""
+"""Parts of the chain behind which the compared samples are picked: plays, filters behind them, other filters, maps."""
 
 LEVEL_STEPS = 3
-"""Most steps to the offset in front of a map; each squares what is left of the map's curvature, a few per cent."""
+"""Most Newton steps to the offset in front of a map, whose curvature is a few per cent: each squares the rest."""
 
 
 class NotFiniteError(ArithmeticError):
-    """An output map makes no numbers of what it is given."""
+    """An output map has no finite values at its input."""
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """Plays of given thresholds between a front and effects; weights apart."""
+    """Plays with given thresholds between a front and effects; the weights are given apart."""
 
     thresholds: Array
     stages: tuple[Stage, ...]
@@ -44,7 +44,7 @@ class Actuator:
     gains: dict[tuple[int, int], tuple[Effect, Run, Array, Array]] = field(
         default_factory=dict, compare=False, repr=False
     )
-    """Gain and offset over a run, which is kept along with its effect: the `id` of what is gone may be another's."""
+    """Gain and offset over a run, with the effect and the run themselves: the `id` of a deleted one may be reused."""
 
     def at(self, place: Place) -> Sequence[Effect]:
         """The effects at one place of the chain, in its order."""
@@ -58,11 +58,11 @@ class Actuator:
         return found
 
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
-        """Rows that the weights multiply, up to the output map, and what is added to them without a weight.
+        """Rows that the weights multiply, up to the output map, and the constant that is added to them.
 
-        Of the samples that are compared, where nothing behind needs the others: `compared` picks them in any case.
-        With `p` a single row, the weighted sum: cheaper, since what follows the plays runs once. `sums`: sums of the
-        same weights, of actuators that have effects in common.
+        Of the compared samples alone where nothing behind needs the others; `compared` picks them in any case. With `p`
+        a single row, the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
+        actuators that have effects in common.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
@@ -78,19 +78,19 @@ class Actuator:
         for effect in self.at(Place.LINEAR):
             if effect.order > 0:
                 rows = effect.filtered(rows, run)
-                if self.at(Place.GAIN):  # of nothing a filter makes nothing
+                if self.at(Place.GAIN):  # without one the constant is zero
                     constant = effect.filtered(constant, run)
         if self._needed == _RINGING:
             rows, constant = item.picked(rows), constant[item.compared]
         return rows, constant
 
     def compared(self, values: Array, item: Item) -> Array:
-        """Of values at the samples of `columns`, (N,) or (k, N), those at samples that are compared."""
+        """The compared samples of values (N,) or (k, N) at the samples of `columns`."""
         return values[..., item.compared] if self._needed == _MAPPED else values
 
     @cached_property
     def _needed(self) -> int:
-        """The last part of the chain that needs every sample; behind it the samples that are compared will do."""
+        """The last part of the chain that needs every sample; behind it the compared ones are enough."""
         if not all(effect.pointwise for effect in self.at(Place.OUTPUT)):
             return _MAPPED
         if len(self._filters) < len(self.at(Place.LINEAR)):
@@ -98,7 +98,7 @@ class Actuator:
         return _FILTERED if self._filters or not all(effect.pointwise for effect in self._bending) else _MOVED
 
     def _slow(self, item: Item) -> Array:
-        """(n + 1, N) plays behind the filters that follow them, if there are any; remembered like the plays."""
+        """(n + 1, N) plays behind the filters that follow them, remembered like the plays."""
         if self._needed == _MOVED:
             return self._plays(item)
         by = (self._moving, self._bending, self._filters, self._needed == _FILTERED)
@@ -113,7 +113,7 @@ class Actuator:
         return rows
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
-        """(N,) their weighted sum; one number more or less changes a part of the chain alone."""
+        """(N,) their weighted sum; actuators that differ in one number share the part of the chain before it."""
         by: object = (self._moving, self._bending)
         if by not in sums:
             sums[by] = self._summed(item, p)
@@ -131,7 +131,7 @@ class Actuator:
         return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
 
     def _plays(self, item: Item) -> Array:
-        """(n + 1, N) plays behind what bends them; those of the last few hypotheses are remembered."""
+        """(n + 1, N) plays behind the effects that bend them; those of the last few hypotheses are remembered."""
         if not self._bending:
             return self._moved(item)
         by = (self._moving, self._bending, self._needed == _MOVED)
@@ -155,8 +155,7 @@ class Actuator:
     def _summed(self, item: Item, p: Array) -> Array:
         """(N,) weighted sum of the plays; those without a weight need not move for it.
 
-        The sum is the same to the last digit whether they are remembered or not: what a process remembers depends on
-        what it has tried before.
+        The sum has the same bits whether the plays are remembered or not: that depends on what a process did before.
         """
         if self._bending:
             return chain.bent_sum(self._bending, p, self._moved(item), self.thresholds)
@@ -173,12 +172,12 @@ class Actuator:
 
     @cached_property
     def _moving(self) -> object:
-        """All that the plays' movement depends on, of one record."""
+        """Everything but the record on which the movement of the plays depends."""
         movers = tuple(effect for effect in self.at(Place.PLAYS) if effect.moves_plays())
         return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, movers
 
     def _input(self, item: Item) -> tuple[Array, Run, Array, Array]:
-        """What the plays follow, with their thresholds and where they start."""
+        """The input of the plays, the run, their thresholds and their start."""
         a = item.run.v
         for effect in self.at(Place.DRIVE):
             a = effect.drive(a, item.run)
@@ -188,7 +187,7 @@ class Actuator:
         return course.v, item.run, self.thresholds, start
 
     def mapped(self, h: Array, level: Array, item: Item) -> Array:
-        """The output behind its maps, a limit in front of the offset and a sensor behind it; the offset is `level`."""
+        """The output behind its maps: a limit in front of the offset `level`, a sensor behind it."""
         maps = self.at(Place.OUTPUT)
         for effect in maps:
             if effect.order == 0:
@@ -202,8 +201,8 @@ class Actuator:
     def level(self, h: Array, item: Item, largest: Array | None = None) -> tuple[Array, Array]:
         """The best offset (N,) in front of a sensor and behind a limit, and how the output changes with it (N,).
 
-        A sensor sees the responses to an unknown start state too, so they are part of it, and what is added at the very
-        end is none of it: a curve about the wrong offset would be another one. `largest`: limits of their factors.
+        A sensor sees the responses to an unknown start state as well, so they are included; drift added behind it is
+        not, since a curve about the wrong offset would be a different one. `largest`: limits of the responses' factors.
         """
         y = item.y[item.compared] - self.added(item)
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
@@ -230,7 +229,7 @@ class Actuator:
         return level, moved
 
     def added(self, item: Item) -> Array:
-        """What is added at the very end, of the samples that are compared."""
+        """The sum of what is added at the end of the chain, at the compared samples."""
         total = np.zeros(len(item.run.t))
         for effect in self.at(Place.ADDED):
             total = total + effect.added(item.run)
@@ -242,10 +241,10 @@ class Actuator:
         return any(effect.place is Place.OUTPUT for effect in self.effects)
 
     def nuisances(self, item: Item, offset: Array | None = None) -> Array:
-        """(k, N) what is free in every record, of the compared samples: its offset, responses to an unknown start.
+        """(k, N) free components of every record at the compared samples: its offset, responses to an unknown start.
 
-        A history says what the plays remember, and not when the drive was there, which slow effects depend on.
-        `offset`: what the offset does to the output, where a map lies between them.
+        A history gives the memory of the plays, but not its times, on which slow effects depend. `offset`: the change
+        of the output with the offset, where a map lies between them.
         """
         free = self._free(item)[:, item.compared]
         return free if offset is None else free * offset
@@ -260,16 +259,16 @@ class Actuator:
         return [effect for effect in self.effects if item.history is None or not effect.fades]
 
     def largest(self, item: Item, p: Array) -> Array:
-        """(k,) how large the factors of `nuisances` may be: an effect of little weight has little left from a start."""
+        """(k,) largest factors of `nuisances`: an effect of little weight has a small start response."""
         span = acceptance.START_SPAN * float(np.sum(p)) * (item.session or item.run).drive_range
         limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self._starting(item))]
         return np.concatenate(limits)
 
     def error(self, item: Item, p: Array, like: tuple[Actuator, Array] | None = None) -> Array:
-        """Measured less predicted, what is free in the record fitted away; NaN where it is not compared.
+        """Measured less predicted with the free components fitted; NaN where the record is not compared.
 
-        `like`: another actuator and its weights, whose `nuisances` are free in place of its own, to compare the two on
-        equal terms.
+        `like`: another actuator and its weights, whose `nuisances` are free in place of its own: the two are then
+        compared on equal terms.
         """
         by = self._mark(p), None if like is None else like[0]._mark(like[1])
         whole = item.errors.recalled(by)
@@ -287,7 +286,7 @@ class Actuator:
         return whole
 
     def _mark(self, p: Array) -> object:
-        """All that a prediction depends on beside the record."""
+        """Everything but the record on which a prediction depends."""
         return self._numbers, p.tobytes()
 
     @cached_property
@@ -296,7 +295,7 @@ class Actuator:
         return self.thresholds.tobytes(), self.stages, effects
 
     def _left(self, item: Item, p: Array) -> Array:
-        """(2, N) of the compared samples: what is left before anything is fitted, and how the offset changes it."""
+        """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
         by = self._mark(p)
         found = item.left.recalled(by)
         if found is None:

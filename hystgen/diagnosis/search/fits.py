@@ -26,7 +26,7 @@ from hystgen.identification.reduction import Reduced
 Array = NDArray[np.float64]
 
 class _Block:
-    """A record's part of the system about a shape and weights: plays and measured output, reduced; derivatives later.
+    """A record's part of the system about a shape and weights: plays and measured output, reduced; then derivatives.
 
     The reflections of the reduction are kept, so that the columns of the derivatives are reduced alone.
     """
@@ -61,13 +61,13 @@ class _Block:
         self._reduced = [reduction.reflected(part) for part in self._cut(table)]
 
     def _cut(self, table: Array) -> list[Array]:
-        """A few thousand samples at a time, which stay in the cache while they are reduced."""
+        """Chunks of a few thousand samples, which stay in the cache while they are reduced."""
         if len(table) <= reduction.CHUNK:
             return [table]
         return [table[k : k + reduction.CHUNK] for k in range(0, len(table), reduction.CHUNK)]
 
     def system(self, varied: Sequence[Actuator] = ()) -> Array:
-        """Triangular: the plays, the measured output, and the derivatives; what is free in the record is taken out."""
+        """The triangle of plays, measured output and derivatives, without the free components of the record."""
         if not varied:
             return self._without_free([part.triangle for part in self._reduced])
         table = np.empty((len(varied), self.samples)).T
@@ -78,7 +78,7 @@ class _Block:
         return self._without_free([part.extended(columns) for part, columns in parts])
 
     def _of(self, other: Actuator, sums: Sums) -> Array:
-        """What other numbers predict, with the same weights and offset."""
+        """The prediction of other numbers with the same weights and offset."""
         rows, constant = other.columns(self._item, self._p, sums)
         moved = rows[0] + constant
         if other.bends:
@@ -91,7 +91,7 @@ class _Block:
 
 
 def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) -> Shaped:
-    """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
+    """The best weights of a shape, and the linear system about the shape and about weights `p` close to them."""
     n1 = len(structure.thresholds)
     here = structure.actuator(shape)
     try:
@@ -107,7 +107,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))
 
     whole = reduction.triangle(*(block.system() for block in blocks))
-    if not np.isfinite(whole).all():  # numbers far from what the records are like
+    if not np.isfinite(whole).all():  # the numbers are far out
         return Shaped(shape, p, math.inf, p, samples, derived)
     columns = np.arange(n1)
     best = weights.non_negative(whole, columns)
@@ -125,7 +125,7 @@ class Fitted:
 
     @property
     def actuator(self) -> Actuator:
-        """What was found."""
+        """The actuator of the shape."""
         return self.structure.actuator(self.shape)
 
     @property
@@ -139,7 +139,7 @@ class Fitted:
         return not self.structure.parts and not self.actuator.stages
 
     def errors(self, items: Sequence[Item], like: Fitted | None = None) -> list[Array]:
-        """Error signals over records; `like`: with what another model leaves free in them."""
+        """Error signals over records; `like`: with the free components of another model."""
         actuator = self.actuator
         other = None if like is None else (like.actuator, like.weights)
         return [actuator.error(item, self.weights, other) for item in items]
@@ -147,7 +147,7 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """A search for the numbers of a structure, as far as it has come; it can go on from there."""
+    """The state of a search for the numbers of a structure, from which it can continue."""
 
     structure: Structure
     items: Sequence[Item]
@@ -167,24 +167,26 @@ class Search:
         return replace(self, now=now, damping=damping)
 
     def found(self, otherwise: Array) -> Fitted:
-        """What was found; `otherwise`: weights where the numbers lie too far from what the records are like."""
+        """The fit; `otherwise`: its weights if the numbers are too far out to solve for them."""
         best = self.now.best if math.isfinite(self.now.rms) else otherwise
         return Fitted(self.structure, self.now.shape, best, self.now.rms)
 
 
 def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Search:
-    """A search at its start; `p`: weights near which to begin."""
+    """A search at its start; `p`: weights close to the best ones."""
     return Search(structure, items, linear(structure, items, np.clip(start, *structure.bounds), p))
 
 
 def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:
-    """The end of a search from a start; `p`: weights near which to begin."""
+    """The end of a search from a start; `p`: weights close to the best ones."""
     return begun(structure, items, start, p).further().found(p)
 
 
 def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, weights.Weights]:
-    """A hypothesis with p_0 raised to a share `floor` of the sum of weights where the records allow it, as `identify`
-    does it (`weights.fit`), and what was done; all other numbers are as they were."""
+    """A hypothesis with p_0 raised to a share `floor` of the sum of weights if the records allow it, and its weights.
+
+    As in `identify` (`weights.fit`); all other numbers stay.
+    """
     p, here = fitted.weights, fitted.actuator
     kept = weights.Weights(p, fitted.rms)
     if len(p) < 2 or p[0] >= floor * float(np.sum(p)):

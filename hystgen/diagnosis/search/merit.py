@@ -45,8 +45,8 @@ class Merit:
 def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
     """What a tried effect is worth, or None.
 
-    None where chance explains the difference, where too little is removed to be told from noise, where hardly any of it
-    is in the records that its numbers come from, and where records of one loop alone do not support a name.
+    None where chance explains the difference, where too little is removed to stand out of the noise, where hardly any
+    of it is in the records that its numbers come from, and where records of one loop alone do not support a name.
 
     `least`: what has to be removed, as a multiple of the remaining error or the noise; by default the number of a first
     or a further effect.

@@ -22,7 +22,7 @@ from hystgen.records import Record
 Array = NDArray[np.float64]
 
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
-    """The nominal front as a family around it, and the shape that it has in that family."""
+    """The nominal front as a member of a family, and its shape in that family."""
     if not stages:
         return Kept(), np.empty(0)
     if len(stages) == 1 and isinstance(stages[0], DeadZone):
@@ -51,14 +51,14 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
 
 
 def _inside(front: Front, shape: Array) -> bool:
-    """Whether a search may begin at a shape: another one near it would not be the front that is nominal."""
+    """Whether a search may begin at a shape: a neighbour of it would not be the nominal front."""
     low, high = front.bounds
     slack = front.slack(np.clip(shape, low, high))
     return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -acceptance.TOUCHING))
 
 
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
-    """The nominal model with its weights, thresholds, front and effects' numbers free, and where a search starts."""
+    """The nominal model with free weights, front and numbers of its effects, and the start of a search."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
     parts = tuple(Part(effect.name, _near(effect)) for effect in given)
@@ -66,7 +66,7 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
 
 
 def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
-    """The nominal weights at the structure's thresholds next to their own; None behind a front, which has a scale."""
+    """The nominal weights at the structure's nearest thresholds; None behind a front, which has a scale of its own."""
     if cascade.stages:
         return None
     p, places = np.zeros(len(structure.thresholds)), structure.thresholds
@@ -76,7 +76,7 @@ def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
 
 
 def _near(effect: Effect) -> Candidate:
-    """The effect with its numbers free, by factors: what is 0 stays that, and signs are kept."""
+    """The effect with free factors on its numbers: zeros and signs stay."""
     sizes = {key: _size(value) for key, value in effect if key not in effect.settled}
     free = {key: size for key, size in sizes.items() if size}
     number = sum(free.values())
@@ -95,7 +95,7 @@ def _near(effect: Effect) -> Candidate:
 
 
 def _size(value: object) -> int:
-    """How many factors the numbers of a key have."""
+    """Number of factors of a key."""
     if isinstance(value, float):
         return int(value != 0.0)
     if not isinstance(value, tuple) or not any(map(_size, value)):
@@ -105,7 +105,7 @@ def _size(value: object) -> int:
 
 
 def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> Any:
-    """The numbers times their factors, kept within what the key may be."""
+    """The numbers times their factors, within the limits of the key."""
     if isinstance(value, tuple):
         each = factors if len(factors) == len(value) else list(factors) * len(value)
         return tuple(_times(one, [factor], effect, key) for one, factor in zip(value, each, strict=True))
@@ -119,7 +119,7 @@ def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> An
 
 
 def _through(places: Array, nominal: Sequence[float]) -> Array:
-    """The places, those next to a nominal threshold moved there: where the belief is right, it is met exactly."""
+    """The places, those next to a nominal threshold moved there, so that a right nominal model is met exactly."""
     moved = places.copy()
     for r in nominal:
         near = int(np.argmin(np.abs(places - r)))

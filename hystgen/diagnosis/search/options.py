@@ -1,4 +1,4 @@
-"""What can be added to a hypothesis: every shape of every effect of the catalogue, and fronts."""
+"""Extensions of a hypothesis: every shape of every effect of the catalogue, and fronts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PLACES = 201
 
 @dataclass(frozen=True)
 class Option:
-    """One way to extend a hypothesis. `front`: it puts a memoryless part in front, which is named once found.
+    """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named once it is fitted.
 
     `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`. `beyond`: label of
     the simpler one that it contains, and without which it is not tried; `grown`: a start from the numbers of that.
@@ -40,7 +40,7 @@ class Option:
     grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
-        """The shape of all, where the extension has these numbers and the rest is as it was."""
+        """The shape of the whole hypothesis with these numbers of the extension; the others stay."""
         front_shape, _ = now.structure.pieces(now.shape)
         if self.front:
             return np.concatenate([numbers, now.shape[len(front_shape) :]])
@@ -48,7 +48,7 @@ class Option:
 
 
 def about(items: Sequence[Item], thresholds: Array) -> About:
-    """What the records are like, for the shapes that are worth trying."""
+    """Ranges, rates and times of the records, from which effects choose their candidates."""
     low = min(float(item.run.v.min()) for item in items)
     high = max(float(item.run.v.max()) for item in items)
     finest = min(float(np.median(np.diff(item.run.t))) for item in items)
@@ -94,7 +94,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
 
 
 def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -> list[Option]:
-    """A memoryless part in front, in all its shapes."""
+    """The memoryless parts that may be added in front."""
 
     def one(label: str, front: Front, starts: Sequence[Array], beyond: str = "") -> Option:
         pair = replace(structure, front=front), replace(held, front=front)
@@ -105,7 +105,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
     bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # one way over the whole range
-    # places outside the range's ends do nothing, nor does a small change of them
+    # a limit outside the range does nothing, nor does a small change of it: start inside
     limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
@@ -118,9 +118,9 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 
 
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
-    """`saturation` for a front that is straight but for flatter ends, or bends alike at both; else `asymmetry`.
+    """`saturation` for a front that is straight between flatter ends, or bends alike at both; else `asymmetry`.
 
-    Both where one end alone is a little flatter: a soft limit there and a bent actuator are one and the same front.
+    Both names where one end alone is a little flatter: a soft limit there and a bent actuator give the same front.
     """
     v = np.linspace(*drive, PLACES)
     w = v

@@ -1,4 +1,4 @@
-"""Every shape of every effect beside a hypothesis: told apart on thinned records, the hopeful ones fitted jointly."""
+"""Screening of every shape of every effect beside a hypothesis: ranked on thinned records, the best fitted jointly."""
 
 from __future__ import annotations
 
@@ -31,38 +31,36 @@ LARGE = 5_000
 
 @dataclass(frozen=True)
 class Tried:
-    """An option followed up: what it gives on held-out records."""
+    """An option fitted to the end, with its held-out errors."""
 
     option: Option
     fitted: Fitted
     names: tuple[str, ...]
-    """the name, and others that the same numbers would bear as well"""
+    """its name, and others that the same front may have"""
     held_out: float
     errors: list[Array]
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """The first of its names."""
         return self.names[0]
 
     def numbers(self, held: Sequence[Item]) -> int:
-        """How many numbers it takes, with what it leaves free in a record.
-
-        Free responses to a start state alone may explain a drift.
-        """
+        """Number of its free numbers, with those in a record: free start responses alone may explain a drift."""
         return free_numbers(self.fitted, held)
 
 
 def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
-    """How many numbers a hypothesis has, with what it leaves free in a record."""
+    """Number of a hypothesis' free numbers, with those in a record."""
     return len(fitted.shape) + max(len(fitted.actuator.nuisances(item)) for item in held)
 
 
 @dataclass(frozen=True)
 class Records:
-    """What a search is over, and what it is like: the records, thinned for searches, and further to tell shapes apart.
+    """The records of a search: in full, thinned to search with, and thinner still for the screening.
 
-    `full`: those to fit, with as many samples compared as any search compares.
+    `full`: fitted records with the most samples that any fit compares; `quick`: with those of a search; `thin`,
+    `thin_held`: with those of the screening.
     """
 
     to_fit: Sequence[Item]
@@ -75,13 +73,13 @@ class Records:
     user: Sequence[type[Effect]]
     noise: float
     gap: float
-    """what the refitted model leaves of the records to fit"""
+    """rms error of the refitted model over the fitted records"""
     tick: Callable[[], None]
     jobs: int
     one_loop: bool
     """whether all of them pass the same loop"""
     one_speed: bool
-    """whether those to fit pass their loops in the same time"""
+    """whether the fitted ones pass their loops in the same time"""
 
     @classmethod
     def of(
@@ -93,7 +91,7 @@ class Records:
         user: Sequence[type[Effect]] = (),
         tick: Callable[[], None] = lambda: None,
     ) -> Records:
-        """Records thinned by what the refitted model leaves of them; a user's own effect sees all samples."""
+        """Records thinned by the errors of the refitted model; a user's own effect sees all samples."""
         groups, structure = (to_fit, held), refitted.structure
         masks = everything(groups)
         if not user and not any(part.name.startswith(USER) for part in structure.parts):
@@ -108,7 +106,7 @@ class Records:
         )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
-        """One effect more, the best shapes of all, the best one first; `worth`: of the options that are worth it."""
+        """The hypothesis with one effect more, the best shapes first; `worth`: selects the options to try."""
         rings = spectra.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
         known = replace(self.known, ringing=rings)
         rough = _rough(now, self.thin)
@@ -125,17 +123,17 @@ class Records:
 
 
 def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
-    """The hypothesis with every other threshold, the least and the largest among them: enough to tell shapes apart."""
+    """The hypothesis with every other threshold, the smallest and the largest among them: enough to rank shapes."""
     all_of_them = now.structure.thresholds
     places = np.unique([0, *range(len(all_of_them) - 1, -1, -2)])
     p = np.zeros(len(places))
-    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # behind a map near ones are needed
+    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # a map behind needs near weights
     structure = replace(now.structure, thresholds=np.ascontiguousarray(all_of_them[places]))
     return fits.begun(structure, thin, now.shape, p).found(p)
 
 
 def _jobs(to_fit: Sequence[Item]) -> int:
-    """Processes that are worth it; what each would compile or read from a cache is there before they begin."""
+    """Number of processes; the compiled functions of effects are loaded before they fork."""
     if sum(len(item.run.t) for item in to_fit) < LARGE:
         return 1
     jobs = parallel.cores()
@@ -145,7 +143,7 @@ def _jobs(to_fit: Sequence[Item]) -> int:
 
 
 class _Pair(NamedTuple):
-    """An option, and the same with fewer thresholds to tell shapes apart."""
+    """An option, and the same with the fewer thresholds of the screening."""
 
     option: Option
     rough: Option
@@ -153,7 +151,7 @@ class _Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """An option, counted by its number, after the first steps, and its held-out rms."""
+    """An option, with its number, after the first steps, and its held-out rms."""
 
     k: int
     option: Option
@@ -162,7 +160,7 @@ class _Screened:
 
 
 _SCREEN, _JOIN, _POLISH = range(3)
-"""What is done with an option: a few steps alone, a few of the whole hypothesis, and the search to its end."""
+"""Stages of a search: a few steps of the option alone, a few of the whole hypothesis, and the rest to its end."""
 
 
 class _Task(NamedTuple):
@@ -170,16 +168,13 @@ class _Task(NamedTuple):
     k: int
     """number of the option"""
     shape: Array | None = None
-    """where the search begins; for a shape that contains a simpler one what was found for that"""
+    """start of the search; for a shape that contains a simpler one the numbers of that"""
     weights: Array | None = None
     steps: int = 0
 
 
 class _Numbers(NamedTuple):
-    """What a search finds, and its rms error on records that took no part: no more than can be sent by a process.
-
-    What builds an effect of numbers cannot.
-    """
+    """Numbers that a search found, and its held-out rms: what a process can send, unlike the candidates themselves."""
 
     shape: Array
     weights: Array
@@ -197,7 +192,7 @@ class _Searches:
     records: Records
 
     def __call__(self, task: _Task) -> _Numbers:
-        """What one search finds."""
+        """The numbers that one search finds."""
         pair, records = self.found[task.k], self.records
         if task.what == _SCREEN:
             fitted, held = self._screen(pair.rough, task.shape), records.thin_held
@@ -239,7 +234,7 @@ class _Searches:
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
     def _join(self, option: Option, task: _Task) -> Fitted:
-        """The whole hypothesis fitted from a start, by so many steps."""
+        """The whole hypothesis fitted from the start of a task, by its number of steps."""
         assert task.shape is not None
         assert task.weights is not None
         search = fits.begun(option.structure, self.records.quick, task.shape, task.weights)
@@ -251,7 +246,7 @@ _Crew = parallel.Crew[_Task, _Numbers]
 
 
 def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
-    """The options after a few steps on thinned records: the best shapes on what was fitted, and on what was not.
+    """The options after a few steps on thinned records: the best on fitted records, and on held-out ones.
 
     What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
     a simpler one is tried where that takes something away, and goes on where it takes more.
@@ -289,11 +284,11 @@ def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
     tried = [each for each in tried if math.isfinite(each.residual)]
     kept = _kept(tried, [each for each in tried if helps(each, *without)])
     contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
-    return list(dict.fromkeys([*kept, *contained]))  # whether more numbers are worth it shows when all fit
+    return list(dict.fromkeys([*kept, *contained]))  # whether further numbers help shows in the joint fit
 
 
 def _cost(structure: Structure, option: Option) -> int:
-    """What a search costs, about: the longest go first, so that no process is left alone with one."""
+    """Rough cost of a search: the longest go first, so that no process ends alone with one."""
     return len(structure.start) * (1 + len(option.starts))
 
 
@@ -316,13 +311,13 @@ def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Scr
 
 
 def _twins(one: _Screened, other: _Screened) -> bool:
-    """Whether two leave as good as the same, fitted and held out."""
+    """Whether two have nearly the same errors, fitted and held out."""
     both = (one.fitted.rms, other.fitted.rms), (one.residual, other.residual)
     return all(abs(a - b) <= acceptance.TWIN * b for a, b in both)
 
 
 def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) -> list[Tried]:
-    """The options fitted to everything and run over the held-out records, the best one first."""
+    """The options fitted jointly and judged on held-out records, the best one first."""
     now, records = searches.now, searches.records
     found = {each.k: searches.found[each.k].option for each in kept}
     by_held_out = acceptance.PROMISING * min((each.residual for each in kept), default=0.0)

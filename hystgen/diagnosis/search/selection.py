@@ -41,7 +41,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The believed model refitted, what was found, the model after it, and the ranking of each round."""
+    """The refitted nominal model, the model with the effects, these effects, and the ranking of each round."""
 
     refitted: Fitted
     fitted: Fitted
@@ -49,30 +49,27 @@ class Outcome:
     rankings: tuple[tuple[Tried, ...], ...]
 
 
-def refit(base: Structure, to_fit: Sequence[Item], start: Array, believed: Array | None = None) -> Fitted:
-    """The believed structure with its weights, the shape of its front and its effects' numbers, fitted anew.
+def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
+    """The nominal structure with weights, front and numbers of its effects refitted.
 
-    Sought from `start`, and where an output map bends the weights' part also from the `believed` ones: beyond a limit
-    no sample tells how far off others are.
+    From the shape `start` and linear weights; where an output map bends the output also from the `nominal` weights,
+    since samples beyond a limit do not show how far off others are.
     """
     quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
-    if believed is not None and base.actuator(start).bends:
-        starts.append(believed)
+    if nominal is not None and base.actuator(start).bends:
+        starts.append(nominal)
     found = [fits.fit(base, quick, start, p) for p in starts]
     return min(found, key=lambda each: rms(each.errors(quick)))
 
 
 def again(fitted: Fitted, ready: Prepared) -> Fitted:
-    """A hypothesis fitted anew to other records."""
+    """A hypothesis refitted to other records."""
     return fits.fit(fitted.structure, _quick(ready.to_fit), fitted.shape, fitted.weights)
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """What was found with p_0 of the model that is written raised to the floor of `identify`, and what was done.
-
-    The errors behind the last effect are those of this model; without an effect it is the refitted one.
-    """
+    """The outcome with p_0 raised to the floor of `identify`, and the weights; errors are then those of that model."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
         return outcome, made
@@ -88,7 +85,7 @@ def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:
 
 
 def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] = lambda _: False) -> Outcome:
-    """Add effects to the refitted model as long as one qualifies, and `until` something shows beside what is found."""
+    """Add effects to the refitted model as long as one qualifies; a model that `until` accepts ends the search."""
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     none = now
     found: list[Found] = []
@@ -134,7 +131,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
 
 @dataclass(frozen=True)
 class _Step:
-    """A hypothesis, what was tried to extend it, the one of those that is taken, and what it is good for if it is."""
+    """A hypothesis, the extensions that were tried, the best of them, and its merit if it is accepted."""
 
     now: Fitted
     tried: list[Tried]
@@ -150,11 +147,11 @@ def _step(
     start: Fitted | None = None,
     least: float | None = None,
 ) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
+    """The best extension of a hypothesis and those it was chosen from; None without any to try.
 
-    `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. What
-    explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is the
-    next one's turn. Where another explains far more on equal terms, only in too few places to be sure, none has a name.
+    `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. An
+    extension may explain most only through its free start states, and be worth nothing on equal terms; then the next
+    one is judged. If another explains far more on equal terms, but in too few places to be sure, none is named.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
@@ -172,20 +169,19 @@ def _step(
 
 
 def _explained(step: _Step, records: Records) -> bool:
-    """Whether hardly more than noise is left: no other first effect can do better beside it, and `_exchanged` asks for
-    each that does as well."""
+    """Whether only noise is left: no other first effect can do better, and `_exchanged` finds those that do as well."""
     return step.merit is not None and is_noise(step.best.held_out, records.noise)
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
-    """The latest step with another of those that cannot be told from its best, and the step that this makes possible.
+    """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
 
-    Which one of several it was shows beside the next effect: where nothing more qualifies behind the one that was
-    taken, or less, or no more by more numbers, it was the wrong one. Where the next one is itself one of them,
-    `_exchanged` asks what else there is beside it.
+    Which of several alike effects is present shows beside the next one: if nothing more qualifies behind the accepted
+    one, or it leaves more, or needs more numbers to leave as little, it was the wrong one. Where the next effect is
+    itself a rival, `_exchanged` examines what else fits beside it.
     """
     alike = judge.rivals(latest.best, latest.tried, records)
-    others = {each.name: each for each in reversed(alike)}  # of each name the best one
+    others = {each.name: each for each in reversed(alike)}  # the best one of each name
     follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
     if step.merit is not None:
         follow = [each for each in follow if each.name != step.best.name]
@@ -209,13 +205,13 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
-    """Two effects of which none qualifies alone, since the other one hides it, but each beside the other.
+    """Two effects that hide each other: neither qualifies alone, but each beside the other.
 
-    The one, and the step from it to both. The search begins with what explains most on held-out records, and with each
-    effect that fitted ones leave no doubt of. What hides the one may leave less of the gap without it: then its share
-    is nothing, and that of the other all.
+    Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
+    records, and with each that is certain on fitted ones. Without the first, the other may leave less of the gap than
+    before; then the first has no share of it.
     """
-    one_of_each = {each.name: each for each in reversed(failed.tried)}  # of each name the best one
+    one_of_each = {each.name: each for each in reversed(failed.tried)}  # the best one of each name
     fitted = failed.now.errors(records.to_fit)
     seconds = []
     for first in one_of_each.values():
@@ -246,8 +242,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Those without the effects, which is linear, then with them: a sensor's curve far from where it was found leads on
-    to anywhere."""
+    """Weights without the effects, a linear fit, then with them: far from its outputs a sensor's curve leads astray."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -256,9 +251,9 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
 def _without_needless(
     now: Fitted, found: list[Found], records: Records
 ) -> tuple[Fitted, list[Found], dict[str, Fitted]]:
-    """Drop effects accepted earlier that those accepted later have made needless.
+    """Drop effects accepted earlier that later ones have made needless.
 
-    With it the model less each of the others of these.
+    Returns the model, the remaining effects, and for each earlier one the model without it.
     """
     less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
@@ -275,12 +270,11 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Put another effect or shape in the place of one accepted earlier, where those accepted later make it the better.
+    """Replace effects accepted earlier by others, or other shapes, that are better beside those accepted later.
 
-    The first of two has been chosen while the second was missing, and may have taken part of its place; and the second
-    beside a wrong first one. Which names are alike shows beside all the others too. `less`: the model less an effect,
-    where that is known; `names`: effects that were followed up so far, since one that was among the best beside none of
-    the others is not worth another search.
+    The first of two was chosen while the second was missing, and may have taken part of its place; the second was
+    chosen beside a wrong first one. Rivals, too, are judged beside all the others. `less`: the model without an effect,
+    where it is known; `names`: effects that were among the best in some round, the only ones worth another search.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -288,13 +282,13 @@ def _exchanged(
             fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
             if fitted is None:
                 continue
-            start = _left_as_it_is(now, old.name, records)  # the others' numbers without any may be far from all others
+            start = _without_refit(now, old.name, records)  # refitted without it, the others' numbers may be far off
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
             if not _gives_way(now, old.name, step.best, records):
-                # else it was not found again
+                # otherwise the search did not find the effect again
                 if step.best.held_out <= (1.0 + acceptance.ALIKE) * records.residual(now):
                     alike = dict.fromkeys([other.name, *other.rivals])
                     found[k] = replace(old, rivals=tuple(name for name in alike if name != old.name))
@@ -310,9 +304,9 @@ def _exchanged(
 
 
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
-    """Whether a hypothesis leaves so much more than another one, or no less on equal terms with more numbers.
+    """Whether an effect gives way to a better one.
 
-    Or as much with as many, where the catalogue has the other effect before that of this name.
+    By error, by fewer numbers with no larger error on equal terms, or, if equal, by its later place in the catalogue.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -324,7 +318,7 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 
 
 def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
-    """What was found, with the errors of the models before and after each; empty where one makes it no smaller."""
+    """The effects with the errors before and after each of them; empty if one does not lower the error."""
     residuals = [records.residual(now)]
     for each in reversed(found[1:]):
         smaller = _without(now, each.name, records)
@@ -342,7 +336,7 @@ def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records)
 
 
 def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
-    """What was found but the k-th; each step of the gap is between two models that there are."""
+    """The effects without the k-th; the errors before and after each remain those of existing models."""
     later = [replace(found[k + 1], before=found[k].before), *found[k + 2 :]] if k + 1 < len(found) else []
     rest = [*found[:k], *later]
     rest[-1] = replace(rest[-1], after=without)
@@ -350,13 +344,13 @@ def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
 
 
 def _without(now: Fitted, name: str, records: Records) -> Fitted | None:
-    """The hypothesis less one effect, fitted anew."""
+    """The hypothesis without one effect, refitted."""
     smaller = _less(now, name)
     return None if smaller is None else fits.fit(smaller[0], records.quick, smaller[1], now.weights)
 
 
-def _left_as_it_is(now: Fitted, name: str, records: Records) -> Fitted | None:
-    """The hypothesis less one effect, the others' numbers unchanged."""
+def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
+    """The hypothesis without one effect, with the others' numbers unchanged."""
     smaller = _less(now, name)
     if smaller is None:
         return None

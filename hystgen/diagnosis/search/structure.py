@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Part:
-    """An effect in a hypothesis: its catalogue name and the shape of it whose numbers are sought."""
+    """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted."""
 
     name: str
     candidate: Candidate
@@ -52,7 +52,7 @@ class Structure:
         )
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative beyond the bounds."""
+        """Further constraints on a shape: numbers that must not be negative."""
         return self.front.slack(shape[: len(self.front.straight)])
 
     def pieces(self, shape: Array) -> tuple[Array, list[Array]]:
@@ -69,17 +69,17 @@ class Structure:
         return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
 
     def held(self, shape: Array) -> Structure:
-        """The same without numbers to find: what they make, kept as it is."""
+        """The same without free numbers: front and effects stay as a shape makes them."""
         front_shape, _ = self.pieces(shape)
         front = Kept(self.front.stages(front_shape), self.front.name)
         return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
 
     def actuator(self, shape: Array) -> Actuator:
-        """What the numbers make."""
+        """The actuator of a shape."""
         return Actuator(self.thresholds, self.front.stages(self.pieces(shape)[0]), tuple(self.effects(shape)))
 
     def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
-        """What the numbers make with one after the other changed by `DIFFERENCE`; the rest is that of `here`."""
+        """The actuators of a shape with each number in turn changed by `DIFFERENCE`; the rest is shared with `here`."""
         front, numbers = self.pieces(shape)
         ends = len(front) + np.cumsum([len(x) for x in numbers])
 
