@@ -23,7 +23,7 @@ FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
 """How exactly, and how, a compensator corrects a stage in front of the plays."""
 
 LONGER = 0.01
-"""An error is visibly larger than another from this share on: two pixels of a bar."""
+"""An error is visibly larger than another from this share on."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:

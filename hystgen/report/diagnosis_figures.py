@@ -1,4 +1,4 @@
-"""The pictures of a diagnosis: how the gap shrinks, where it is, and what it goes with, with the noise drawn in."""
+"""The figures of a diagnosis: how the gap shrinks, where it is, and what it depends on, each with the noise."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ BEFORE, AFTER, FLOOR = "#8a929c", drawing.RESIDUAL, drawing.FAULT
 WIDE, NARROW = 9.0, 4.2
 
 SHOWN = 2
-"""Held-out records that are drawn along time."""
+"""Number of held-out records that are drawn along time."""
 
 FAR = 25.0
-"""A logarithmic axis is used where the largest value is so many times the least."""
+"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
 
 HOLD = 16
 
@@ -46,7 +46,7 @@ def steps(found: Diagnosis) -> list[tuple[str, float]]:
 
 
 def gap(found: Diagnosis, width: float) -> Any:
-    """What each step takes from the held-out error, down to the noise."""
+    """How much each step removes from the held-out error, down to the noise."""
     stages, noise = steps(found), found.result.noise_floor
     names = [*(name for name, _ in stages), "noise"]
     values = [*(value for _, value in stages), noise]
@@ -137,7 +137,7 @@ def records(found: Diagnosis, width: float) -> Any:
 
 
 def against(found: Diagnosis, width: float) -> Any:
-    """Mean and scatter of the error over what it may go with, of all records."""
+    """Mean and scatter of the error of all records over the variables it may depend on."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     units, unit = found.parameters.units, found.result.unit
     wide = width == WIDE
@@ -281,7 +281,7 @@ def _floor(axes: Any, found: Diagnosis) -> None:
 
 
 def _range(axes: Any, values: Sequence[float]) -> None:
-    """A horizontal axis from zero, or a logarithmic one where the values lie far apart."""
+    """A horizontal axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
         _decades(axes, "x")
