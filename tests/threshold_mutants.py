@@ -56,7 +56,8 @@ def documented() -> dict[str, str]:
     for each, text in itertools.pairwise(body):
         if isinstance(each, ast.Assign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
             targets = each.targets[0].elts if isinstance(each.targets[0], ast.Tuple) else each.targets
-            found |= {target.id: str(text.value.value) for target in targets if isinstance(target, ast.Name)}
+            words = " ".join(str(text.value.value).split())
+            found |= {target.id: words for target in targets if isinstance(target, ast.Name)}
     return found
 
 
