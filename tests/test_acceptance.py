@@ -582,7 +582,8 @@ class TestWholeRecords:
         assert (channels._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
 
     @pytest.mark.parametrize(
-        ("share", "scatters", "left_out"), [(0.05, 8.0, True), (0.05, 4.5, False), (0.15, 12.0, True), (0.25, 12.0, False)]
+        ("share", "scatters", "left_out"),
+        [(0.05, 8.0, True), (0.05, 4.5, False), (0.15, 12.0, True), (0.25, 12.0, False)],
     )
     def test_a_few_samples_far_off_do_not_count(self, share: float, scatters: float, left_out: bool) -> None:
         random = np.random.default_rng(4)
