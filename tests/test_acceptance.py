@@ -19,11 +19,11 @@ from scipy.signal import lfilter
 from scipy.stats import wilcoxon
 from test_selection import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
 
-from hystgen.diagnosis.data import bad_samples, channels, starts, thinning
+from hystgen.diagnosis.data import bad_samples, channels, disturbances, lines, periodic, spectra, starts, thinning
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.noise_floor import noise_floor
 from hystgen.diagnosis.data.preparing import prepare
-from hystgen.diagnosis.findings.kinds import Saturated
+from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
 from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
 from hystgen.diagnosis.search.actuator import Actuator
 from hystgen.diagnosis.search.fits import Fitted
@@ -111,7 +111,7 @@ def test_blocks_are_longer_than_errors_remember(memory: int) -> None:
     blocks = [np.mean(gain[k : k + size]) for k in range(0, 600 - size + 1, size)]
     assert size == (2 if memory == 1 else 30)
     expected = wilcoxon(blocks, alternative="greater").pvalue
-    assert merit.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9)
+    assert merit.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize(("more", "first"), [(1.004, "lag"), (1.008, "delay")])
@@ -618,3 +618,182 @@ def _orthogonal(x: Array, to: Array) -> Array:
     rest = x - float(x @ to) / float(to @ to) * to
     rest = rest - np.mean(rest)
     return np.asarray(rest / np.std(rest))
+
+
+# Lines -------------------------------------------------------------------------------------------------------
+
+
+def tone(frequency: float, samples: int, size: float = 1.0, step: float = 1e-3) -> Array:
+    return np.asarray(size * np.sin(2.0 * np.pi * frequency * step * np.arange(samples) + 0.3))
+
+
+def hiss(samples: int, seed: int = 0) -> Array:
+    """White noise of unit variance."""
+    return np.random.default_rng(seed).normal(size=samples)
+
+
+def driven(v: Array, step: float = 1e-3, name: str = "r") -> Item:
+    return Item(name, Run(np.arange(len(v)) * step, v), 0.1 * v, None, 10.0)
+
+
+def ramp(samples: int, step: float = 1e-3, name: str = "r") -> Item:
+    """A record whose drive has no lines."""
+    return driven(np.linspace(0.0, 100.0, samples), step, name)
+
+
+def of_share(share: float) -> float:
+    """Amplitude of a tone with this share of the variance of it and noise."""
+    return float(np.sqrt(2.0 * share / (1.0 - share)))
+
+
+def heard(item: Item, error: Array) -> list[float]:
+    return sorted(frequency for _, frequency in spectra.peaks(item, error))
+
+
+class TestSpectra:
+    @pytest.mark.parametrize(("share", "seen"), [(0.042, True), (0.021, False)])
+    def test_share_of_a_line(self, share: float, seen: bool) -> None:
+        assert bool(heard(ramp(8000), tone(130.0, 8000, of_share(share)) + hiss(8000))) is seen
+
+    @pytest.mark.parametrize(("height", "seen"), [(45.0, True), (20.0, False)])
+    def test_height_of_a_line(self, height: float, seen: bool) -> None:
+        """Over its surroundings, in a short record."""
+        noise, line = hiss(600), tone(125.0, 600)
+        window = np.hanning(600)
+        power = np.abs(np.fft.rfft(noise * window)) ** 2
+        around = np.median(np.concatenate([power[35:72], power[79:115]]))
+        with_line = np.abs(np.fft.rfft(line * window))[75]
+        phase = np.angle(np.fft.rfft(noise * window)[75]) - np.angle(np.fft.rfft(line * window)[75])
+        size = (np.sqrt(height * around) - np.sqrt(power[75])) / with_line
+        error = noise + size * np.sin(2.0 * np.pi * 0.125 * np.arange(600) + 0.3 + phase)
+        assert (heard(ramp(600), error) == [pytest.approx(125.0)]) is seen
+
+    @pytest.mark.parametrize(("share", "seen"), [(2e-6, False), (0.7e-6, True)])
+    def test_a_line_of_the_drive(self, share: float, seen: bool) -> None:
+        """However small, beside one and a half slow swings."""
+        slow = 50.0 * np.cos(2.0 * np.pi * 0.375 * np.arange(4000) * 1e-3)
+        v = slow + tone(125.0, 4000, float(np.sqrt(share)) * 50.0)
+        assert bool(heard(driven(v), tone(125.0, 4000) + hiss(4000))) is seen
+
+    @pytest.mark.parametrize(("height", "seen"), [(14.0, False), (7.0, True)])
+    def test_height_of_a_line_of_the_drive(self, height: float, seen: bool) -> None:
+        noise, window = hiss(2000, 1), np.hanning(2000)
+        spectrum = np.fft.rfft(noise * window)
+        around = np.median(np.abs(np.concatenate([spectrum[210:247], spectrum[254:290]])) ** 2)
+        line = np.fft.rfft(tone(125.0, 2000) * window)[250]
+        phase = np.angle(spectrum[250]) - np.angle(line)
+        size = (np.sqrt(height * around) - np.abs(spectrum[250])) / np.abs(line)
+        v = noise + size * np.sin(2.0 * np.pi * 0.125 * np.arange(2000) + 0.3 + phase)
+        assert bool(heard(driven(v), tone(125.0, 2000) + hiss(2000))) is seen
+
+    @pytest.mark.parametrize(
+        ("carried", "harmonic", "seen"),
+        [
+            (0.7, 3.0, False), (0.35, 3.0, True), (0.7, 8.0, False), (0.7, 12.0, True), (0.7, 3.025, False),
+            (0.7, 3.05, True),
+        ],
+    )
+    def test_harmonics_of_a_carrier(self, carried: float, harmonic: float, seen: bool) -> None:
+        """A share of the drive's power in 40 swings; a fortieth of the harmonic is one bin."""
+        rest = smooth(5, 4000)
+        v = tone(10.0, 4000, float(np.sqrt(2.0 * carried))) + np.sqrt(1.0 - carried) * rest
+        found = heard(driven(v), tone(10.0 * harmonic, 4000) + 0.3 * hiss(4000))
+        assert (pytest.approx(10.0 * harmonic) in found) is seen
+
+    @pytest.mark.parametrize(("periods", "seen"), [(10, True), (6, False)])
+    def test_periods_of_a_line(self, periods: int, seen: bool) -> None:
+        assert bool(heard(driven(hiss(4000, 9)), tone(periods / 4.0, 4000) + 0.3 * hiss(4000))) is seen
+
+    @pytest.mark.parametrize(("samples", "seen"), [(300, True), (200, False)])
+    def test_samples_of_a_spectrum(self, samples: int, seen: bool) -> None:
+        assert bool(heard(ramp(samples), tone(250.0, samples) + 0.1 * hiss(samples))) is seen
+
+    @pytest.mark.parametrize(("first", "last", "seen"), [(44, 80, True), (16, 40, False)])
+    def test_surroundings_of_a_line(self, first: int, last: int, seen: bool) -> None:
+        """Strong noise in these bins on either side."""
+        random = np.random.default_rng(6)
+        spectrum = random.normal(size=2001) + 1j * random.normal(size=2001)
+        for k in range(first, last):
+            spectrum[[500 - k, 500 + k]] *= 30.0
+        spectrum[500] = 120.0
+        assert (pytest.approx(125.0) in heard(ramp(4000), np.fft.irfft(spectrum, 4000))) is seen
+
+    def test_the_highest_bins(self) -> None:
+        """Of seven equal tones five are looked at."""
+        error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(7)) + 0.1 * hiss(4000)
+        assert len(heard(ramp(4000), error)) == 5
+
+    @pytest.mark.parametrize(("apart", "number"), [(0.013, 1), (0.03, 2)])
+    def test_ringing_at_nearly_the_same_frequency(self, apart: float, number: int) -> None:
+        errors = [tone(f, 20_000) + 0.3 * hiss(20_000) for f in (100.0, 100.0 * (1.0 + apart))]
+        found = spectra.ringing([ramp(20_000), ramp(20_000)], errors, 5)
+        assert len([f for f in found if 99.0 < f < 104.0]) == number
+
+    @pytest.mark.parametrize(("samples", "repeats"), [(80, True), (50, False)])
+    def test_a_short_drive_does_not_repeat(self, samples: int, repeats: bool) -> None:
+        v = np.cos(2.0 * np.pi * np.arange(samples) / 20.0)
+        assert (spectra.repetition(v) == 20) is repeats
+
+    @pytest.mark.parametrize(("noise", "repeats"), [(0.7, True), (1.4, False)])
+    def test_a_noisy_drive_repeats(self, noise: float, repeats: bool) -> None:
+        """Of a range of 100, rms between periods."""
+        v = np.tile(np.interp(np.arange(500), [0, 100, 250, 400, 500], [0.0, 100.0, 20.0, 70.0, 0.0]), 6)
+        assert (spectra.repetition(v + noise / np.sqrt(2.0) * hiss(3000)) is not None) is repeats
+
+    @pytest.mark.parametrize(("duty", "repeats"), [(0.05, True), (0.015, False)])
+    def test_a_drive_that_mostly_rests(self, duty: float, repeats: bool) -> None:
+        """It differs from itself by the root of twice that, rms."""
+        v = np.tile(np.where(np.arange(400) < 400 * duty, 1.0, 0.0), 6)
+        assert (spectra.repetition(v) is not None) is repeats
+
+
+class TestLines:
+    @pytest.mark.parametrize(("share", "ruled"), [(0.4, True), (0.2, False)])
+    def test_a_line_rules(self, share: float, ruled: bool) -> None:
+        error = tone(130.0, 4000, of_share(share)) + hiss(4000)
+        assert bool(periodic.ruling([ramp(4000)], [error])[0]) is ruled
+
+    @pytest.mark.parametrize(("share", "rules"), [(0.4, True), (0.2, False)])
+    def test_a_line_in_a_few_records(self, share: float, rules: bool) -> None:
+        """In one of ten, unless it rules that one."""
+        items = [ramp(2000, name=f"r{k}") for k in range(10)]
+        errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(share)) if k == 0 else 0.0) for k in range(10)]
+        assert bool(periodic.lines(items, errors)[0]) is rules
+
+    @pytest.mark.parametrize(("having", "seen"), [(5, True), (3, False)])
+    def test_a_line_in_many_records(self, having: int, seen: bool) -> None:
+        items = [ramp(2000, name=f"r{k}") for k in range(10)]
+        errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(0.15)) if k < having else 0.0) for k in range(10)]
+        assert bool(periodic.lines(items, errors)[0]) is seen
+
+    @pytest.mark.parametrize(("steady", "seen"), [(7, True), (5, False)])
+    def test_steady_in_most_records(self, steady: int, seen: bool) -> None:
+        """In the others it is gone after half the time."""
+        items = [ramp(2000, name=f"r{k}") for k in range(10)]
+        fading = np.where(np.arange(2000) < 1000, 1.0, 0.0)
+        errors = [3.0 * tone(130.0, 2000) * (1.0 if k < steady else fading) + hiss(2000, k) for k in range(10)]
+        assert (lines.steady(items, errors) is not None) is seen
+
+    def test_four_lines(self) -> None:
+        error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(6)) + 0.1 * hiss(4000)
+        assert len(periodic.lines([ramp(4000)], [error])[0]) == 4
+
+    @pytest.mark.parametrize(("rate", "size"), [(1080.0, 1.5), (945.0, 1.0)])
+    def test_two_samples_a_period_do_not_show_an_amplitude(self, rate: float, size: float) -> None:
+        """A line of 450 Hz, twice as large in the record with the other sampling rate."""
+        items = [ramp(4000, 1.0 / 2000.0, "a"), ramp(4000, 1.0 / rate, "b")]
+        errors = [tone(450.0, 4000, 1.0, 1.0 / 2000.0), tone(450.0, 4000, 2.0, 1.0 / rate)]
+        (line, *_), _ = periodic.lines(items, [e + 0.1 * hiss(4000, k) for k, e in enumerate(errors)])
+        assert line.amplitude == pytest.approx(size, rel=0.1)
+
+    @pytest.mark.parametrize(
+        ("frequency", "mains"), [(50.08, 50.0), (50.15, None), (149.8, "3 x 50 Hz"), (59.97, 60.0)]
+    )
+    def test_mains(self, frequency: float, mains: object) -> None:
+        assert lines._mains(frequency, 1e-3) == mains
+
+    @pytest.mark.parametrize(("frequency", "known"), [(103.0, True), (108.0, False)])
+    def test_the_rest_of_a_line(self, frequency: float, known: bool) -> None:
+        line = Line(100.0, 1.0, 0.5, ("r",))
+        assert disturbances.is_known(replace(line, frequency=frequency), [line]) is known
+        assert not disturbances.is_known(Ripple(100.0, 1.0, 0.5, ("r",), False), [line])
