@@ -17,12 +17,28 @@ import threshold_mutants
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import wilcoxon
+from test_diagnosis import STRUCTURE, result
+from test_disturbances import sweep
 from test_selection import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
 
-from hystgen.diagnosis.data import bad_samples, channels, disturbances, lines, periodic, spectra, starts, thinning
+from hystgen.diagnosis import Diagnosis
+from hystgen.diagnosis.data import (
+    bad_samples,
+    channels,
+    disturbances,
+    drives,
+    lines,
+    periodic,
+    ripple,
+    spectra,
+    starts,
+    stick_slip,
+    thinning,
+)
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.noise_floor import noise_floor
-from hystgen.diagnosis.data.preparing import prepare
+from hystgen.diagnosis.data.preparing import Prepared, prepare
+from hystgen.diagnosis.findings import content, residual, stretches
 from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
 from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
 from hystgen.diagnosis.search.actuator import Actuator
@@ -114,9 +130,10 @@ def test_blocks_are_longer_than_errors_remember(memory: int) -> None:
     assert merit.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
 
 
-@pytest.mark.parametrize(("more", "first"), [(1.004, "lag"), (1.008, "delay")])
+@pytest.mark.parametrize(("more", "first"), [(1.006, "lag"), (1.015, "delay")])
 def test_equal_effects_come_in_the_order_of_the_catalogue(more: float, first: str) -> None:
-    assert first_of(Made("delay", 1, (1.0, 1.0)), Made("lag", 1, (more, more))) == first
+    """Over all records one leaves 0.3 or 0.9 % more."""
+    assert first_of(Made("delay", 1, (1.0, 1.0)), Made("lag", 1, (more, 1.0))) == first
 
 
 class TestForwardSelection:
@@ -235,7 +252,8 @@ class TestScreening:
 
     @pytest.mark.parametrize(("left", "fitted", "joined"), [(1.9, 3.0, True), (3.0, 1.9, True), (2.1, 2.1, False)])
     def test_what_promises_nothing_is_not_searched_jointly(self, left: float, fitted: float, joined: bool) -> None:
-        assert (_followed([(1.0, 1.0), (left, fitted)], [1.0, 1.0])[1][0] > 0) is joined
+        steps = _followed([(1.0, 1.0), (left, fitted)], [1.0, 1.0])
+        assert (steps[0][0], steps[1][0]) == (5, 5 if joined else 0)
 
     @pytest.mark.parametrize(("left", "polished"), [(1.2, True), (1.4, False)])
     def test_what_is_behind_after_a_few_steps_is_not_polished(self, left: float, polished: bool) -> None:
@@ -651,9 +669,9 @@ def heard(item: Item, error: Array) -> list[float]:
 
 
 class TestSpectra:
-    @pytest.mark.parametrize(("share", "seen"), [(0.042, True), (0.021, False)])
+    @pytest.mark.parametrize(("share", "seen"), [(0.055, True), (0.024, False)])
     def test_share_of_a_line(self, share: float, seen: bool) -> None:
-        assert bool(heard(ramp(8000), tone(130.0, 8000, of_share(share)) + hiss(8000))) is seen
+        assert bool(heard(ramp(20_000), tone(130.0, 20_000, of_share(share)) + hiss(20_000))) is seen
 
     @pytest.mark.parametrize(("height", "seen"), [(45.0, True), (20.0, False)])
     def test_height_of_a_line(self, height: float, seen: bool) -> None:
@@ -668,7 +686,7 @@ class TestSpectra:
         error = noise + size * np.sin(2.0 * np.pi * 0.125 * np.arange(600) + 0.3 + phase)
         assert (heard(ramp(600), error) == [pytest.approx(125.0)]) is seen
 
-    @pytest.mark.parametrize(("share", "seen"), [(2e-6, False), (0.7e-6, True)])
+    @pytest.mark.parametrize(("share", "seen"), [(1.5e-6, False), (0.7e-6, True)])
     def test_a_line_of_the_drive(self, share: float, seen: bool) -> None:
         """However small, beside one and a half slow swings."""
         slow = 50.0 * np.cos(2.0 * np.pi * 0.375 * np.arange(4000) * 1e-3)
@@ -797,3 +815,238 @@ class TestLines:
         line = Line(100.0, 1.0, 0.5, ("r",))
         assert disturbances.is_known(replace(line, frequency=frequency), [line]) is known
         assert not disturbances.is_known(Ripple(100.0, 1.0, 0.5, ("r",), False), [line])
+
+
+# Ripples and stick-slip --------------------------------------------------------------------------------------
+
+
+def rippled(places: Array, pitch: float, seed: int, grain: float = 0.0) -> tuple[Item, Array]:
+    """A record that moves over these places, with a ripple of unit amplitude and some noise; and its error."""
+    error = np.sin(2.0 * np.pi * places / pitch) + 0.1 * hiss(len(places), seed)
+    y = places + error
+    if grain:
+        y = grain * np.round(y / grain)
+        error = y - places
+    return Item(f"r{seed}", Run(np.arange(len(places)) * 1e-3, places), y, None, 10.0), error
+
+
+def there_and_back(low: float, high: float, samples: int) -> Array:
+    """A pass up and one down, with these samples each."""
+    return np.concatenate([np.linspace(low, high, samples), np.linspace(high, low, samples)[1:]])
+
+
+def pitches(made: Sequence[tuple[Item, Array]]) -> list[float]:
+    found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+    return [] if found is None else [found.finding.place]
+
+
+class TestRipple:
+    @pytest.mark.parametrize(("step", "seen"), [(0.2, True), (0.35, False)])
+    def test_samples_a_pitch(self, step: float, seen: bool) -> None:
+        made = [rippled(there_and_back(0.0, 40.0, round(40.0 / step)), 1.0, k) for k in range(3)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("samples", "seen"), [(42, True), (26, False)])
+    def test_samples_of_a_pass(self, samples: int, seen: bool) -> None:
+        made = [rippled(there_and_back(1.3 * k, 1.3 * k + 4.5, samples), 1.0, k) for k in range(12)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("length", "seen"), [(4.0, True), (2.4, False)])
+    def test_pitches_of_a_pass(self, length: float, seen: bool) -> None:
+        made = [rippled(there_and_back(1.3 * k, 1.3 * k + length, 60), 1.0, k) for k in range(12)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("number", "seen"), [(400, True), (700, False)])
+    def test_the_finest_pitch(self, number: int, seen: bool) -> None:
+        """Pitches in the range."""
+        made = [rippled(there_and_back(0.0, float(number), 6000), 1.0, k) for k in range(2)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("beside", "step"), [(0.014, True), (0.03, False)])
+    def test_a_pitch_of_the_converter(self, beside: float, step: bool) -> None:
+        made = [rippled(there_and_back(0.0, 40.0, 2000), 1.0, k, 1.0 + beside) for k in range(3)]
+        found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+        assert found is not None
+        assert found.finding.place == pytest.approx(1.0, rel=0.005)
+        assert found.finding.entry()["converter_step"] is step
+
+
+SLIP = 0.0, 2.2
+"""What a stretch that stands, and one that leaps, moves of what it should."""
+
+
+def slipping(ratios: Sequence[float], moves: float = 1.0, jump: float = 9.0, noise: float = 1.0) -> bool:
+    """Whether stick-slip is seen where stretches of seven samples move by these shares of the prediction.
+
+    A stretch that moves more than predicted does so in one jump, and falls behind again a little where that is more.
+    """
+    e = [0.0]
+    for ratio in ratios:
+        change = 7.0 * moves * (ratio - 1.0)
+        rest = (change - jump) / 6.0 if ratio > 1.0 else change / 7.0
+        e += list(e[-1] + np.cumsum([jump if ratio > 1.0 else rest, *([rest] * 6)]))
+    error = np.array(e)
+    predicted = moves * np.arange(len(error))
+    item = Item("r", Run(np.arange(len(error)) * 1e-3, predicted), predicted + error, None, 10.0)
+    return bool(stick_slip.stick_slip([item], [error], noise))
+
+
+def pattern(pairs: int, stretches: int, stands: float = 0.0, leaps: float = 2.2) -> list[float]:
+    """Pairs of standing and leaping, spread evenly among stretches that follow."""
+    found = [1.0] * stretches
+    for k in range(pairs):
+        at = k * stretches // pairs
+        found[at : at + 2] = [stands, leaps]
+    return found
+
+
+class TestStickSlip:
+    @pytest.mark.parametrize(("pairs", "seen"), [(20, True), (11, False)])
+    def test_how_much_stands(self, pairs: int, seen: bool) -> None:
+        assert slipping(pattern(pairs, 100)) is seen
+
+    @pytest.mark.parametrize(("leaping", "seen"), [(7, True), (3, False)])
+    def test_how_much_leaps(self, leaping: int, seen: bool) -> None:
+        """Of a hundred stretches; the others that stand make up for it slowly."""
+        ratios = pattern(20, 100, -0.2, 1.5)
+        for k in [k for k, ratio in enumerate(ratios) if ratio == 1.5][:leaping]:
+            ratios[k] = 2.2
+        assert slipping(ratios) is seen
+
+    @pytest.mark.parametrize(("off", "seen"), [(0.7, True), (0.5, False)])
+    def test_how_far_off_a_stretch_is(self, off: float, seen: bool) -> None:
+        assert slipping(pattern(20, 100, 1.0 - off, 1.0 + off)) is seen
+
+    @pytest.mark.parametrize(("jump", "seen"), [(8.5, True), (5.5, False)])
+    def test_how_large_a_jump_is(self, jump: float, seen: bool) -> None:
+        """Of times the noise."""
+        assert slipping(pattern(20, 100, 0.0, 1.9), jump=jump) is seen
+
+    @pytest.mark.parametrize(("pairs", "stretches", "seen"), [(7, 40, True), (4, 26, False)])
+    def test_how_many_jumps(self, pairs: int, stretches: int, seen: bool) -> None:
+        assert slipping(pattern(pairs, stretches)) is seen
+
+    @pytest.mark.parametrize(("length", "seen"), [(1, True), (3, False)])
+    def test_what_goes_on(self, length: int, seen: bool) -> None:
+        """Stretches that stand, and those that leap, in a row."""
+        row = [0.0] * length + [2.0] * length + [1.0] * 4
+        assert slipping(row * (100 // len(row))) is seen
+
+
+# Drives and descriptions -------------------------------------------------------------------------------------
+
+
+class TestDrives:
+    @pytest.mark.parametrize(("turn", "number"), [(1.4, 0), (3.0, 2)])
+    def test_a_small_turn(self, turn: float, number: int) -> None:
+        v = np.interp(np.arange(300), [0, 100, 130, 299], [0.0, 50.0, 50.0 - turn, 100.0])
+        assert len(drives.reversals(v)) == number
+
+    @pytest.mark.parametrize(("top", "one"), [(93.0, True), (86.0, False)])
+    def test_ends_of_loops(self, top: float, one: bool) -> None:
+        assert drives.one_loop([sweep(0, 100, 0, 100, 0), sweep(0, top, 0, top, 0)]) is one
+
+    @pytest.mark.parametrize(("slower", "one"), [(1.35, True), (1.8, False)])
+    def test_speeds_of_loops(self, slower: float, one: bool) -> None:
+        assert drives.one_speed([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=slower)]) is one
+
+    @pytest.mark.parametrize(("hold", "one"), [(50, True), (160, False)])
+    def test_a_loop_that_stands_is_none(self, hold: int, one: bool) -> None:
+        """Samples beside 200 of each move."""
+        move = np.linspace(0.0, 100.0, 200)
+        v = np.concatenate([move, np.full(hold, 100.0), move[::-1], np.zeros(hold)] * 3)
+        assert drives.one_loop([driven(v)]) is one
+
+
+def scattered(samples: int, seed: int = 0) -> Item:
+    """A drive that goes everywhere in every block of samples."""
+    return driven(np.random.default_rng(seed).uniform(0.0, 100.0, samples))
+
+
+class TestDescription:
+    @pytest.mark.parametrize(("share", "matters"), [(0.14, True), (0.07, False)])
+    def test_a_variable_that_matters(self, share: float, matters: bool) -> None:
+        item = scattered(20_000)
+        error = of_share(share) * np.sin(2.0 * np.pi * item.run.v / 100.0) + hiss(20_000, 1)
+        assert ("drive" in residual.shares([item], [error])[1]) is matters
+
+    def test_bins_of_a_variable(self) -> None:
+        """Eight waves over the range, of which 24 bins see two thirds."""
+        item = scattered(20_000)
+        shares = residual.shares([item], [np.sin(2.0 * np.pi * 8.0 * item.run.v / 100.0)])[1]
+        assert 0.6 < shares["drive"] < 0.8
+
+    def test_folds(self) -> None:
+        """A drift is seen in half of the blocks of time alone: a bin is two thirds of one."""
+        item = scattered(9600)
+        assert 0.25 < residual.shares([item], [np.linspace(-1.0, 1.0, 9600)])[1]["session time"] < 0.45
+
+    @pytest.mark.parametrize(("samples", "described"), [(300, True), (150, False)])
+    def test_samples_of_a_description(self, samples: int, described: bool) -> None:
+        item = scattered(samples)
+        assert (residual.shares([item], [item.run.v - 50.0])[0] > 0.0) is described
+
+    @pytest.mark.parametrize(("free", "main"), [(0.6, "memory"), (0.45, "drive")])
+    def test_memory_in_place_of_one_variable(self, free: float, main: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(residual, "shares", lambda *_: (0.4, {"drive": 0.4}))
+        monkeypatch.setattr(residual, "together", lambda *_: (free, 0.7))
+        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).main_variable == main
+
+    @pytest.mark.parametrize(("free", "rate_free"), [(0.8, True), (0.6, False)])
+    def test_rate_free(self, free: float, rate_free: bool) -> None:
+        assert residual._rate_free(free, 1.0) is rate_free
+
+    @pytest.mark.parametrize(("share", "repeatable"), [(0.6, True), (0.4, False)])
+    def test_repeatable(self, share: float, repeatable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(residual, "repeatable", lambda *_: share)
+        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).repeatable is repeatable
+
+    @pytest.mark.parametrize(
+        ("share", "waves", "samples", "known"),
+        [
+            (0.09, 1, 40_000, True), (0.035, 1, 40_000, False),  # of the variance
+            (0.1, 8, 40_000, True), (0.1, 12, 40_000, False),  # twenty bins see 0.57 or 0.25 of these
+            (0.9, 1, 640, True), (0.9, 1, 300, False),  # 16 or 7 a bin
+        ],
+    )  # fmt: skip
+    def test_parity(self, share: float, waves: int, samples: int, known: bool) -> None:
+        item = scattered(samples)
+        error = of_share(share) * np.cos(2.0 * np.pi * waves * item.run.v / 100.0) + hiss(samples, 1)
+        assert (residual.even_share([item], [error]) is not None) is known
+
+
+class TestStretches:
+    @pytest.mark.parametrize(("times", "listed"), [(1.6, True), (1.4, False)])
+    def test_above_the_noise(self, times: float, listed: bool) -> None:
+        error = np.where(np.arange(2400) < 300, times, 1.0) * np.resize([1.0, -1.0], 2400)
+        assert bool(stretches.worst([ramp(2400)], [error], 1.0)) is listed
+
+    def test_ends_of_the_range(self) -> None:
+        """Windows of 4 % of the range: the third one is two fifths within a tenth of it."""
+        found = stretches.worst([ramp(2400)], [np.ones(2400)], 0.1)
+        assert {(each.kind, each.interval) for each in found} == {
+            ("range_end", (0.0, 0.199)), ("moving", (0.2, 2.199)), ("range_end", (2.2, 2.399)),
+        }  # fmt: skip
+
+    def test_fast(self) -> None:
+        """A third of the record is twice as fast as most of it, a twelfth ten times."""
+        rates = np.repeat([1.0, 2.0, 1.0, 10.0, 1.0], [700, 800, 300, 200, 400])
+        item = driven(np.cumsum(np.resize(np.repeat([1.0, -1.0], 25), 2400) * rates))
+        found = stretches.worst([item], [np.ones(2400)], 0.1)
+        assert [each.interval for each in found if each.kind == "fast"] == [(1.8, 1.999)]
+
+
+@pytest.mark.parametrize(("share", "begins"), [(0.6, "The records are disturbed"), (0.4, "Something is missing")])
+def test_what_the_sentence_is_about(share: float, begins: str) -> None:
+    line = Line(frequency=50.0, amplitude=0.1, share=share, records=("r",))
+    found = result("unexplained", (), 0.5, [line, STRUCTURE])
+    assert Diagnosis(found, None, (), ()).sentence().startswith(begins)  # type: ignore[arg-type]
+
+
+def test_held_out_records_that_are_alone() -> None:
+    """With 2.5 or 3.5 times the error of a fitted one."""
+    items = [ramp(2000, name=name) for name in ("fit", "a", "b")]
+    errors = [size * hiss(2000, k) for k, size in enumerate((1.0, 2.5, 3.5))]
+    ready = Prepared(items[:1], items[1:], [], [], (0.0, 100.0), np.zeros(1))
+    (left,) = content._unexplained(ready, [errors[:1], errors[1:]], 0.5, 1.0, [])
+    assert left.entry()["held_out_alone"] == ("b",)
