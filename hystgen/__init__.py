@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from hystgen.cascade import Cascade as Cascade
     from hystgen.cascade import InverseCascade as InverseCascade
     from hystgen.compensator.session import Session as Session
-    from hystgen.diagnosis import diagnose as diagnose
     from hystgen.emission.calls import differences as differences
     from hystgen.emission.calls import emit as emit
     from hystgen.fleet.batch import identify_batch as identify_batch
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
     from hystgen.plays import density as density
     from hystgen.plays import elastoplastic as elastoplastic
     from hystgen.plays import operators as operators
+    from hystgen.report.diagnosed import diagnose as diagnose
     from hystgen.report.fit import report_fit as report_fit
     from hystgen.report.planned import plan as plan
     from hystgen.verification.run import verify as verify
@@ -60,7 +60,7 @@ _PLACES = {
     "ParameterError": "basics.problems",
     "Session": "compensator.session",
     "TanhEnvelope": "front.tanh.model",
-    "diagnose": "diagnosis",
+    "diagnose": "report.diagnosed",
     "differences": "emission.calls",
     "emit": "emission.calls",
     "identify": "identification",

@@ -10,7 +10,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
@@ -23,20 +23,18 @@ from scipy.signal import lfilter
 
 import hystgen
 from hystgen.basics import parallel
-from hystgen.diagnosis import (
-    Diagnosis,
-    _extended,
-    believed,
-    decisions,
-    floor,
-    options,
-    selection,
-    structure,
-    told,
-    trials,
-)
-from hystgen.diagnosis.held_out import set_aside
-from hystgen.diagnosis.structure import Item
+from hystgen.diagnosis import Diagnosis
+from hystgen.diagnosis.data import preparing
+from hystgen.diagnosis.data.held_out import set_aside
+from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.noise_floor import noise_floor
+from hystgen.diagnosis.findings.content import ONE_LOOP
+from hystgen.diagnosis.findings.kinds import Finding, Line, Structure
+from hystgen.diagnosis.findings.result import Errors, Gap, Inverse, NamedEffect, Result
+from hystgen.diagnosis.run import _extended
+from hystgen.diagnosis.search import acceptance, merit, options, screening, selection, structure
+from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search.fits import Fitted
 from hystgen.effects.ageing.model import ExponentialAgeing
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep.model import ExponentialCreep
@@ -117,7 +115,7 @@ class TestBlindPlants:
         (case, _), *_ = made(tmp_path, "none", 1)
         (tmp_path / "file").touch()
         (tmp_path / "taken" / "report.html").mkdir(parents=True)
-        monkeypatch.setattr("hystgen.diagnosis.diagnose", lambda *_, **__: pytest.fail("searched"))
+        monkeypatch.setattr("hystgen.api.diagnose", lambda *_, **__: pytest.fail("searched"))
         data = sorted(case.glob("r*.csv"))[:2]
         code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
         assert (code, out) == (2, "")
@@ -166,7 +164,7 @@ class TestSeveralProcesses:
         return case
 
     def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(trials, "LARGE", 0)
+        monkeypatch.setattr(screening, "LARGE", 0)
         found = []
         for cores in (1, 3):
             monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
@@ -176,10 +174,11 @@ class TestSeveralProcesses:
     @pytest.mark.parametrize(("forks", "fits"), [(1, 0), (2, 0), (2, 10)])
     def test_an_interrupt_leaves_nothing(self, case: Path, forks: int, fits: int) -> None:
         program = (
-            "import os, sys; from hystgen import cli, parallel; from hystgen.diagnosis import trials; "
+            "import os, sys; from hystgen import cli; from hystgen.basics import parallel; "
+            "from hystgen.diagnosis.search import screening; "
             "from hystgen.basics.progress import Progress; tick = Progress.tick; "
             "Progress.tick = lambda bar, n: (print('fitted', flush=True), tick(bar, n)); "
-            "trials.LARGE = 0; parallel.cores = lambda: 2; "
+            "screening.LARGE = 0; parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
         )
         with subprocess.Popen(
@@ -224,33 +223,43 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
 
 
+def result(
+    verdict: str,
+    names: Sequence[str],
+    after: float,
+    unexplained: Sequence[Finding],
+    rivals: Sequence[tuple[str, str]] = (),
+) -> Result:
+    """A result with a refitted error of 0.5 um and noise of 0.02 um."""
+    gap = Gap(Errors(0.5, 0.5), Errors(0.5, 0.5), Errors(after, after))
+    effects = tuple(NamedEffect(name, {}, {}, 0.5, 0.5, after, 0.0, "") for name in names)
+    inverse = Inverse(True, ())
+    return Result(verdict, 0.02, 10.0, "um", gap, effects, tuple(unexplained), (), tuple(rivals), (), (), inverse)
+
+
+STRUCTURE = Structure(0.05, 2.5, None, {}, None, None, None, None, ())
+
+
 def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
     """What may be another effect, and an error far from noise."""
-    content: dict[str, Any] = {
-        "verdict": "effects_found", "unit": "um", "noise_floor": 0.02, "unexplained": [],
-        "gap": {"refitted": {"holdout": 0.5}, "after": {"holdout": 0.05}},
-        "effects": [{"name": "lag"}, {"name": "creep"}], "not_separable": [["lag", "delay"], ["lag", "resonance"]],
-    }  # fmt: skip
-    found = Diagnosis(content, hystgen.load(_model(tmp_path)).parameters, (), ())
+    parameters = hystgen.load(_model(tmp_path)).parameters
+    rivals = [("lag", "delay"), ("lag", "resonance")]
     said = "Missing: lag (or delay or resonance), creep. The held-out rms error falls from 0.5 um to 0.05 um"
-    assert found.sentence() == said + "."
-    content["unexplained"] = [{"kind": "structure"}]
-    assert found.sentence() == said + ", 2.5 times the noise and with structure."
+    for unexplained, more in (([], "."), ([STRUCTURE], ", 2.5 times the noise and with structure.")):
+        found = result("effects_found", ("lag", "creep"), 0.05, unexplained, rivals)
+        assert Diagnosis(found, parameters, (), ()).sentence() == said + more
 
 
 @pytest.mark.parametrize(
-    ("share", "structure", "begins"),
+    ("share", "structured", "begins"),
     [(0.1, True, "Something is missing"), (0.1, False, "The records are"), (0.9, True, "The records are")],
 )
 def test_the_sentence_is_about_what_is_most_of_the_error(
-    tmp_path: Path, share: float, structure: bool, begins: str
+    tmp_path: Path, share: float, structured: bool, begins: str
 ) -> None:
-    line = {"kind": "line", "frequency": 50.0, "mains": None, "amplitude": 0.1, "share": share, "records": ["r"]}
-    content: dict[str, Any] = {
-        "verdict": "unexplained", "unit": "um", "unexplained": [line, *([{"kind": "structure"}] if structure else [])],
-        "gap": {"refitted": {"holdout": 0.5}, "after": {"holdout": 0.5}},
-    }  # fmt: skip
-    said = Diagnosis(content, hystgen.load(_model(tmp_path)).parameters, (), ()).sentence()
+    line = Line(frequency=50.0, amplitude=0.1, share=share, records=("r",))
+    found = result("unexplained", (), 0.5, [line, *([STRUCTURE] if structured else [])])
+    said = Diagnosis(found, hystgen.load(_model(tmp_path)).parameters, (), ()).sentence()
     assert said.startswith(begins)
     assert "a line at 50 Hz" in said
 
@@ -270,9 +279,9 @@ def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> 
         records.append(Record(f"r{seed}", t, v, x + bent * (x - 6.0) ** 2 + noise))
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:])
     assert len(found.content["effects"]) == names
-    assert told.ONE_LOOP in found.content["advice"]
+    assert ONE_LOOP in found.content["advice"]
     found.write(tmp_path / "out")
-    assert told.ONE_LOOP.capitalize() in (tmp_path / "out" / "report.html").read_text()
+    assert ONE_LOOP.capitalize() in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_a_record_of_which_most_is_not_compared_is_told() -> None:
@@ -280,10 +289,10 @@ def test_a_record_of_which_most_is_not_compared_is_told() -> None:
     t = np.arange(4000) * 1e-3
     v = 50.0 - np.interp(t, [0.0, 3.0], [40.0, 50.0]) * np.cos(2 * np.pi * 2.0 * t)
     late, early = Record("late", t, v, 0.1 * v), Record("early", t, v[::-1], 0.1 * v[::-1])
-    ready = believed.prepare([early, late], [early], None, 0.0)
+    ready = preparing.prepare([early, late], [early], None, 0.0)
     (said,) = ready.notes
     assert said.startswith(f"late: {np.count_nonzero(ready.to_fit[1].known)} of 4000 samples are compared")
-    assert believed.prepare([early, late], [early], (0.0,), 0.0).notes == []
+    assert preparing.prepare([early, late], [early], (0.0,), 0.0).notes == []
 
 
 class TestNoise:
@@ -299,7 +308,7 @@ class TestNoise:
             "period": 50.0 + 40.0 * np.sin(2 * np.pi * 2.0 * t),
             "move": 50.0 + 40.0 * np.sin(2 * np.pi * (0.3 * t + 0.05 * t**2)),
         }[drive]
-        found = floor.noise_floor([self.item(0.1 * v + rng.normal(0.0, 0.02, len(v)), v)])
+        found = noise_floor([self.item(0.1 * v + rng.normal(0.0, 0.02, len(v)), v)])
         assert found.rms == pytest.approx(0.02, rel=0.12)
 
     def test_p_value(self) -> None:
@@ -307,9 +316,9 @@ class TestNoise:
         before = [rng.normal(size=2000) for _ in range(3)]
         same = [rng.normal(size=2000) for _ in range(3)]
         less = [0.8 * e for e in before]
-        assert decisions.difference(before, less) < 1e-6
-        assert decisions.difference(before, same) > 1e-3
-        assert decisions.difference(less, before) > 0.9
+        assert merit.difference(before, less) < 1e-6
+        assert merit.difference(before, same) > 1e-3
+        assert merit.difference(less, before) > 0.9
 
 
     def test_a_hold_that_rings_tells_nothing(self) -> None:
@@ -319,11 +328,11 @@ class TestNoise:
         v = np.interp(t, [0.0, 0.5, 0.9, 1.4, 2.0], [0.0, 90.0, 90.0, 5.0, 0.0])
         ringing = np.where((t > 0.5) & (t < 0.9), np.exp(-2.0 * (t - 0.5)) * np.cos(2.0 * np.pi * 47.0 * t), 0.0)
         y = 0.1 * v + rng.normal(0.0, 0.02, len(v))
-        assert floor.noise_floor([self.item(y + ringing, v)]).holds is None
+        assert noise_floor([self.item(y + ringing, v)]).holds is None
         slow = np.zeros(len(v))
         for k in range(1, len(v)):
             slow[k] = 0.9 * slow[k - 1] + rng.normal(0.0, 0.05 * np.sqrt(1.0 - 0.81))
-        found = floor.noise_floor([self.item(0.1 * v + slow, v)]).holds
+        found = noise_floor([self.item(0.1 * v + slow, v)]).holds
         assert found is not None
         # 240 samples of which 13 are independent, some of them taken for creep
         assert found == pytest.approx(0.05, rel=4.0 / np.sqrt(2.0 * 13))
@@ -415,7 +424,7 @@ def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
     )
     # where the drift begins is free, and where the creep does
     item = Item("made", Run(t, v), y - 50.0, None, float(np.ptp(y)))
-    error = structure.Actuator(np.array([0.0, 10.0]), (), made).error(item, np.array([1.0, 0.5]))
+    error = Actuator(np.array([0.0, 10.0]), (), made).error(item, np.array([1.0, 0.5]))
     assert np.max(np.abs(error)) < 1e-6
 
 
@@ -478,17 +487,17 @@ def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: floa
     run = Run(np.arange(len(v)) * 1e-3, v)
     slow = ExponentialCreep(name="creep", time_constants=(50.0,), weights=(weight,))
     bent = SensorPolynomial(name="sensor_nonlinearity", coefficients=(curve or 0.0,), scale=100.0)
-    actuator = structure.Actuator(np.array([0.0]), (), (slow,) if curve is None else (slow, bent))
+    actuator = Actuator(np.array([0.0]), (), (slow,) if curve is None else (slow, bent))
     p = np.ones(1)
     rows, _ = actuator.columns(Item("still", run, v, None, 100.0), p)
     ramp = 0.2 * np.linspace(-1.0, 1.0, len(v))
     y = bent.mapped(rows[0] + 3.0 + ramp, run)
-    (error,) = structure.Fitted(_only(actuator), np.empty(0), p, 0.0).errors([Item("ramp", run, y, None, 100.0)])
+    (error,) = Fitted(_only(actuator), np.empty(0), p, 0.0).errors([Item("ramp", run, y, None, 100.0)])
     error = error / (1.0 + 2.0 * (curve or 0.0) * (rows[0] + 3.0 + ramp) / 100.0)
     assert np.sqrt(np.mean(error**2) / np.mean(ramp**2)) == pytest.approx(left, abs=0.02)
 
 
-def _only(actuator: structure.Actuator) -> structure.Structure:
+def _only(actuator: Actuator) -> structure.Structure:
     return structure.Structure(actuator.thresholds, Kept(), tuple(map(structure.kept, actuator.effects)))
 
 
@@ -500,18 +509,18 @@ def test_every_other_threshold_leaves_hardly_more(plays: int, curve: float | Non
     weights = np.append(1.0, np.full(plays, 0.6 / plays))
     v = wander(5, turns=40)
     bent = SensorPolynomial(name="sensor_nonlinearity", coefficients=(curve or 0.0,), scale=100.0)
-    actuator = structure.Actuator(places, (), () if curve is None else (bent,))
+    actuator = Actuator(places, (), () if curve is None else (bent,))
     item = Item("made", Run(np.arange(len(v)) * 1e-3, v), v, (0.0,), 100.0)
     h = brute_output(v, tuple(places.tolist()), tuple(weights.tolist()), 0.0)
     item = dataclasses.replace(item, y=np.asarray(h + (curve or 0.0) * h**2 / 100.0))
-    whole = structure.Fitted(_only(actuator), np.empty(0), weights, 0.0)
-    rough = trials._rough(whole, [item])
+    whole = Fitted(_only(actuator), np.empty(0), weights, 0.0)
+    rough = screening._rough(whole, [item])
     kept = rough.structure.thresholds
     assert (kept[0], kept[-1]) == (0.0, 30.0)
     assert len(kept) == 1 + (plays + 1) // 2
     assert set(kept) <= set(places)
-    assert structure.rms(whole.errors([item])) < 1e-9 * np.ptp(item.y)
-    assert structure.rms(rough.errors([item])) < (0.02 if plays > 1 else 1e-9) * np.ptp(item.y)
+    assert rms(whole.errors([item])) < 1e-9 * np.ptp(item.y)
+    assert rms(rough.errors([item])) < (0.02 if plays > 1 else 1e-9) * np.ptp(item.y)
 
 
 def _bent(folder: Path, codes: float, metres: float) -> dict[str, Any]:
@@ -712,12 +721,12 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (wander(3, 40) - 40.0)])
     run = Run(np.arange(len(v)) * 1e-3, v)
     item = Item("made", run, v, (0.0,), 100.0)
-    actuator = structure.Actuator(places, (), (effect,))
+    actuator = Actuator(places, (), (effect,))
     (rows,), _ = actuator.columns(item, weights)
     predicted = rows + actuator.added(item)
     item = dataclasses.replace(item, y=predicted)
-    fitted = structure.Fitted(form, np.empty(0), weights, 0.0)
-    ready = believed.Prepared([item], [item], [], [], (0.0, 100.0), places)
+    fitted = Fitted(form, np.empty(0), weights, 0.0)
+    ready = preparing.Prepared([item], [item], [], [], (0.0, 100.0), places)
     given = hystgen.load(_model(tmp_path))
     extended = hystgen.Model(_extended(given.parameters, given.cascade, fitted, ready, ()))
     (found,) = extended.chain.simulate([run], [0.0])
@@ -774,7 +783,7 @@ class TestBelievedEffects:
     def test_gains_of_records_that_come_and_go(self) -> None:
         """What is remembered of a record is not another's that has come to lie in its place."""
         effect = ExponentialAgeing(name="ageing", shape="exponential", loss=0.05, travel=100.0)
-        actuator = structure.Actuator(np.array([0.0]), (), (effect,))
+        actuator = Actuator(np.array([0.0]), (), (effect,))
         for number in range(200):
             v = wander(number, 20)[: 100 + number % 7]
             run = Run(np.arange(len(v)) * 1e-3, v)
@@ -786,7 +795,7 @@ class TestBelievedEffects:
     def test_a_history_says_nothing_of_slow_states(self, history: tuple[float, ...] | None) -> None:
         """It says what the plays remember, and not when the drive was there: creep may still be on its way."""
         effect = ExponentialCreep(name="creep", time_constants=(4.0,), weights=(0.06,))
-        actuator = structure.Actuator(np.array([0.0]), (), (effect,))
+        actuator = Actuator(np.array([0.0]), (), (effect,))
         v = wander(3, 20)
         t = np.arange(len(v)) * 1e-3
         slow = np.asarray(lfilter([1.0], [1.0, -np.exp(-1e-3 / 4.0)], np.zeros(len(v)), zi=[50.0])[0])
@@ -876,8 +885,8 @@ class TestOwnEffects:
 
     def test_it_sees_all_samples(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """Others do with fewer while they are tried; its code may count on even steps."""
-        monkeypatch.setattr(trials, "SCREENED", 500)
-        monkeypatch.setattr(trials, "SEARCHED", 800)
+        monkeypatch.setattr(acceptance, "SCREENED", 500)
+        monkeypatch.setattr(acceptance, "SEARCHED", 800)
         seen = []
 
         class Even(Effect):
@@ -899,14 +908,14 @@ class TestOwnEffects:
         records = self.records(2.0, 11.0)
         given: dict[str, Any] = {"holdout": records[3:], "history": [0.0]}
         steps = []
-        look = trials.thinned
+        look = screening.thinned
 
         def looked(groups: Any, most: int, masks: Any) -> Any:
             found = look(groups, most, masks)
             steps.extend(float(np.ptp(np.diff(item.run.t))) for group in found for item in group)
             return found
 
-        monkeypatch.setattr(trials, "thinned", looked)
+        monkeypatch.setattr(screening, "thinned", looked)
         hystgen.diagnose(_model(tmp_path), records[:3], effects=[Even], **given)
         assert seen
         assert max(seen) < 1e-9
@@ -924,14 +933,14 @@ def _model(folder: Path) -> Path:
 
 
 def test_the_report_says_why_refitting_may_widen_the_gap() -> None:
-    content: dict[str, Any] = {
-        "unit": "um",
-        "gap": {"as_given": {"fit": 2.0, "holdout": 3.0}, "refitted": {"fit": 0.5, "holdout": 4.0}},
-    }
-    (said,) = report._refitted(content)
+    found = result("unexplained", (), 0.5, [])
+
+    def gap(held_out: float) -> Result:
+        return dataclasses.replace(found, gap=Gap(Errors(2.0, 3.0), Errors(0.5, held_out), Errors(0.5, 0.5)))
+
+    (said,) = report._refitted(gap(4.0))
     assert "rms error (um) of the records that are fitted from 2 to 0.5, and that" in said.text
-    content["gap"]["refitted"]["holdout"] = 3.02
-    assert report._refitted(content) == []
+    assert report._refitted(gap(3.02)) == []
 
 
 def test_a_model_with_a_bent_sensor_is_refitted(tmp_path: Path) -> None:
@@ -996,10 +1005,10 @@ def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPat
     def step(*held_out: float) -> object:
         """The first of them is unsure, the second sure."""
         tried = [SimpleNamespace(held_out=left) for left in held_out]
-        merit = decisions.Merit(1.0, 1.0, 0.5, 1e-6)
-        monkeypatch.setattr(decisions, "simplest_first", lambda found, _: found)
-        monkeypatch.setattr(decisions, "merit_of", lambda _, best, *__: None if best is tried[0] else merit)
-        monkeypatch.setattr(decisions, "removes", lambda *_: removes)
+        worth = merit.Merit(1.0, 1.0, 0.5, 1e-6)
+        monkeypatch.setattr(merit, "simplest_first", lambda found, _: found)
+        monkeypatch.setattr(merit, "merit_of", lambda _, best, *__: None if best is tried[0] else worth)
+        monkeypatch.setattr(merit, "removes", lambda *_: removes)
         records = SimpleNamespace(extensions=lambda *_: tried, gap=1.0)
         found = selection._step(object(), 1.0, records)  # type: ignore[arg-type]
         assert found is not None

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -15,9 +15,15 @@ from recordings import brute_output, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.diagnosis import bad_samples, channels, description, intervals, periodic, stick_slip, structure, told
-from hystgen.diagnosis.drives import one_loop, one_speed
-from hystgen.diagnosis.structure import Actuator, Item, Part, Structure
+from hystgen.diagnosis.data import bad_samples, channels, periodic, spectra, stick_slip
+from hystgen.diagnosis.data.drives import one_loop, one_speed, reversals
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.findings import intervals, residual
+from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, Saturated
+from hystgen.diagnosis.findings.kinds import Structure as Remaining
+from hystgen.diagnosis.search import fits, nominal
+from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search.structure import Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
 from hystgen.identification import stretches
@@ -25,6 +31,7 @@ from hystgen.identification.fronts import Kept
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
+Kind = TypeVar("Kind", bound=Finding)
 
 THRESHOLDS, WEIGHTS = (0.0, 4.0, 10.0, 20.0), (0.08, 0.01, 0.01, 0.01)
 STEP, NOISE = 1e-3, 0.01
@@ -75,8 +82,9 @@ def errors(items: Sequence[Item]) -> list[Array]:
     return [item.y - plant(item.run.v) for item in items]
 
 
-def told_of(kind: str, entries: Sequence[dict[str, Any]], record: str) -> dict[str, Any]:
-    (found,) = [each for each in entries if each["kind"] == kind and each.get("record") == record]
+def of_kind(kind: type[Kind], findings: Sequence[Finding], record: str) -> Kind:
+    """The finding of one kind and record."""
+    (found,) = [each for each in findings if isinstance(each, kind) and getattr(each, "record", None) == record]
     return found
 
 
@@ -117,13 +125,13 @@ class TestWrongSamples:
                 y[a:b] = -3.0 if constant else -3.0 + noise(b - a, a)
             items[k] = changed(items[k], y)
         clean, told = bad_samples.without_faults(items, [])
-        assert [each["record"] for each in told] == ["r0.csv", "r2.csv", "r3.csv"]
+        assert [each.record for each in told] == ["r0.csv", "r2.csv", "r3.csv"]
         for k, runs in places.items():
-            each = told_of("drop_outs", told, f"r{k}.csv")
-            assert each["count"] == len(runs)
-            assert each["samples"] == sum(b - a for a, b in runs)
-            assert each["first"] == items[k].run.t[runs[0][0]]
-            assert each.get("level") == (-3.0 if constant else None)
+            each = of_kind(DropOuts, told, f"r{k}.csv")
+            assert each.count == len(runs)
+            assert each.samples == sum(b - a for a, b in runs)
+            assert each.first == items[k].run.t[runs[0][0]]
+            assert each.level == (-3.0 if constant else None)
             wrong = np.concatenate([np.arange(a, b) for a, b in runs])
             assert np.flatnonzero(np.isnan(clean[k].y)).tolist() == wrong.tolist()
 
@@ -139,7 +147,7 @@ class TestWrongSamples:
         y = y.copy()
         y[6000:6030] = -30.0
         (each,) = bad_samples.without_faults([changed(item, y)], [])[1]
-        assert (each["kind"], each["samples"]) == ("drop_outs", 30)
+        assert (each.kind, each.samples) == ("drop_outs", 30)
 
     def test_held_samples(self) -> None:
         items = session()
@@ -150,28 +158,28 @@ class TestWrongSamples:
         items[0] = changed(items[0], y)
         clean, told = bad_samples.without_faults(items, [])
         (each,) = told
-        assert (each["kind"], each["record"], each["count"]) == ("held_samples", "r0.csv", 3)
-        assert each["samples"] == sum(b - a for a, b in runs)
-        assert each["first"] == items[0].run.t[200]
-        assert np.count_nonzero(np.isnan(clean[0].y)) == each["samples"]
+        assert (each.kind, each.record, each.count) == ("held_samples", "r0.csv", 3)
+        assert each.samples == sum(b - a for a, b in runs)
+        assert each.first == items[0].run.t[200]
+        assert np.count_nonzero(np.isnan(clean[0].y)) == each.samples
 
     def test_a_converter_at_its_end(self) -> None:
         items = [changed(item, np.minimum(item.y, 9.0)) for item in session()]
         found = [stretches.rails(item.y, item.run.v) for item in items]
         assert found[0] == [("largest", 9.0)]
-        repaired = [{"kind": "saturated", "record": "r0.csv", "end": "largest", "level": 9.0, "count": 1}]
+        repaired = [Saturated("r0.csv", None, "largest", 9.0, 1)]
         assert bad_samples.not_at_the_end(repaired, items) == repaired
         clean, told = bad_samples.without_faults(items, repaired)
-        assert {each["kind"] for each in told} == {"saturated"}
+        assert {each.kind for each in told} == {"saturated"}
         for item, left in zip(items, clean, strict=True):
             at = np.flatnonzero(item.y == 9.0)
             assert np.count_nonzero(np.isnan(left.y)) >= np.count_nonzero(np.diff(at) == 1)
 
     def test_held_at_the_top_is_no_end_of_the_converter(self) -> None:
         items = session()
-        repaired = [{"kind": "saturated", "record": "r2.csv", "end": "largest", "level": 6.0, "count": 30}]
+        repaired = [Saturated("r2.csv", None, "largest", 6.0, 30)]
         (each,) = bad_samples.not_at_the_end(repaired, items)
-        assert each == {"kind": "held_samples", "record": "r2.csv", "count": 1, "samples": 30}
+        assert each == HeldSamples("r2.csv", None, 1, 30)
 
 
 class TestPeriodic:
@@ -183,11 +191,11 @@ class TestPeriodic:
             changed(item, item.y + 0.03 * np.sin(2 * np.pi * frequency * item.run.t + 1.0)) for item in humming
         ]
         (line,), left = periodic.lines(items, errors(items))
-        assert line["kind"] == "line"
-        assert line["frequency"] == pytest.approx(frequency, abs=0.05)
-        assert line["amplitude"] == pytest.approx(0.03, rel=0.06)
-        assert line["records"] == ["r0.csv", "r1.csv", "r2.csv", "r3.csv"]
-        assert line.get("mains") == mains
+        assert line.kind == "line"
+        assert line.frequency == pytest.approx(frequency, abs=0.05)
+        assert line.amplitude == pytest.approx(0.03, rel=0.06)
+        assert line.records == ("r0.csv", "r1.csv", "r2.csv", "r3.csv")
+        assert line.mains == mains
         assert np.std(np.concatenate(left)) == pytest.approx(NOISE, rel=0.1)
 
     def test_ripple(self) -> None:
@@ -195,10 +203,10 @@ class TestPeriodic:
             changed(item, item.y + 0.05 * np.sin(2 * np.pi * plant(item.run.v) / 0.4 + 0.7)) for item in session(0.5)
         ]
         (ripple,), left = periodic.lines(items, errors(items))
-        assert ripple["kind"] == "ripple"
-        assert ripple["pitch"] == pytest.approx(0.4, rel=0.003)
-        assert ripple["amplitude"] == pytest.approx(0.05, rel=0.06)
-        assert len(ripple["records"]) == len(items)
+        assert ripple.kind == "ripple"
+        assert ripple.pitch == pytest.approx(0.4, rel=0.003)
+        assert ripple.amplitude == pytest.approx(0.05, rel=0.06)
+        assert len(ripple.records) == len(items)
         assert np.std(np.concatenate(left)) == pytest.approx(NOISE, rel=0.1)
 
     def test_a_ripple_is_told_by_what_moves(self) -> None:
@@ -208,19 +216,19 @@ class TestPeriodic:
         still = Item("still.csv", Run(np.arange(len(v)) * STEP, v), plant(v) + noise(len(v), 7), HISTORY, 10.0)
         items = [*moving, still]
         (ripple,), left = periodic.ruling(items, errors(items))
-        assert (ripple["pitch"], ripple["amplitude"]) == (pytest.approx(0.4, rel=0.003), pytest.approx(0.05, rel=0.06))
-        assert ripple["records"] == [item.name for item in moving]
+        assert (ripple.pitch, ripple.amplitude) == (pytest.approx(0.4, rel=0.003), pytest.approx(0.05, rel=0.06))
+        assert ripple.records == tuple(item.name for item in moving)
         assert np.std(np.concatenate(left[:-1])) == pytest.approx(NOISE, rel=0.1)
 
     def test_codes_of_a_converter_are_no_interpolation_error(self) -> None:
         items = [changed(item, 0.1 * np.round(item.y / 0.1)) for item in session(0.5)]
         (ripple,), _ = periodic.lines(items, errors(items))
-        assert (ripple["pitch"], ripple["converter_step"]) == (pytest.approx(0.1, rel=0.003), True)
-        assert told.sentence(ripple, "um").endswith("its pitch is the step of the converter")
+        assert (ripple.pitch, ripple.converter_step) == (pytest.approx(0.1, rel=0.003), True)
+        assert ripple.sentence("um").endswith("its pitch is the step of the converter")
         finer = [changed(item, item.y + 0.01 * np.sin(2 * np.pi * plant(item.run.v) / 0.1)) for item in session(0.5)]
         (ripple,), _ = periodic.lines(finer, errors(finer))
-        assert ripple["converter_step"] is False
-        assert "interpolation error" in told.sentence(ripple, "um")
+        assert ripple.converter_step is False
+        assert "interpolation error" in ripple.sentence("um")
 
     def test_what_is_another_on_the_way_back_is_no_ripple(self) -> None:
         """Triangles over the same range, so that what turns with the way is the same in all of them."""
@@ -234,7 +242,7 @@ class TestPeriodic:
                 way = np.sign(np.gradient(v)) if ways == "turned" else 1.0
                 y = plant(v) + way * ripple + noise(len(t), k)
                 items.append(Item(f"r{k}", Run(t, v), y, HISTORY, 10.0))
-            made[ways] = [each for each in periodic.lines(items, errors(items))[0] if each["kind"] == "ripple"]
+            made[ways] = [each for each in periodic.lines(items, errors(items))[0] if each.kind == "ripple"]
         assert len(made["both"]) == 1
         assert made["turned"] == []
 
@@ -247,12 +255,12 @@ class TestPeriodic:
         left = np.diff(v, prepend=0.0)[(np.arange(len(t)) // 2500) * 2500] * 0.05
         left = left * np.exp(-damping * omega * since) * np.cos(omega * since) + noise(len(t), 3)
         item = Item("steps.csv", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        (heard, *_) = periodic.ringing([item], [left], 3)
+        (heard, *_) = spectra.ringing([item], [left], 3)
         assert heard == pytest.approx(47.0, rel=0.01)
         assert periodic.ruling([item], [left])[0] == []
         steady = 0.2 * np.sin(2 * np.pi * 47.0 * t) + noise(len(t), 3)
         (line,), rest = periodic.ruling([item], [steady])
-        assert line["frequency"] == pytest.approx(47.0, abs=0.01)
+        assert line.frequency == pytest.approx(47.0, abs=0.01)
         assert np.std(rest[0]) == pytest.approx(NOISE, rel=0.02)
 
     def test_harmonics_of_a_periodic_drive_are_no_lines(self) -> None:
@@ -260,17 +268,17 @@ class TestPeriodic:
         v = 50.0 - 50.0 * np.cos(2 * np.pi * 5.0 * t)
         left = 0.05 * np.cos(2 * np.pi * 15.0 * t) + 0.03 * np.sin(2 * np.pi * 25.0 * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        assert [each for each in periodic.lines([item], [left])[0] if each["kind"] == "line"] == []
+        assert [each for each in periodic.lines([item], [left])[0] if each.kind == "line"] == []
 
     @pytest.mark.parametrize(("frequency", "seen"), [(10.6, False), (13.0, True), (50.0, True)])
     def test_harmonics_of_a_drive_that_swells_are_no_lines(self, frequency: float, seen: bool) -> None:
         """It never repeats itself."""
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
         v = 50.0 - np.linspace(10.0, 50.0, len(t)) * np.cos(2 * np.pi * 5.3 * t)
-        assert periodic.repetition(v) is None
+        assert spectra.repetition(v) is None
         left = 0.05 * np.cos(2 * np.pi * frequency * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        told = [each["frequency"] for each in periodic.lines([item], [left])[0] if each["kind"] == "line"]
+        told = [each.frequency for each in periodic.lines([item], [left])[0] if each.kind == "line"]
         assert told == ([pytest.approx(frequency, abs=0.01)] if seen else [])
 
 
@@ -319,11 +327,11 @@ def test_stick_slip() -> None:
         y, jumps[k] = sticking(plant(items[k].run.v), 0.3, k)
         items[k] = changed(items[k], y + noise(len(y), k))
     found = stick_slip.stick_slip(items, errors(items), NOISE)
-    assert [each["record"] for each in found] == ["r0.csv", "r1.csv"]
+    assert [each.record for each in found] == ["r0.csv", "r1.csv"]
     for k, each in zip((0, 1), found, strict=True):
-        assert each["count"] == pytest.approx(len(jumps[k]), rel=0.15)
-        assert each["first"] == pytest.approx(items[k].run.t[jumps[k][0]], abs=0.02)
-        assert each["size"] == pytest.approx(0.3, rel=0.25)
+        assert each.count == pytest.approx(len(jumps[k]), rel=0.15)
+        assert each.first == pytest.approx(items[k].run.t[jumps[k][0]], abs=0.02)
+        assert each.size == pytest.approx(0.3, rel=0.25)
 
 
 @pytest.mark.parametrize("tau", [5.0, 40.0])
@@ -343,10 +351,10 @@ def records() -> list[Record]:
 
 def check(
     given: Sequence[Record], weights: Sequence[float] | Array = WEIGHTS
-) -> tuple[list[Record | None], list[dict[str, Any]]]:
-    """Against a believed model that is 20 % off."""
-    actuator = Actuator(np.array(THRESHOLDS), (), ())
-    return channels.checked(given, actuator, 1.2 * np.array(weights), HISTORY)
+) -> tuple[list[Record | None], list[Finding]]:
+    """Against a nominal model that is 20 % off."""
+    model = Actuator(np.array(THRESHOLDS), (), ()), 1.2 * np.array(weights)
+    return channels.checked(given, lambda record: nominal.predicted(record, *model, HISTORY))
 
 
 class TestWholeRecords:
@@ -355,8 +363,8 @@ class TestWholeRecords:
         given = records()
         given[1] = replace(given[1], y=factor * np.asarray(given[1].y))
         kept, (each,) = check(given)
-        assert (each["kind"], each["record"]) == ("scale", "r1.csv")
-        assert each["factor"] == pytest.approx(factor, rel=0.05)
+        assert (each.kind, each.record) == ("scale", "r1.csv")
+        assert each.factor == pytest.approx(factor, rel=0.05)
         assert [k for k, one in enumerate(kept) if one is None] == [1]
 
     @pytest.mark.parametrize("factor", [1000.0, 0.001])
@@ -365,8 +373,8 @@ class TestWholeRecords:
         given = records()
         given[1] = replace(given[1], v=factor * np.asarray(given[1].v))
         kept, (each,) = check(given)
-        assert (each["kind"], each["record"]) == ("scale", "r1.csv")
-        assert each["factor"] == pytest.approx(1.0 / factor, rel=0.5)
+        assert (each.kind, each.record) == ("scale", "r1.csv")
+        assert each.factor == pytest.approx(1.0 / factor, rel=0.5)
         assert [k for k, one in enumerate(kept) if one is None] == [1]
 
     @pytest.mark.parametrize("which", [0, 1, 3])
@@ -374,16 +382,16 @@ class TestWholeRecords:
         given = records()
         given[which] = replace(given[which], y=3.0 + noise(len(given[which].v), 70))
         kept, (each,) = check(given)
-        assert (each["kind"], each["record"]) == ("scale", f"r{which}.csv")
-        assert each["factor"] < 0.02
+        assert (each.kind, each.record) == ("scale", f"r{which}.csv")
+        assert each.factor < 0.02
         assert [k for k, one in enumerate(kept) if one is None] == [which]
 
     @pytest.mark.parametrize("factor", [1000.0, 0.1, -1.0])
     def test_all_in_other_units(self, factor: float) -> None:
         given = [replace(record, y=factor * np.asarray(record.y)) for record in records()]
         kept, (each,) = check(given)
-        assert (each["kind"], each["record"]) == ("scale", "all")
-        assert each["factor"] == pytest.approx(factor / 1.2, rel=0.05)
+        assert (each.kind, each.record) == ("scale", "all")
+        assert each.factor == pytest.approx(factor / 1.2, rel=0.05)
         assert None not in kept
 
     @pytest.mark.parametrize("which", [{2}, {0, 1, 2, 3, 4}])
@@ -391,8 +399,8 @@ class TestWholeRecords:
         given = records()
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
         kept, told = check(wrong)
-        assert {each["record"] for each in told} == {f"r{k}.csv" for k in which}
-        assert {each["kind"] for each in told} == {"swapped_channels"}
+        assert {each.record for each in told} == {f"r{k}.csv" for k in which}
+        assert {each.kind for each in told} == {"swapped_channels"}
         for one, right in zip(kept, given, strict=True):
             assert one is not None
             np.testing.assert_array_equal(one.v, right.v)
@@ -412,8 +420,8 @@ class TestWholeRecords:
             given.append(replace(record, y=out[len(HISTORY) :] + gain * noise(len(record.v), 30 + k)))
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
         kept, told = check(wrong, believed)
-        assert [each["record"] for each in told] == [f"r{k}.csv" for k in sorted(which)]
-        assert {each["kind"] for each in told} == {"swapped_channels"}
+        assert [each.record for each in told] == [f"r{k}.csv" for k in sorted(which)]
+        assert {each.kind for each in told} == {"swapped_channels"}
         assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
 
     def test_exchanged_columns_without_a_loop(self) -> None:
@@ -421,13 +429,13 @@ class TestWholeRecords:
         small = [replace(r, v=50.0 + 0.01 * r.v, y=3.0 + 8e-4 * r.v + 0.01 * noise(len(r.v), 8)) for r in records()]
         assert check(small)[1] == []
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k == 3 else r for k, r in enumerate(small)]
-        assert [(each["kind"], each["record"]) for each in check(wrong)[1]] == [("swapped_channels", "r3.csv")]
+        assert [(each.kind, each.record) for each in check(wrong)[1]] == [("swapped_channels", "r3.csv")]
 
     def test_outputs_exchanged_between_records(self) -> None:
         given = records()
         given[1], given[4] = replace(given[1], y=given[4].y), replace(given[4], y=given[1].y)
         kept, told = check(given)
-        assert [(each["kind"], each["record"], each["with"]) for each in told] == [
+        assert [(each.kind, each.record, each.other) for each in told] == [
             ("exchanged_records", "r1.csv", "r4.csv"),
             ("exchanged_records", "r4.csv", "r1.csv"),
         ]
@@ -435,25 +443,25 @@ class TestWholeRecords:
 
 
 class TestDescription:
-    def described(self, left: Sequence[Array]) -> dict[str, Any]:
+    def described(self, left: Sequence[Array]) -> Remaining:
         items = session()
         with_noise = [e + noise(len(e), k) for k, e in enumerate(left)]
-        return description.described(items, with_noise, NOISE)
+        return residual.described(items, with_noise, NOISE, ())
 
     def test_even_in_the_drive(self) -> None:
         found = self.described([0.1 * (((item.run.v - 50.0) / 50.0) ** 2 - 0.35) for item in session()])
-        assert found["main_variable"] in ("drive", "displacement")
-        assert found["share_by_variable"]["drive"] > 0.6
-        assert found["rate_free"] is True
-        assert found["even_share"] > 0.9
-        assert found["repeatable"] is True
+        assert found.main_variable in ("drive", "displacement")
+        assert found.share_by_variable["drive"] > 0.6
+        assert found.rate_free is True
+        assert found.even_share > 0.9
+        assert found.repeatable is True
 
     def test_odd_and_with_the_rate(self) -> None:
         left = [np.gradient(item.run.v, STEP) for item in session()]
         found = self.described([3e-4 * e for e in left])
-        assert found["main_variable"] == "rate"
-        assert found["rate_free"] is False
-        assert found["even_share"] < 0.3
+        assert found.main_variable == "rate"
+        assert found.rate_free is False
+        assert found.even_share < 0.3
 
     def test_with_the_memory(self) -> None:
         left = []
@@ -461,25 +469,25 @@ class TestDescription:
             z = brute_output(np.concatenate([HISTORY, item.run.v]), (12.0,), (1.0,), 0.0)[len(HISTORY) :]
             left.append(0.02 * (z - item.run.v))
         found = self.described(left)
-        assert found["main_variable"] == "memory"
-        assert found["rate_free"] is True
+        assert found.main_variable == "memory"
+        assert found.rate_free is True
 
     def test_noise_goes_with_nothing(self) -> None:
         found = self.described([np.zeros(len(item.y)) for item in session()])
-        assert found["main_variable"] is None
-        assert found["share_by_variable"] == {}
-        assert found["rate_free"] is None
-        assert found["repeatable"] is False
-        assert found["above_floor"] == pytest.approx(1.0, rel=0.05)
+        assert found.main_variable is None
+        assert found.share_by_variable == {}
+        assert found.rate_free is None
+        assert found.repeatable is False
+        assert found.above_floor == pytest.approx(1.0, rel=0.05)
 
     def test_loop_centre(self) -> None:
         v = np.concatenate([np.linspace(0, 100, 101), np.linspace(99, 60, 40), np.linspace(61, 80, 20)])
-        centre = description.loop_centre(v)
+        centre = residual.loop_centre(v)
         assert centre[-1] == pytest.approx(80.0, abs=1.5)
-        assert description.reversals(v) == pytest.approx([100, 140], abs=2)
+        assert reversals(v) == pytest.approx([100, 140], abs=2)
 
     def test_is_said_in_words(self) -> None:
-        said = description.words(self.described([3e-4 * np.gradient(item.run.v, STEP) for item in session()]))
+        said = self.described([3e-4 * np.gradient(item.run.v, STEP) for item in session()]).words()
         assert said.startswith("goes mostly with the drive rate (")
         assert "depends on the rate" in said
 
@@ -504,7 +512,7 @@ class TestIntervals:
         about = About((0.0, 100.0), 10.0, STEP, 2.4, 7.2, 500.0, 1e4, THRESHOLDS)
         (candidate,) = kind.candidates(about)
         form = Structure(np.array(THRESHOLDS), Kept(), (Part("lag", candidate),))
-        found = structure.fit(form, items, form.start, np.array(WEIGHTS))
+        found = fits.fit(form, items, form.start, np.array(WEIGHTS))
         (sure,) = intervals.intervals(found, items).parts
         (effect,) = form.effects(found.shape)
         return effect.time_constant, sure["time_constant"]  # type: ignore[attr-defined]
@@ -550,7 +558,7 @@ def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
     )
     quiet = hystgen.diagnose(tmp_path / "stage.yaml", given[:3], holdout=given[3:], history=HISTORY)
     assert quiet.verdict == "nothing_missing"
-    assert told_of("drop_outs", quiet.content["unexplained"], "r0.csv")["samples"] == 50
+    assert of_kind(DropOuts, quiet.result.unexplained, "r0.csv").samples == 50
     assert quiet.content["gap"]["after"]["holdout"] < 1.25 * NOISE
     assert "2 drop-outs" in quiet.sentence()
     found = hystgen.diagnose(tmp_path / "stage.yaml", hum[:3], holdout=hum[3:], history=HISTORY)

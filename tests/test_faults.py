@@ -22,7 +22,8 @@ from recordings import brute_output, columns, noisy, record, wander, write_csv, 
 
 import hystgen
 from hystgen.basics.problems import RecordError
-from hystgen.diagnosis import believed, intervals
+from hystgen.diagnosis.findings import intervals
+from hystgen.diagnosis.search import nominal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import IdentificationError, faults, pi, prepared
 from hystgen.identification.fronts import Tanh
@@ -412,7 +413,7 @@ class TestTanh:
             size, curvature = rng.uniform(5.0, 40.0, 2), 10.0 ** rng.uniform(-2.0, 1.0, 2)
             up, down = ((size[k], curvature[k], rng.uniform(-4.0, 4.0), 0.0) for k in (0, 1))
             stage = TanhEnvelope(up, down if rng.random() < 0.5 else None)
-            front, shape = believed.front_of([stage], (0.0, 3.6))
+            front, shape = nominal.front_of([stage], (0.0, 3.6))
             (made,) = front.stages(shape)
             assert isinstance(made, TanhEnvelope)
             searched += isinstance(front, Tanh)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import decisions, selection, trials
+from hystgen.diagnosis.search import merit, screening, selection
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class World:
         extended = Hypothesis(self, now.names | {name})
         errors = extended.errors(list(self.held))
         option: Any = SimpleNamespace(label=name, name=name)
-        return trials.Tried(option, extended, (name,), self.rms(errors), errors)
+        return screening.Tried(option, extended, (name,), self.rms(errors), errors)
 
     def extensions(self, now: Hypothesis, worth: Any = None) -> list[Any]:
         found = [self.tried(now, name) for name in self.all if name not in now.names]
@@ -82,7 +82,7 @@ class World:
     def records(self) -> Any:
         return SimpleNamespace(
             to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
-            left=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
+            residual=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
         )  # fmt: skip
 
 
@@ -132,8 +132,8 @@ def test_neither_of_two_is_a_further_one(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(bare: bool, enough: float, left: float) -> None:
     """A first effect removes 0.6 times what it leaves, a further one as much as it leaves; neither less than noise."""
     now: Any = SimpleNamespace(bare=bare)
-    records: Any = SimpleNamespace(noise=NOISE, left=lambda _: left * NOISE)
-    assert decisions.leaves_enough(now, records) is (left > enough)
+    records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: left * NOISE)
+    assert merit.leaves_enough(now, records) is (left > enough)
 
 
 def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,12 +167,12 @@ def test_one_loop_leaves_open_what_fitted_records_explain_unless_others_bear_it_
 ) -> None:
     """Of the fitted records `a` and `b` leave hardly anything, and `b` fails on held-out ones."""
     now = Made("", 0, (1.0, 1.0))
-    records: Any = SimpleNamespace(noise=NOISE, one_loop=True, left=lambda each: each.left[1])
+    records: Any = SimpleNamespace(noise=NOISE, one_loop=True, residual=lambda each: each.left[1])
     tried: list[Any] = [
         SimpleNamespace(name=name, fitted=SimpleNamespace(rms=0.02), held_out=left, errors=[np.full(100, left)])
         for name, left in (("a", held_out), ("b", 0.8))
     ]
-    assert decisions.left_open(now, tried[0], tried, records) == open_  # type: ignore[arg-type]
+    assert merit.left_open(now, tried[0], tried, records) == open_  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("left", "named"), [(0.45, True), (0.55, False)])
@@ -222,7 +222,7 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
         return Hypothesis(world, now.names - {name})
 
     monkeypatch.setattr(selection, "_without", without)
-    monkeypatch.setattr(selection, "_left_as_it_is", without)
+    monkeypatch.setattr(selection, "_without_refit", without)
     now: Any = Hypothesis(world, frozenset("wc"))
     gap = world.gap(Hypothesis(world, frozenset()))
     found = [
@@ -312,14 +312,14 @@ def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float
 
     def screened(name: str, left: float, fitted: float = 0.6) -> Any:
         option = SimpleNamespace(name=name, label=name)
-        return SimpleNamespace(option=option, left=left, fitted=SimpleNamespace(rms=fitted))
+        return SimpleNamespace(option=option, residual=left, fitted=SimpleNamespace(rms=fitted))
 
     others = [screened(name, 0.1 + 0.02 * k) for k, name in enumerate("abcd")]
     delay, lag = screened("delay", 0.303, 0.5), screened("lag", left, fitted)
     best_fits = [screened(name, 0.9, 0.4) for name in "ef"]
     tried = [*others, lag, delay, *best_fits]
-    assert [each.option.name for each in trials._kept(tried, tried)] == [*"abcd", "delay", *"ef"] + ["lag"] * follows
-    assert lag not in trials._kept(tried, others)
+    assert [each.option.name for each in screening._kept(tried, tried)] == [*"abcd", "delay", *"ef"] + ["lag"] * follows
+    assert lag not in screening._kept(tried, others)
 
 
 def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -328,9 +328,9 @@ def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.Mon
     def made(name: str, fitted: float) -> Any:
         return SimpleNamespace(name=name, fitted=SimpleNamespace(rms=fitted))
 
-    monkeypatch.setattr(decisions, "rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
+    monkeypatch.setattr(merit, "rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
     now, records = made("", 2.0), SimpleNamespace(noise=NOISE, one_loop=False)
-    assert decisions.left_open(now, made("a", 1.0), [], records) == ["b"]  # type: ignore[arg-type]
+    assert merit.left_open(now, made("a", 1.0), [], records) == ["b"]  # type: ignore[arg-type]
 
 
 TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
@@ -358,11 +358,11 @@ class Made:
 def first_of(best: Made, other: Made, effect: str | None = None) -> str:
     """Which of two is taken; `effect`: of which both are shapes."""
     tried: list[Any] = [
-        trials.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
+        screening.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
         for made in (best, other)
     ]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    first: Any = decisions.simplest_first(tried, records)[0].fitted
+    first: Any = merit.simplest_first(tried, records)[0].fitted
     return str(first.name)
 
 
@@ -376,28 +376,28 @@ def test_what_a_shape_leaves_free_is_part_of_the_effect() -> None:
 def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
     """Held-out records ruled by what another effect makes of their edges, of which fitted ones have hardly any."""
     records: Any = SimpleNamespace(gap=1.0)
-    assert decisions.Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
-    assert decisions.Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
-    assert not decisions.Merit(0.06, 0.06, 0.9, 1e-9).worth(1.0, records)
+    assert merit.Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
+    assert merit.Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
+    assert not merit.Merit(0.06, 0.06, 0.9, 1e-9).worth(1.0, records)
 
 
 def test_nearly_all_that_is_left_is_worth_a_name() -> None:
     """Beside a resonance of some hundred times the noise, say, of which another effect is a few per cent."""
     records: Any = SimpleNamespace(gap=1.0)
-    assert decisions.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
-    assert not decisions.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
+    assert merit.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
+    assert not merit.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
 
 
 @pytest.mark.parametrize(("left", "first", "further"), [(0.6, True, True), (0.8, True, False), (0.9, False, False)])
 def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, further: bool) -> None:
     """Of 1 it removes 0.8, 0.6 and 0.44, which are 1.33, 0.75 and 0.48 times what it leaves."""
     better = Made("better", 1, (left, left))
-    best = trials.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
+    best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     for bare, accepted in ((True, first), (False, further)):
         now: Any = Made("now", 1, (1.0, 1.0))
         now.bare = bare
-        assert (decisions.merit_of(now, best, records) is not None) is accepted
+        assert (merit.merit_of(now, best, records) is not None) is accepted
 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])
@@ -405,9 +405,9 @@ def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> Non
     """The numbers of an effect come from records in which it makes no difference."""
     now, better = Made("now", 1, (1.0, 1.0)), Made("better", 1, (fitted, 0.5))
     option: Any = SimpleNamespace(name="better")
-    best = trials.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
+    best = screening.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (decisions.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (merit.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("own", "accepted"), [(1.0, True), (0.5, False)])
@@ -415,6 +415,6 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     """The hypothesis leaves more with the effect's small start states than with its own; the effect is to beat both."""
     now, better = Made("now", 5, (own, own), (1.0, 1.0)), Made("better", 5, (0.6, 0.6))
     option: Any = SimpleNamespace(name="better")
-    best = trials.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
+    best = screening.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (decisions.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (merit.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]

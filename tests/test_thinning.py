@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hystgen.chain import chain
-from hystgen.diagnosis import thinning
-from hystgen.diagnosis.structure import Item
+from hystgen.diagnosis.data import thinning
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
+from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
 from hystgen.effects.delay.model import Delay
 from hystgen.effects.lag.model import Lag
@@ -67,7 +68,7 @@ def test_plays_at_the_needed_samples_are_those_of_all_samples(name: str) -> None
     at = needed(v, white(len(v)))
     assert len(at) < (1.0 if name in ("chirp", "small turns") else 0.2) * len(v)
     as_drive = np.ptp(v) / np.ptp(plays(v))
-    missed = thinning.TURNING * NOISE * as_drive
+    missed = acceptance.THIN_TURNING * NOISE * as_drive
     assert np.max(np.abs(plays(v[at]) - plays(v)[at])) <= np.sum(WEIGHTS) * missed
 
 
@@ -92,7 +93,7 @@ def test_what_acts_on_the_drive_sees_the_drive_that_all_samples_are(name: str, e
     some = whole.picked(at)
     as_drive = np.ptp(v) / np.ptp(plays(v))
     error = np.abs(np.asarray(effect.drive(some.v, some)) - np.asarray(effect.drive(v, whole))[at])
-    assert np.max(error) <= (thinning.STRAIGHT + thinning.TURNING) * NOISE * as_drive * (1.0 + 1e-9)
+    assert np.max(error) <= (acceptance.THIN_STRAIGHT + acceptance.THIN_TURNING) * NOISE * as_drive * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("name", drives())
@@ -105,7 +106,8 @@ def test_a_filter_behind_the_plays_does_too(name: str) -> None:
     at = needed(v, left)
     some = whole.picked(at)
     error = np.abs(np.asarray(follow.drive(plays(v)[at], some)) - np.asarray(follow.drive(plays(v), whole))[at])
-    assert np.max(error) <= (thinning.STRAIGHT + np.sum(WEIGHTS) * thinning.TURNING) * NOISE * (1.0 + 1e-9)
+    most = acceptance.THIN_STRAIGHT + np.sum(WEIGHTS) * acceptance.THIN_TURNING
+    assert np.max(error) <= most * NOISE * (1.0 + 1e-9)
 
 
 def test_what_rings_is_seen_in_what_is_left_alone() -> None:
@@ -119,7 +121,7 @@ def test_what_rings_is_seen_in_what_is_left_alone() -> None:
     def missed(few: NDArray[np.intp]) -> float:
         return float(np.sqrt(np.mean((left - np.interp(at, few, left[few])) ** 2)))
 
-    assert missed(places) <= thinning.LIKE_NOISE * NOISE < 10 * NOISE < missed(without)
+    assert missed(places) <= acceptance.THIN_RESIDUAL * NOISE < 10 * NOISE < missed(without)
 
 
 def test_a_column_that_changes_is_kept() -> None:

@@ -81,7 +81,7 @@ def diagnose(
     from hystgen import diagnosis
     from hystgen.effects import load_user_effects
     from hystgen.emission import files
-    from hystgen.report import drawing
+    from hystgen.report import diagnosed, drawing
 
     model = load_model(params, effects)
     guarded(params, drawing.require)
@@ -92,7 +92,7 @@ def diagnose(
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
-        found = diagnosis.diagnose(
+        found = diagnosed.diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
         for note in (*found.notes, *found.warnings):

@@ -1,1 +1,1 @@
-"""Words and pictures about models and fits."""
+"""Reports, plots and text about models, fits and diagnoses."""

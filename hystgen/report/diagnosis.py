@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page that says what is missing, how much it explains and what is left."""
+"""The report of a diagnosis: one page on what is missing, how much it explains, and what is left."""
 
 from __future__ import annotations
 
@@ -8,29 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 from hystgen.basics import parallel
 from hystgen.basics.version import __version__
-from hystgen.diagnosis import description, told
+from hystgen.diagnosis.findings.content import ONE_LOOP
+from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure
+from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
+from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.report import drawing
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
 from hystgen.report.drawing import label
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
 
 if TYPE_CHECKING:
-    from hystgen.diagnosis import Diagnosis
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How far and how a compensator takes out what is a stage in front of the plays."""
+"""How exactly, and how, a compensator corrects a stage in front of the plays."""
 
 LONGER = 0.01
-"""An error is plainly larger than another from this share on."""
-
-AT_NOISE = 1.25
-"""An error within this factor of the noise is called noise."""
+"""An error is visibly larger than another from this share on."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:
     """The page. Raises PlotError without matplotlib."""
-    content = found.content
+    result = found.result
     each = list(itertools.product(FIGURES, (WIDE, NARROW)))
     with drawing.styled():
         drawn = dict(zip(each, parallel.each(lambda one: _drawn(found, *one), each, parallel.cores()), strict=True))
@@ -39,15 +38,15 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         for name in FIGURES
     }
     sections = [
-        Section("How the gap shrinks", [figures["gap"], *_refitted(content)]),
-        Section("What was found", _found(content, found.parameters.model.effects, found.not_emitted())),
-        Section("What is left", _left(content)),
-        Section("Faults of the data", _faults(content)),
+        Section("How the gap shrinks", [figures["gap"], *_refitted(result)]),
+        Section("What was found", _found(result, found.parameters.model.effects, found.not_emitted())),
+        Section("What is left", _left(result)),
+        Section("Faults of the data", _faults(result)),
         Section("Before and after, on held-out records", [figures["overlay"]]),
-        Section("Where model and measurement disagree", [figures["records"], figures["time"], *_where(content)]),
+        Section("Where model and measurement disagree", [figures["records"], figures["time"], *_where(result)]),
         Section("What the error goes with", [figures["against"], figures["frequency"]]),
-        Section("What cannot be told apart", _rivals(content)),
-        Section("Shapes that were tried", _ranking(content)),
+        Section("What cannot be told apart", _rivals(result)),
+        Section("Shapes that were tried", _ranking(result)),
         Section("What was done to the data", [Listing(found.notes) if found.notes else Text("Nothing.")]),
         Section("Parameters", [Details("Parameter file with the effects added", parameters_text)]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
@@ -61,44 +60,44 @@ def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
 
 
 def _chance(p_value: float) -> str:
-    """It may be less than the least number that there is."""
+    """A p-value, which may be below the smallest double."""
     return f"{p_value:.1g}" if p_value > 0.0 else "< 1e-300"
 
 
-def _refitted(content: Mapping[str, Any]) -> list[Text]:
-    """What the second bar means where it is plainly longer than the first."""
-    given, refitted = content["gap"]["as_given"], content["gap"]["refitted"]
-    if refitted["holdout"] <= (1.0 + LONGER) * given["holdout"]:
+def _refitted(result: Result) -> list[Text]:
+    """An explanation of the second bar where it is visibly longer than the first."""
+    given, refitted = result.gap.as_given, result.gap.refitted
+    if refitted.holdout <= (1.0 + LONGER) * given.holdout:
         return []
-    fitted = f"{given['fit']:.4g} to {refitted['fit']:.4g}"
+    fitted = f"{given.fit:.4g} to {refitted.fit:.4g}"
     return [
         Text(
-            f"Refitting changes the {label('rms error', content['unit'])} of the records that are fitted from "
-            f"{fitted}, and that of the held-out ones from {given['holdout']:.4g} to {refitted['holdout']:.4g}: "
+            f"Refitting changes the {label('rms error', result.unit)} of the records that are fitted from "
+            f"{fitted}, and that of the held-out ones from {given.holdout:.4g} to {refitted.holdout:.4g}: "
             "weights fitted where something is missing take some of it, and other records may miss it in another way."
         )
     ]
 
 
-def _found(content: Mapping[str, Any], there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
-    """`not_emitted`: why the compensators that the table speaks of cannot be had in C; empty where they can."""
-    if not content["effects"]:
+def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
+    """`not_emitted`: why the compensators in the table cannot be emitted as C; empty if they can."""
+    if not result.effects:
         return [Text("No effect of the catalogue removes enough of the held-out error to get a name.")]
-    unit = content["unit"]
+    unit = result.unit
     rows = [["effect", label("held-out rms before", unit), label("after", unit), "share of the gap", "p"]]
     means = [["effect", "compensation", "how"]]
     numbers = [["effect", "number", "value", "95 % from", "to", "what it is"]]
-    for effect in content["effects"]:
-        before, after = effect["holdout_before"], effect["holdout_after"]
-        share = f"{100.0 * effect['share_of_gap']:.0f} %"
-        rows.append([effect["name"], f"{before:.4g}", f"{after:.4g}", share, _chance(effect["p_value"])])
+    for effect in result.effects:
+        before, after = effect.holdout_before, effect.holdout_after
+        share = f"{100.0 * effect.share_of_gap:.0f} %"
+        rows.append([effect.name, f"{before:.4g}", f"{after:.4g}", share, _chance(effect.p_value)])
         kind = _kind(effect, there)
         how = (kind.compensated, kind.compensation) if kind is not None else FRONT
-        means.append([effect["name"], *how])
+        means.append([effect.name, *how])
         said = {} if kind is None else {key: field.description or "" for key, field in kind.model_fields.items()}
-        for key, value in effect["parameters"].items():
-            several = _numbers(value, effect["intervals"].get(key), key.replace("_", " "))
-            numbers += [[effect["name"], *row, said.get(key, "")] for row in several]
+        for key, value in effect.parameters.items():
+            several = _numbers(value, effect.intervals.get(key), key.replace("_", " "))
+            numbers += [[effect.name, *row, said.get(key, "")] for row in several]
     return [
         Table(rows, (0,)),
         Text("What they mean for a compensator:"),
@@ -112,23 +111,23 @@ def _found(content: Mapping[str, Any], there: Sequence[Effect], not_emitted: str
     ]
 
 
-def _kind(effect: Mapping[str, Any], there: Sequence[Effect]) -> type[Effect] | None:
-    """The class of an entry, one of the effects that are there; None for a stage in front of the plays."""
-    if effect["parameters"].get("kind"):
+def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
+    """The class of an entry, among the effects of the model; None for a stage in front of the plays."""
+    if effect.parameters.get("kind"):
         return None
-    return next(type(each) for each in reversed(there) if each.name == effect["name"])
+    return next(type(each) for each in reversed(there) if each.name == effect.name)
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one a number; of equal lists the first one stands for all."""
+    """Rows of name, value, low and high, one a number; the first of equal lists stands for all."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
             row for key, each in value.items()
             for row in _numbers(each, known.get(key), f"{name} {key.replace('_', ' ')}".strip())
         ]  # fmt: skip
-    if isinstance(value, list):
-        alike = len(value) > 1 and isinstance(value[0], list) and all(each == value[0] for each in value)
+    if isinstance(value, tuple):
+        alike = len(value) > 1 and isinstance(value[0], tuple) and all(each == value[0] for each in value)
         chosen = value[:1] if alike else value
         return [
             row for k, each in enumerate(chosen)
@@ -144,23 +143,23 @@ def _pair(known: Sequence[float] | None) -> list[str]:
     return [f"{x:.4g}" for x in known] if known and known[0] < known[1] else ["fixed", ""]
 
 
-def _left(content: Mapping[str, Any]) -> list[Text | Listing | Table]:
-    seen = [each for each in content["unexplained"] if each["kind"] not in told.REPAIRED]
+def _left(result: Result) -> list[Text | Listing | Table]:
+    seen = [each for each in result.unexplained if not isinstance(each, Fault)]
     if not seen:
-        after, noise = content["gap"]["after"]["holdout"], content["noise_floor"]
-        if after <= AT_NOISE * noise:
+        after, noise = result.gap.after.holdout, result.noise_floor
+        if is_noise(after, noise):
             return [Text("Nothing but noise.")]
         times = f"The error that is left is {after / noise:.3g} times the noise" if noise else "Some error is left"
         return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
-    sentences = [told.sentence(each, content["unit"]) for each in seen]
+    sentences = [each.sentence(result.unit) for each in seen]
     blocks: list[Text | Listing | Table] = [Listing(sentences)]
     for each in seen:
-        if each["kind"] == "structure" and each["share_by_variable"]:
+        if isinstance(each, Structure) and each.share_by_variable:
             rows = [["what is left goes with", "share of its variance"]]
-            shares = each["share_by_variable"].items()
-            rows += [[description.NAMES[name], f"{100.0 * share:.0f} %"] for name, share in shares]
+            shares = each.share_by_variable.items()
+            rows += [[VARIABLE_NAMES[name], f"{100.0 * share:.0f} %"] for name, share in shares]
             blocks += [Table(rows, (0,)), Text("Each variable by itself, judged on samples that it has not seen.")]
-    more = [text for each in seen for text in told.advice(each)]
+    more = [text for each in seen for text in each.advice()]
     return [*blocks, Text("To learn more:"), Listing(more)] if more else blocks
 
 
@@ -174,12 +173,12 @@ WHAT = {
 }
 
 
-def _faults(content: Mapping[str, Any]) -> list[Text | Table]:
-    seen = [each for each in content["unexplained"] if each["kind"] in told.REPAIRED]
+def _faults(result: Result) -> list[Text | Table]:
+    seen = [each.entry() for each in result.unexplained if isinstance(each, Fault)]
     if not seen:
-        disturbed = any(each["kind"] != told.ACTUATOR for each in content["unexplained"])
-        return [Text("None in single samples; other disturbances are told above." if disturbed else "None were seen.")]
-    rows = [["record", "what", "times", "samples", "first at (s)", label("level", content["unit"]), "done"]]
+        disturbed = any(not isinstance(each, Structure) for each in result.unexplained)
+        return [Text("None in single samples; disturbances are listed above." if disturbed else "None were seen.")]
+    rows = [["record", "what", "times", "samples", "first at (s)", label("level", result.unit), "done"]]
     for each in sorted(seen, key=lambda one: (str(one["record"]), str(one["kind"]))):
         single = each["kind"] in ("saturated", "isolated_samples")
         samples = each.get("count") if single else each.get("samples")
@@ -200,37 +199,37 @@ def _faults(content: Mapping[str, Any]) -> list[Text | Table]:
     return [Table(rows, (0, 1, 6))]
 
 
-def _rivals(content: Mapping[str, Any]) -> list[Text | Listing]:
-    advice = content["advice"]
-    more = [Text(f"{told.ONE_LOOP.capitalize()}.")] if told.ONE_LOOP in advice else []
-    if not content["not_separable"]:
-        return [Text("Nothing came close to what was named." if content["effects"] else "Nothing was named."), *more]
-    pairs = (" and ".join(pair) for pair in content["not_separable"])
+def _rivals(result: Result) -> list[Text | Listing]:
+    advice = result.advice
+    more = [Text(f"{ONE_LOOP.capitalize()}.")] if ONE_LOOP in advice else []
+    if not result.not_separable:
+        return [Text("Nothing came close to what was named." if result.effects else "Nothing was named."), *more]
+    pairs = (" and ".join(pair) for pair in result.not_separable)
     return [Listing([f"{pair}: {text}" for pair, text in zip(pairs, advice, strict=False)]), *more]
 
 
-def _where(content: Mapping[str, Any]) -> list[Text | Table]:
-    if not content["where"]:
+def _where(result: Result) -> list[Text | Table]:
+    if not result.where:
         return [Text("No stretch of a record of the refitted model is far above the noise.")]
-    rows = [["record", "what goes on there", "from (s)", "to (s)", label("rms", content["unit"])]]
+    rows = [["record", "what goes on there", "from (s)", "to (s)", label("rms", result.unit)]]
     rows += [
-        [w["record"], str(w["kind"]).replace("_", " "), *(f"{x:.6g}" for x in w["interval"]), f"{w['rms']:.3g}"]
-        for w in content["where"]
+        [each.record, each.kind.replace("_", " "), *(f"{x:.6g}" for x in each.interval), f"{each.rms:.3g}"]
+        for each in result.where
     ]
     return [Text("The stretches where the refitted model does worst:"), Table(rows, (0, 1))]
 
 
-def _ranking(content: Mapping[str, Any]) -> list[Text | Table]:
+def _ranking(result: Result) -> list[Text | Table]:
     blocks: list[Text | Table] = []
-    unit = content["unit"]
-    for k, tried in enumerate(content["ranking"]):
-        best = min((each["holdout"] for each in tried), default=0.0)
+    unit = result.unit
+    for k, tried in enumerate(result.ranking):
+        best = min((each.holdout for each in tried), default=0.0)
         rows: list[Sequence[str]] = [
             ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best"]
         ]
         for each in tried:
-            margin = f"{100.0 * (each['holdout'] / best - 1.0):.1f} %" if best > 0.0 else ""
-            rows.append([each["name"], each["shape"], f"{each['fit']:.4g}", f"{each['holdout']:.4g}", margin])
-        after = "" if k < len(content["effects"]) else ", none of which removes enough to be named"
+            margin = f"{100.0 * (each.holdout / best - 1.0):.1f} %" if best > 0.0 else ""
+            rows.append([each.name, each.shape, f"{each.fit:.4g}", f"{each.holdout:.4g}", margin])
+        after = "" if k < len(result.effects) else ", none of which removes enough to be named"
         blocks += [Text(f"Round {k + 1}, the shapes that were fitted to the end{after}:"), Table(rows, (0, 1))]
     return blocks or [Text("None: the refitted model leaves no more than noise.")]

@@ -1,4 +1,4 @@
-"""The pictures of a diagnosis: how the gap shrinks, where it is, and what it goes with, with the noise drawn in."""
+"""The figures of a diagnosis: how the gap shrinks, where it is, and what it depends on, each with the noise."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.description import loop_centre
-from hystgen.diagnosis.floor import STANDS, still
+from hystgen.diagnosis.data.noise_floor import still
+from hystgen.diagnosis.findings.kinds import Line
+from hystgen.diagnosis.findings.residual import loop_centre
+from hystgen.diagnosis.search import acceptance
 from hystgen.report import drawing
 from hystgen.report.drawing import label
 from hystgen.report.fit_figures import binned
@@ -25,10 +27,10 @@ BEFORE, AFTER, FLOOR = "#8a929c", drawing.RESIDUAL, drawing.FAULT
 WIDE, NARROW = 9.0, 4.2
 
 SHOWN = 2
-"""Held-out records that are drawn along time."""
+"""Number of held-out records that are drawn along time."""
 
 FAR = 25.0
-"""A logarithmic axis is used where the largest value is so many times the least."""
+"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
 
 HOLD = 16
 
@@ -38,14 +40,14 @@ WINDOWS = 12
 
 def steps(found: Diagnosis) -> list[tuple[str, float]]:
     """The stages of the waterfall, with the held-out rms of each."""
-    content = found.content
-    stages = [("as given", content["gap"]["as_given"]["holdout"]), ("refitted", content["gap"]["refitted"]["holdout"])]
-    return stages + [(f"+ {effect['name']}", effect["holdout_after"]) for effect in content["effects"]]
+    result = found.result
+    stages = [("as given", result.gap.as_given.holdout), ("refitted", result.gap.refitted.holdout)]
+    return stages + [(f"+ {effect.name}", effect.holdout_after) for effect in result.effects]
 
 
 def gap(found: Diagnosis, width: float) -> Any:
-    """What each step takes from the held-out error, down to the noise."""
-    stages, noise = steps(found), float(found.content["noise_floor"])
+    """How much each step removes from the held-out error, down to the noise."""
+    stages, noise = steps(found), found.result.noise_floor
     names = [*(name for name, _ in stages), "noise"]
     values = [*(value for _, value in stages), noise]
     drawn = drawing.figure(width, 1.0 + 0.44 * len(names))
@@ -75,7 +77,7 @@ def gap(found: Diagnosis, width: float) -> Any:
         axes.set_xlim(least, top * (top / least) ** (0.22 if width == WIDE else 0.6))
     else:
         axes.set_xlim(0.0, room * top)
-    axes.set(xlabel=label("rms error, held out", found.content["unit"]))
+    axes.set(xlabel=label("rms error, held out", found.result.unit))
     axes.grid(axis="y", visible=False)
     return drawn
 
@@ -88,8 +90,8 @@ def worst(found: Diagnosis) -> list[Signals]:
 
 def overlay(found: Diagnosis, width: float) -> Any:
     """Measured and predicted along time, and the error before and after."""
-    shown, unit = worst(found), found.content["unit"]
-    named = bool(found.content["effects"])
+    shown, unit = worst(found), found.result.unit
+    named = bool(found.result.effects)
     drawn = drawing.figure(width, 4.9 * len(shown))
     panels = drawn.subplots(2 * len(shown), 1, height_ratios=(3, 2) * len(shown))
     for top, bottom, each in zip(panels[::2], panels[1::2], shown, strict=True):
@@ -122,22 +124,22 @@ def records(found: Diagnosis, width: float) -> Any:
     axes = drawn.subplots()
     places = np.arange(len(shown), dtype=np.float64)
     values = [[_rms(getattr(each, key)) for each in shown] for key in ("before", "after")]
-    if found.content["effects"]:
+    if found.result.effects:
         axes.plot(values[0], places, "o", color=BEFORE, markersize=6, label="refitted")
     axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
-    axes.axvline(found.content["noise_floor"], color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
+    axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
     axes.invert_yaxis()
-    _range(axes, [*values[0], *values[1], found.content["noise_floor"]])
-    axes.set(xlabel=label("rms error", found.content["unit"]))
+    _range(axes, [*values[0], *values[1], found.result.noise_floor])
+    axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
     return drawn
 
 
 def against(found: Diagnosis, width: float) -> Any:
-    """Mean and scatter of the error over what it may go with, of all records."""
+    """Mean and scatter of the error of all records over the variables it may depend on."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
-    units, unit = found.parameters.units, found.content["unit"]
+    units, unit = found.parameters.units, found.result.unit
     wide = width == WIDE
     drawn = drawing.figure(width, 7.4 if wide else 14.0)
     grid = np.ravel(drawn.subplots(3, 2, sharey=True) if wide else drawn.subplots(6, 1, sharey=True))
@@ -152,7 +154,7 @@ def against(found: Diagnosis, width: float) -> Any:
     ]  # fmt: skip
     for axes, (name, of, log) in zip(grid, variables, strict=True):
         x = np.concatenate([of(each) for each in shown])
-        sides = [("before", BEFORE, "refitted")] if found.content["effects"] else []
+        sides = [("before", BEFORE, "refitted")] if found.result.effects else []
         for key, colour, what in (*sides, ("after", AFTER, _last(found))):
             e = np.concatenate([getattr(each, key) * (_direction(each) if log else 1.0) for each in shown])
             _binned(axes, x, e, colour, f"{what}, mean \N{PLUS-MINUS SIGN} 1 sd", log)
@@ -195,7 +197,7 @@ def _since_stop(each: Signals) -> Array:
 def _direction(each: Signals) -> Array:
     """1 where the drive went up when it last moved, -1 where it went down."""
     found = np.sign(np.diff(each.v, prepend=each.v[0]))
-    tolerance = STANDS * float(np.ptp(each.v))
+    tolerance = acceptance.HOLD_DRIVE * float(np.ptp(each.v))
     moved = np.flatnonzero(np.abs(np.diff(each.v, prepend=each.v[0])) > tolerance)
     if not len(moved):
         return np.ones(len(found))
@@ -215,7 +217,7 @@ def time(found: Diagnosis, width: float) -> Any:
         start = float(t[-1]) + 0.02 * float(np.ptp(t))
         edges = np.linspace(0, len(t), WINDOWS + 1).astype(int)
         for key, colour, what in (("before", BEFORE, "refitted"), ("after", AFTER, _last(found))):
-            if key == "before" and not found.content["effects"]:
+            if key == "before" and not found.result.effects:
                 continue
             e = getattr(each, key)
             parts = [(0.5 * (t[a] + t[b - 1]), _rms(e[a:b])) for a, b in itertools.pairwise(edges) if b > a]
@@ -223,7 +225,7 @@ def time(found: Diagnosis, width: float) -> Any:
             values += [rms for _, rms in parts]
             axes.plot(*zip(*parts, strict=True), "-o", color=colour, markersize=2.5, linewidth=1.1,
                       label=None if number else what)  # fmt: skip
-    noise = found.content["noise_floor"]
+    noise = found.result.noise_floor
     axes.axhline(noise, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
@@ -231,7 +233,7 @@ def time(found: Diagnosis, width: float) -> Any:
     else:
         axes.set_ylim(bottom=0.0)
     clock = "session time (s)" if one_clock else "time, one record after another (s)"
-    axes.set(xlabel=clock, ylabel=label("rms error", found.content["unit"]))
+    axes.set(xlabel=clock, ylabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
     return drawn
 
@@ -240,11 +242,11 @@ def frequency(found: Diagnosis, width: float) -> Any:
     """Spectral density of the error of the worst held-out record."""
     from scipy.signal import welch
 
-    each, unit = worst(found)[0], found.content["unit"]
+    each, unit = worst(found)[0], found.result.unit
     step = float(np.median(np.diff(each.t)))
     drawn = drawing.figure(width, 3.6)
     axes = drawn.subplots()
-    sides = [("before", BEFORE, "refitted")] if found.content["effects"] else []
+    sides = [("before", BEFORE, "refitted")] if found.result.effects else []
     for key, colour, what in (*sides, ("after", AFTER, _last(found))):
         e = getattr(each, key)
         known = np.flatnonzero(np.isfinite(e))
@@ -253,12 +255,12 @@ def frequency(found: Diagnosis, width: float) -> Any:
         e = np.interp(np.arange(known[0], known[-1] + 1), known, e[known])
         places, density = welch(e, 1.0 / step, nperseg=min(len(e), max(256, len(e) // 4)))
         axes.plot(places[1:], np.sqrt(density[1:]), color=colour, linewidth=1.0, label=what)
-    floor = float(found.content["noise_floor"]) * np.sqrt(2.0 * step)
+    floor = found.result.noise_floor * np.sqrt(2.0 * step)
     axes.axhline(floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise, if white")
-    for line in (entry for entry in found.content["unexplained"] if entry["kind"] == "line"):
-        if line["frequency"] < 0.5 / step:
-            axes.axvline(line["frequency"], color=drawing.OTHER, linestyle=":", linewidth=1.0)
-            axes.annotate(f"{line['frequency']:.4g} Hz", (line["frequency"], 1.0), xycoords=("data", "axes fraction"),
+    for line in (each for each in found.result.unexplained if isinstance(each, Line)):
+        if line.frequency < 0.5 / step:
+            axes.axvline(line.frequency, color=drawing.OTHER, linestyle=":", linewidth=1.0)
+            axes.annotate(f"{line.frequency:.4g} Hz", (line.frequency, 1.0), xycoords=("data", "axes fraction"),
                           xytext=(3, -10), textcoords="offset points", fontsize=8, color=drawing.OTHER)  # fmt: skip
     _decades(axes, "x")
     _decades(axes, "y")
@@ -269,17 +271,17 @@ def frequency(found: Diagnosis, width: float) -> Any:
 
 
 def _last(found: Diagnosis) -> str:
-    return "with the effects" if found.content["effects"] else "refitted model"
+    return "with the effects" if found.result.effects else "refitted model"
 
 
 def _floor(axes: Any, found: Diagnosis) -> None:
-    noise = found.content["noise_floor"]
+    noise = found.result.noise_floor
     for sign, name in ((1.0, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-1.0, None)):
         axes.axhline(sign * noise, color=FLOOR, linestyle="--", linewidth=1.0, label=name)
 
 
 def _range(axes: Any, values: Sequence[float]) -> None:
-    """A horizontal axis from zero, or a logarithmic one where the values lie far apart."""
+    """A horizontal axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
         _decades(axes, "x")

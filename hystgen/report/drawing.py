@@ -1,4 +1,4 @@
-"""What all pictures share: colours, labels, thinned lines, and the same bytes for the same picture.
+"""Shared by all figures: colours, labels, thinned lines, and the same bytes for the same figure.
 
 matplotlib is imported when one is drawn; its settings, and those of the user, stay as they are.
 """
@@ -27,7 +27,7 @@ LINES = {
     "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
     "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
 }
-"""The model as a thin line on a broad one: neither hides the other."""
+"""The model as a thin line over the broad one of the measurement: both stay visible."""
 
 STYLE = {
     "svg.hashsalt": "hystgen",
@@ -50,7 +50,7 @@ STYLE = {
 }
 
 BLOCKS = 1000
-"""A line is thinned to the extremes of so many blocks of samples."""
+"""Number of blocks of samples whose extremes a thinned line keeps."""
 
 MOST_POINTS = 4000
 """Lines with more points than this that cannot be thinned become pixels in an SVG; most points of a cloud."""
@@ -88,7 +88,7 @@ def _import() -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep matplotlib from talking about its caches, which it makes elsewhere where the home folder is read-only."""
+    """Silence matplotlib about its caches, which it puts elsewhere if the home folder is read-only."""
     logger = logging.getLogger("matplotlib")
     before = logger.level
     if before == logging.NOTSET:
@@ -104,7 +104,7 @@ def styled() -> Iterator[None]:
     """The style of all pictures, whatever matplotlib's own settings; to draw and to save in. Raises PlotError."""
     require()
     with _quiet():
-        from matplotlib import figure, style  # noqa: F401  # all that copies of this process would each import
+        from matplotlib import figure, style  # noqa: F401  # which each fork of this process would import again
         from matplotlib.backends import backend_svg  # noqa: F401
 
         with style.context(["default", STYLE]):
@@ -121,7 +121,7 @@ def figure(width: float, height: float) -> Any:
 def content(drawn: Any, kind: str) -> bytes:
     """The bytes of a PNG or SVG (`kind`) of a figure, without date or version."""
     engine = drawn.get_layout_engine()
-    if engine is not None:  # savefig would draw everything twice to have it laid out
+    if engine is not None:  # savefig would draw everything twice for the layout
         engine.execute(drawn)
         drawn.set_layout_engine(None)
     out = io.BytesIO()
@@ -153,7 +153,7 @@ def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
     for signal in signals:
         part = signal[start:stop]
         for sign in (1.0, -1.0):
-            # a block's first sample stands for it where none of its samples has a value
+            # the first sample of a block without values
             values = np.where(np.isnan(part), -np.inf, sign * part)
             peak = np.maximum.reduceat(values, edges[:-1])
             at_peak = np.flatnonzero(values == np.repeat(peak, np.diff(edges)))

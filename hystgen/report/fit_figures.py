@@ -1,4 +1,4 @@
-"""The pictures of a fit. Every one can be drawn for a wide page and for a phone, with the same content."""
+"""The figures of a fit, each for a wide page and for a phone with the same content."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ BINS, FEWEST = 40, 5
 """Bins of the residual's mean, and the fewest samples in one that is shown."""
 
 TAIL, FAR = 0.002, 3.0
-"""An axis ends at these quantiles where the extremes lie so many times further out."""
+"""Quantiles at which an axis ends, and how many times farther out the extremes then are."""
 
 AGREE = 1.2
-"""Two estimates of the noise that differ by no more than this factor are one."""
+"""Two estimates of the noise that differ by at most this factor agree."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A record, what the fit compared of it, and the model's output (N,) along it."""
+    """A record, its compared samples, and the model's output (N,) along it."""
 
     record: Record
     used: Used
@@ -88,13 +88,13 @@ class Shown:
 
         Differences of second order take what is smooth out of a residual and leave noise times the root of 6 (Gasser,
         Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth do
-        neighbours tell the same as every other sample.
+        neighbours agree with that from every other sample.
         """
         found = []
         for lag in (1, 2):
             parts = [self.residual[a:b] for a, b in self.used.parts]
             second = np.concatenate([e[2 * lag :] - 2.0 * e[lag:-lag] + e[: -2 * lag] for e in parts])
-            # the kinks at reversals are few, and no noise
+            # without the few kinks at reversals, which are no noise
             found.append(1.4826 * float(np.nanmedian(np.abs(second))) / np.sqrt(6.0))
         if not 0.0 < max(found) <= AGREE * min(found):
             return None
@@ -109,7 +109,7 @@ def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
 
 
 def drawn_ones(shown: Sequence[Shown]) -> list[Shown]:
-    """Of the fitted and of the held-out records the one with the largest error."""
+    """The record with the largest error among the fitted ones and among the held-out ones."""
     groups = [[each for each in shown if each.used.held_out == held] for held in (False, True)]
     return [max(group, key=lambda each: each.rms) for group in groups if group]
 
@@ -138,7 +138,7 @@ def units_of(fit: Fit) -> Units:
     return Units(units.input or "", units.output or "")
 
 
-# Panels: what is drawn into one pair of axes ---------------------------------------------------------------
+# Panels: one pair of axes each ---------------------------------------------------------------
 
 
 def loop_panel(axes: Any, each: Shown, units: Units) -> None:
@@ -157,7 +157,7 @@ def loop_panel(axes: Any, each: Shown, units: Units) -> None:
 
 
 def _shade(axes: Any, each: Shown, named: bool) -> None:
-    """What was not compared: the start of each part, what was left out, gaps."""
+    """Samples that were not compared: the start of each part, samples left out, gaps."""
     t = each.time
     step = each.record.sample_time
     masked = np.zeros(each.used.samples + 2, dtype=np.int8)
@@ -202,7 +202,7 @@ def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
 
 
 def residual_panel(axes: Any, each: Shown, units: Units, colour: str = drawing.RESIDUAL) -> None:
-    """What is left along time."""
+    """The residual along time."""
     for k, (start, stop) in enumerate(each.used.parts):
         chosen = drawing.kept(start, stop, each.residual)
         axes.plot(
@@ -250,7 +250,7 @@ def binned(x: Array, values: Array, low: float, high: float) -> tuple[Array, Arr
 
 
 def _limits(x: Array) -> tuple[float, float]:
-    """Ends of an axis: all there is, or all but the few that lie far out."""
+    """Ends of an axis: the extremes, or quantiles if a few values are far out."""
     low, high = float(x.min()), float(x.max())
     inner_low, inner_high = (float(q) for q in np.quantile(x, (TAIL, 1.0 - TAIL)))
     return (inner_low, inner_high) if high - low > FAR * (inner_high - inner_low) > 0.0 else (low, high)
@@ -338,10 +338,10 @@ def judged(shown: Sequence[Shown]) -> list[Shown]:
 
 
 def noise_of(shown: Sequence[Shown]) -> float | None:
-    """The largest noise of the records, None where that of any cannot be told."""
+    """The largest noise of the records, None if that of any is unknown."""
     found = [each.noise for each in shown]
-    told = [sigma for sigma in found if sigma is not None]
-    return max(told) if told and len(told) == len(found) else None
+    known = [sigma for sigma in found if sigma is not None]
+    return max(known) if known and len(known) == len(found) else None
 
 
 def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
@@ -410,4 +410,4 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
 FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Any]] = {
     "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
 }  # fmt: skip
-"""All of them by the name of their file."""
+"""All figures by the name of their file."""

@@ -1,4 +1,4 @@
-"""One HTML page that stands alone: text, tables and pictures in it, no script, nothing to load."""
+"""A self-contained HTML page: text, tables and figures, no script, nothing to load."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Section:
 
 
 def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:
-    """The page: `title`, a `lead` that says the most important in a few words, the sections."""
+    """The page: `title`, a `lead` with the main result in a few words, the sections."""
     template = _environment().get_template("report.html.j2")
     return template.render(title=title, lead=lead, sections=sections)
 

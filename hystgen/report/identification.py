@@ -1,4 +1,4 @@
-"""The report of an identification: one page for people who look, and its pictures beside it."""
+"""The report of an identification: one page, and its figures as files beside it."""
 
 from __future__ import annotations
 
@@ -75,11 +75,11 @@ def write(
     return files.write(Path(folder), {PAGE: text.encode("utf-8"), **made})[0]
 
 
-# What is said ----------------------------------------------------------------------------------------------
+# Text ----------------------------------------------------------------------------------------------
 
 
 def _kind(fit: Fit) -> str:
-    """What kind of model it is, in words."""
+    """The kind of model in words."""
     plays = fit.parameters.model.pi.thresholds
     cascade = cascade_of(fit.parameters)
     count = counted(len(plays) - 1, "play")
@@ -94,7 +94,7 @@ def _kind(fit: Fit) -> str:
 
 
 def held_out_row(fit: Fit) -> Row | None:
-    """The row of what the model was judged by; None where nothing was held out."""
+    """The row by which the model is judged; None if nothing was held out."""
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 
@@ -202,7 +202,7 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
 
 
 def _masks(each: Shown) -> tuple[Sequence[int], ...]:
-    """What is counted of a record, in the order of the table."""
+    """The counts of a record, in the order of the table."""
     used = each.used
     outputs = used.skipped, used.ignored, used.outliers, used.stretches
     return tuple(found.tolist() for found in (*outputs, used.bridged, used.gaps, used.left_out))
@@ -256,7 +256,7 @@ def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
 
 
 def _fingerprint(record: Record) -> str:
-    """Of the numbers as they were read, so that it does not depend on the file's format."""
+    """Digest of the numbers as they were read, independent of the file's format."""
     digest = hashlib.sha256()
     for values in (record.t, record.v, record.y):
         assert values is not None
@@ -264,11 +264,11 @@ def _fingerprint(record: Record) -> str:
     return digest.hexdigest()[:16]
 
 
-# Captions and what pictures show in words -------------------------------------------------------------------
+# Captions and alternative texts -------------------------------------------------------------------
 
 
 def _several(shown: Sequence[Shown]) -> str:
-    """Which records of several are drawn."""
+    """A sentence for the caption if not all records are drawn."""
     drawn = fit_figures.drawn_ones(shown)
     return " Of several records the one with the largest error is drawn." if len(drawn) < len(shown) else ""
 
@@ -321,10 +321,10 @@ def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:
     unit = f" {fit.unit}" if fit.unit else ""
     said = ", ".join(f"{each.used.name} ({fit_figures.role(each)})" for each in judged)
     level = (
-        f"The noise, told from differences of neighbouring samples, is about {noise:.2g}{unit} (1 sd): a mean "
+        f"The noise, estimated from differences of neighbouring samples, is about {noise:.2g}{unit} (1 sd): a mean "
         "outside that band is structure that the model misses."
         if noise is not None
-        else "The noise cannot be told from these samples: it is not white, or small beside what the model misses."
+        else "The noise cannot be estimated from these samples: it is not white, or small beside the model error."
     )
     compared = sum(int(np.count_nonzero(each.used.compared)) for each in judged)
     some = f" ({drawing.MOST_POINTS} of {compared} are drawn)" if compared > drawing.MOST_POINTS else ""

@@ -1,4 +1,4 @@
-"""The page of a plan: which drives to record, what each is for, in which order, and what to run afterwards."""
+"""The page of a plan: the drives to record, their purpose and order, and the command to run afterwards."""
 
 from __future__ import annotations
 

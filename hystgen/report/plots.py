@@ -1,4 +1,4 @@
-"""Pictures to a file of the user's choice: a model with its loop, loading curve and inverse; a fit."""
+"""Plots to a file of the user's choice: a model with its loop, loading curve and inverse; a fit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _save(figure: Any, path: str | os.PathLike[str]) -> None:
 
 
 def show_model(model: Model, path: str | os.PathLike[str]) -> None:
-    """Loops, initial loading curve and, where it exists, the inverse with what it achieves, as PNG or SVG.
+    """Loops, initial loading curve and, if it exists, the inverse with its accuracy, as PNG or SVG.
 
     Raises PlotError without matplotlib or for another file type.
     """

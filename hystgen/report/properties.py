@@ -1,4 +1,4 @@
-"""What a model can do, in words."""
+"""The properties of a model in words."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hystgen.model import Model
 HARD_RATIO = 1e6
 
 WIDE = 0.05
-"""An error of the inverse of this share of the drive's range is worth a word."""
+"""Share of the drive's range from which an error of the inverse is mentioned."""
 
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
@@ -70,7 +70,7 @@ def properties(model: Model) -> str:
 
 
 def cost(model: Model) -> str:
-    """What the C costs that `emit` would write, of the forward operator where there is no inverse; "" if it refuses."""
+    """Cost of the C that `emit` would write, of the forward operator without an inverse; "" if it refuses."""
     from hystgen.emission import module
 
     options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
@@ -86,12 +86,12 @@ def cost(model: Model) -> str:
 
 
 def _most(bound: float) -> str:
-    """A bound in three digits that are no smaller."""
+    """A bound rounded up to three digits."""
     return f"{float(UP.create_decimal_from_float(bound)):.3g}"
 
 
 def _effects(model: Model) -> list[str]:
-    """Each effect in the order of the chain, its parameters with what they are, and what it means for a compensator."""
+    """Each effect in the order of the chain: its parameters, and how a compensator corrects it."""
     lines = []
     for effect in model.chain.effects:
         shape = getattr(effect, effect.selector, "")
@@ -107,14 +107,14 @@ def _effects(model: Model) -> list[str]:
 
 
 def _shown(value: Any) -> str:
-    """A number or a list, which is cut where it is long."""
+    """A number or a list; a long list is shortened."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_shown(entry) for entry in value[:8]) + (", ..]" if len(value) > 8 else "]")
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
-    """What fixed point gives the user, in physical units, or why it cannot be had."""
+    """Resolution and bounds of fixed point in physical units, or why it is refused."""
     lines = []
     for arithmetic in ("q31", "q15"):
         try:
@@ -157,7 +157,7 @@ def warnings(model: Model) -> list[str]:
 
 
 def _inverse_error(model: Model, arithmetic: str) -> float:
-    """Most that the emitted inverse differs from the exact one, input units. Raises FormatError."""
+    """Largest difference between the emitted inverse and the exact one, input units. Raises FormatError."""
     if arithmetic in ("float32", "float64"):
         return error_bounds(model.cascade, arithmetic, model.engine(arithmetic=arithmetic)).rounding
     form = _format(model, arithmetic)
@@ -165,6 +165,6 @@ def _inverse_error(model: Model, arithmetic: str) -> float:
 
 
 def _format(model: Model, arithmetic: str) -> fixed_tables.Format:
-    """What the model comes to in fixed point. Raises FormatError."""
+    """The model in fixed point. Raises FormatError."""
     emit, engine = model.parameters.emit, model.engine(arithmetic=arithmetic)
     return fixed_tables.build(model.cascade, arithmetic, engine, emit.drive_lsb, emit.output_lsb)[1]

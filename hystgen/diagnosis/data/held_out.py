@@ -1,4 +1,4 @@
-"""What is fitted and what judges: which records are held out, and whether they are enough for it."""
+"""Which records are fitted and which are held out to judge, and whether they are enough for it."""
 
 from __future__ import annotations
 
@@ -9,48 +9,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.words import counted
-from hystgen.diagnosis.structure import Item
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
 from hystgen.identification.reduction import Course
 from hystgen.records import Record
 
-ENOUGH = 100
-"""More samples than this have to be left of some record, to fit and held out each."""
-
-SET_ASIDE = 0.3
-"""Share of a single record, its end, that is held out where nothing else can be."""
-
-REACHED = 0.5
-"""A record is a fast one from this share of the largest rate of the drive on, and a wide one from that of its swing."""
-
 JUDGE = "judge by"
-"""What held-out records are for, in words."""
+"""The purpose of held-out records, in words."""
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
     """Whether a share of any of them is enough to compare."""
-    return any(share * course.used > ENOUGH for course in courses)
+    return any(share * course.used > acceptance.COMPARED_SAMPLES for course in courses)
 
 
 def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
-    """What is said where there is not; `what`: that they are to be for."""
+    """The message where there is not; `what`: the purpose they are too short for."""
     names = ", ".join(course.name for course in courses)
-    most = max(course.used for course in courses)
+    most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
     return (
         f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
-        f"whose memory is not known, and more than {ENOUGH / share:.0f} are needed; give --history, or records that "
-        "sweep their range again"
+        f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
+        "or records that sweep their range again"
     )
 
 
 def hardly_compared(items: Sequence[Item]) -> list[str]:
-    """Of records that say nothing beside others that do, and of those of which most is not compared."""
+    """Notes on records that show nothing beside others that do, and on those that are mostly not compared."""
     known: dict[str, NDArray[np.bool_]] = {}
     for item in items:  # the two ends of a record are two items
         known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
     notes = []
     for name, compared in known.items():
         number = int(np.count_nonzero(compared))
-        if number <= ENOUGH:
+        if number <= acceptance.COMPARED_SAMPLES:
             notes.append(
                 f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
                 "known give --history, or let it sweep its range again"
@@ -64,13 +56,14 @@ def hardly_compared(items: Sequence[Item]) -> list[str]:
 
 
 def set_aside(records: Sequence[Record]) -> list[int]:
-    """Every third record, in a count or with a neighbour in place of one by which either side has fast and wide drives.
+    """Numbers of the records to hold out: every third one, shifted where that gives both sides fast and wide drives.
 
     What a fast edge shows cannot be found where none is fitted, nor judged where none is held out.
     """
     rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
     swings = np.array([float(np.ptp(record.v)) for record in records])
-    showing = [{k for k, x in enumerate(found) if x >= REACHED * np.max(found)} for found in (rates, swings)]
+    least = acceptance.FAST_RECORD
+    showing = [{k for k, x in enumerate(found) if x >= least * np.max(found)} for found in (rates, swings)]
 
     def shared(aside: Sequence[int]) -> int:
         return sum(bool(some.intersection(aside)) and bool(some.difference(aside)) for some in showing)
@@ -81,11 +74,11 @@ def set_aside(records: Sequence[Record]) -> list[int]:
 
 
 def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
-    """Every item twice: its beginning to be fitted, its end to be compared."""
+    """Every item twice: its beginning to be fitted, its end to be held out."""
     beginnings, ends = [], []
     for item in items:
         known = np.flatnonzero(item.known)
-        split = int(known[int((1.0 - SET_ASIDE) * len(known))])
+        split = int(known[int((1.0 - acceptance.SET_ASIDE) * len(known))])
         front, end = item.y.copy(), item.y.copy()
         front[split:], end[:split] = np.nan, np.nan
         beginnings.append(replace(item, y=front))

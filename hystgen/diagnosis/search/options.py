@@ -1,4 +1,4 @@
-"""What can be added to a hypothesis: every shape of every effect of the catalogue, and fronts."""
+"""Extensions of a hypothesis: every shape of every effect of the catalogue, and fronts."""
 
 from __future__ import annotations
 
@@ -9,33 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import effects
-from hystgen.diagnosis.structure import Fitted, Item, Part, Structure
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.structure import Part, Structure
 from hystgen.effects.base import About, Effect
 from hystgen.identification.fronts import Bent, DeadZones, Ends, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 
-BREAKS, FINER = 4, 8
-"""Breaks of the dead-zone sum that an asymmetry is sought with, and of the one that is tried where it helps."""
-
-BENT, ASIDE = 0.3, 2.0
-"""Curvature and place of tanh envelopes from which a search starts too: bent one way all over the range."""
-
-LIMITED = tuple(np.array([share, share, -2.0]) for share in (0.03, 0.1))
-"""Limiters from which a search starts: places outside the range's ends do nothing, nor does a small change of them."""
-
 PLACES = 201
-
-STRAIGHT, NEAR = 0.6, 0.1
-"""A limiter is straight over this share of the range: its slope is the middle one but for that share of its range."""
-
-LIMIT = 0.6
-"""A slope at an end that is less than so many times that in the middle is a limit's alone."""
+"""Drives at which the slope of a front is judged."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """One way to extend a hypothesis. `front`: it puts a memoryless part in front, which is named once found.
+    """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named once it is fitted.
 
     `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`. `beyond`: label of
     the simpler one that it contains, and without which it is not tried; `grown`: a start from the numbers of that.
@@ -51,7 +40,7 @@ class Option:
     grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
-        """The shape of all, where the extension has these numbers and the rest is as it was."""
+        """The shape of the whole hypothesis with these numbers of the extension; the others stay."""
         front_shape, _ = now.structure.pieces(now.shape)
         if self.front:
             return np.concatenate([numbers, now.shape[len(front_shape) :]])
@@ -59,7 +48,7 @@ class Option:
 
 
 def about(items: Sequence[Item], thresholds: Array) -> About:
-    """What the records are like, for the shapes that are worth trying."""
+    """Ranges, rates and times of the records, from which effects choose their candidates."""
     low = min(float(item.run.v.min()) for item in items)
     high = max(float(item.run.v.max()) for item in items)
     finest = min(float(np.median(np.diff(item.run.t))) for item in items)
@@ -105,43 +94,47 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
 
 
 def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -> list[Option]:
-    """A memoryless part in front, in all its shapes."""
+    """The memoryless parts that may be added in front."""
 
     def one(label: str, front: Front, starts: Sequence[Array], beyond: str = "") -> Option:
         pair = replace(structure, front=front), replace(held, front=front)
         return Option(label, "asymmetry", *pair, tuple(starts), True, beyond)
 
     one_way, both_ways = Bent(drive, 1), Bent(drive, 2)
-    dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (BREAKS, FINER))
+    dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (acceptance.BREAKS, acceptance.FINER_BREAKS))
     tanh = Tanh(drive)
+    sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
+    bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # one way over the whole range
+    # a limit outside the range does nothing, nor does a small change of it: start inside
+    limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
         one("front that bends both ways", both_ways, [both_ways.straight]),
         one("front of dead zones", dead_zones, [dead_zones.straight]),
         one("front of more dead zones", finer, [finer.straight], "front of dead zones"),
-        one("front of one tanh", tanh, [tanh.straight, *(np.array([BENT, side]) for side in (-ASIDE, ASIDE))]),
-        one("front with flatter ends", Ends(drive), LIMITED),
+        one("front of one tanh", tanh, [tanh.straight, *bent]),
+        one("front with flatter ends", Ends(drive), limiters),
     ]
 
 
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
-    """`saturation` for a front that is straight but for flatter ends, or bends alike at both; else `asymmetry`.
+    """`saturation` for a front that is straight between flatter ends, or bends alike at both; else `asymmetry`.
 
-    Both where one end alone is a little flatter: a soft limit there and a bent actuator are one and the same front.
+    Both names where one end alone is a little flatter: a soft limit there and a bent actuator give the same front.
     """
     v = np.linspace(*drive, PLACES)
     w = v
     for stage in front.stages(shape):
         w = stage.forward(w)
     slopes = np.diff(w) / np.diff(v)
-    middle, near = float(np.median(slopes)), NEAR * float(np.ptp(slopes))
+    middle, near = float(np.median(slopes)), acceptance.LIMITER_NEAR * float(np.ptp(slopes))
     flatter, other = sorted(float(end.mean()) for end in (slopes[: PLACES // 16], slopes[-PLACES // 16 :]))
-    straight = float(np.mean(np.abs(slopes - middle) <= near)) >= STRAIGHT
+    straight = float(np.mean(np.abs(slopes - middle) <= near)) >= acceptance.LIMITER_STRAIGHT
     if straight and other <= middle + near and flatter < middle - near:
-        sure = flatter < LIMIT * middle or other < middle - near
+        sure = flatter < acceptance.LIMITER_SLOPE * middle or other < middle - near
         return ("saturation",) if sure else ("saturation", "asymmetry")
     bent = w - np.polyval(np.polyfit(v, w, 1), v)
     odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
     ends = 0.5 * (slopes[: PLACES // 8].mean() + slopes[-PLACES // 8 :].mean())
-    odd_wins = np.sum(odd**2) > 2.0 * np.sum(even**2)
+    odd_wins = np.sum(odd**2) > acceptance.ODD_FRONT * np.sum(even**2)
     return ("saturation",) if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else ("asymmetry",)

@@ -10,29 +10,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import decisions
-from hystgen.diagnosis import structure as fits
-from hystgen.diagnosis.believed import Prepared
-from hystgen.diagnosis.decisions import Merit
-from hystgen.diagnosis.options import Option
-from hystgen.diagnosis.structure import Fitted, Item, Structure
-from hystgen.diagnosis.thinning import everything, thinned
-from hystgen.diagnosis.trials import Records, Tried, free_numbers
+from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.preparing import Prepared
+from hystgen.diagnosis.data.thinning import everything, thinned
+from hystgen.diagnosis.search import acceptance, fits
+from hystgen.diagnosis.search import merit as judge
+from hystgen.diagnosis.search.acceptance import apart, is_noise
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.merit import Merit
+from hystgen.diagnosis.search.options import Option
+from hystgen.diagnosis.search.screening import Records, Tried, free_numbers
+from hystgen.diagnosis.search.structure import Structure
 from hystgen.identification import joint
 from hystgen.identification.fronts import Kept
 from hystgen.identification.weights import Weights
 
 Array = NDArray[np.float64]
-
-ROUNDS, RIVALS = 5, 3
-"""Effects that are added at most, and how many others of about the same use are tried in place of the latest."""
-
-EXCHANGE = 0.05
-"""Least share by which another effect has to lower the held-out rms to take the place of one accepted earlier."""
-
-EXCHANGES = 4
-"""At most so many times one effect takes the place of another."""
-
 
 @dataclass(frozen=True)
 class Found:
@@ -48,7 +41,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The believed model refitted, what was found, the model after it, and the ranking of each round."""
+    """The refitted nominal model, the model with the effects, these effects, and the ranking of each round."""
 
     refitted: Fitted
     fitted: Fitted
@@ -56,37 +49,34 @@ class Outcome:
     rankings: tuple[tuple[Tried, ...], ...]
 
 
-def refit(base: Structure, to_fit: Sequence[Item], start: Array, believed: Array | None = None) -> Fitted:
-    """The believed structure with its weights, the shape of its front and its effects' numbers, fitted anew.
+def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
+    """The nominal structure with weights, front and numbers of its effects refitted.
 
-    Sought from `start`, and where an output map bends the weights' part also from the `believed` ones: beyond a limit
-    no sample tells how far off others are.
+    From the shape `start` and linear weights; where an output map bends the output also from the `nominal` weights,
+    since samples beyond a limit do not show how far off others are.
     """
     quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
-    if believed is not None and base.actuator(start).bends:
-        starts.append(believed)
+    if nominal is not None and base.actuator(start).bends:
+        starts.append(nominal)
     found = [fits.fit(base, quick, start, p) for p in starts]
-    return min(found, key=lambda each: fits.rms(each.errors(quick)))
+    return min(found, key=lambda each: rms(each.errors(quick)))
 
 
 def again(fitted: Fitted, ready: Prepared) -> Fitted:
-    """A hypothesis fitted anew to other records."""
+    """A hypothesis refitted to other records."""
     return fits.fit(fitted.structure, _quick(ready.to_fit), fitted.shape, fitted.weights)
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """What was found with p_0 of the model that is written raised to the floor of `identify`, and what was done.
-
-    The errors behind the last effect are those of this model; without an effect it is the refitted one.
-    """
+    """The outcome with p_0 raised to the floor of `identify`, and the weights; errors are then those of that model."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
         return outcome, made
     found = outcome.found
     if not found:
         return replace(outcome, refitted=fitted, fitted=fitted), made
-    last = replace(found[-1], after=records.left(fitted))
+    last = replace(found[-1], after=records.residual(fitted))
     return replace(outcome, fitted=fitted, found=(*found[:-1], last)), made
 
 
@@ -95,16 +85,16 @@ def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:
 
 
 def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] = lambda _: False) -> Outcome:
-    """Add effects to the refitted model as long as one qualifies, and `until` something shows beside what is found."""
+    """Add effects to the refitted model as long as one qualifies; a model that `until` accepts ends the search."""
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     none = now
     found: list[Found] = []
     rankings: list[tuple[Tried, ...]] = []
-    gap = records.left(now)
+    gap = records.residual(now)
     latest: _Step | None = None
-    rounds = ROUNDS if decisions.bear_two(records) else 1
+    rounds = acceptance.MOST_EFFECTS if judge.bear_two(records) else 1
     for _ in range(rounds):
-        if not decisions.leaves_enough(now, records):
+        if not judge.leaves_enough(now, records):
             break
         step = _step(now, gap, records)
         if latest is not None and step is not None and not _explained(step, records):
@@ -131,17 +121,17 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
             latest = None
         if until(now):
             return Outcome(refitted, now, tuple(found), tuple(rankings))
-    if not decisions.borne_out(records.left(now), records):
+    if not judge.borne_out(records.residual(now), records):
         now, found = none, []
     if found:
         now = fits.fit(now.structure, records.full, now.shape, now.weights)
-        found[-1] = replace(found[-1], after=records.left(now))
+        found[-1] = replace(found[-1], after=records.residual(now))
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
 @dataclass(frozen=True)
 class _Step:
-    """A hypothesis, what was tried to extend it, the one of those that is taken, and what it is good for if it is."""
+    """A hypothesis, the extensions that were tried, the best of them, and its merit if it is accepted."""
 
     now: Fitted
     tried: list[Tried]
@@ -157,104 +147,102 @@ def _step(
     start: Fitted | None = None,
     least: float | None = None,
 ) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None where there is none to try.
+    """The best extension of a hypothesis and those it was chosen from; None without any to try.
 
-    `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. What
-    explains most may owe it to what it leaves free in a record, and be good for nothing on equal terms; then it is the
-    next one's turn. Where another explains far more on equal terms, only in too few places to be sure, none has a name.
+    `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. An
+    extension may explain most only through its free start states, and be worth nothing on equal terms; then the next
+    one is judged. If another explains far more on equal terms, but in too few places to be sure, none is named.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
         return None
     unsure = math.inf
-    for best in decisions.simplest_first(tried, records):
-        merit = decisions.merit_of(now, best, records, least)
+    for best in judge.simplest_first(tried, records):
+        merit = judge.merit_of(now, best, records, least)
         if merit is not None and merit.worth(gap, records):
-            if best.held_out > (1.0 + decisions.UNSURE) * unsure:
+            if best.held_out > (1.0 + acceptance.ALIKE) * unsure:
                 break
             return _Step(now, tried, best, merit)
-        if merit is None and decisions.removes(now, best, records, least):
+        if merit is None and judge.removes(now, best, records, least):
             unsure = min(unsure, best.held_out)
     return _Step(now, tried, tried[0], None)
 
 
 def _explained(step: _Step, records: Records) -> bool:
-    """Whether hardly more than noise is left: no other first effect can do better beside it, and `_exchanged` asks for
-    each that does as well."""
-    return step.merit is not None and step.best.held_out <= decisions.AT_FLOOR * records.noise
+    """Whether only noise is left: no other first effect can do better, and `_exchanged` finds those that do as well."""
+    return step.merit is not None and is_noise(step.best.held_out, records.noise)
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
-    """The latest step with another of those that cannot be told from its best, and the step that this makes possible.
+    """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
 
-    Which one of several it was shows beside the next effect: where nothing more qualifies behind the one that was
-    taken, or less, or no more by more numbers, it was the wrong one. Where the next one is itself one of them,
-    `_exchanged` asks what else there is beside it.
+    Which of several alike effects is present shows beside the next one: if nothing more qualifies behind the accepted
+    one, or it leaves more, or needs more numbers to leave as little, it was the wrong one. Where the next effect is
+    itself a rival, `_exchanged` examines what else fits beside it.
     """
-    alike = decisions.rivals(latest.best, latest.tried, records)
-    others = {each.name: each for each in reversed(alike)}  # of each name the best one
-    left = sorted(others.values(), key=lambda each: each.held_out)[:RIVALS]
+    alike = judge.rivals(latest.best, latest.tried, records)
+    others = {each.name: each for each in reversed(alike)}  # the best one of each name
+    follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
     if step.merit is not None:
-        left = [each for each in left if each.name != step.best.name]
+        follow = [each for each in follow if each.name != step.best.name]
     names = {each.name for each in step.tried}
 
     def pairs() -> Iterator[tuple[_Step, _Step]]:
-        for first in decisions.simplest_first(left, records):
-            merit = decisions.merit_of(latest.now, first, records)
+        for first in judge.simplest_first(follow, records):
+            merit = judge.merit_of(latest.now, first, records)
             then = _step(first.fitted, gap, records, lambda option: option.name in names) if merit is not None else None
             if then is not None and then.merit is not None:
                 yield replace(latest, best=first, merit=merit), then
 
     if step.merit is None:
-        enough = (1.0 - EXCHANGE) * records.left(step.now)
+        enough = (1.0 - acceptance.BETTER) * records.residual(step.now)
         return next((pair for pair in pairs() if pair[1].best.held_out <= enough), None)
     every = [*pairs(), (latest, step)]
-    enough = (1.0 + decisions.SIMPLER) * min(then.best.held_out for _, then in every)
+    enough = (1.0 + acceptance.BETTER) * min(then.best.held_out for _, then in every)
     good = [pair for pair in every if pair[1].best.held_out <= enough]
     chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))
     return None if chosen[1] is step else chosen
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
-    """Two effects of which none qualifies alone, since the other one hides it, but each beside the other.
+    """Two effects that hide each other: neither qualifies alone, but each beside the other.
 
-    The one, and the step from it to both. The search begins with what explains most on held-out records, and with each
-    effect that fitted ones leave no doubt of. What hides the one may leave less of the gap without it: then its share
-    is nothing, and that of the other all.
+    Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
+    records, and with each that is certain on fitted ones. Without the first, the other may leave less of the gap than
+    before; then the first has no share of it.
     """
-    one_of_each = {each.name: each for each in reversed(failed.tried)}  # of each name the best one
+    one_of_each = {each.name: each for each in reversed(failed.tried)}  # the best one of each name
     fitted = failed.now.errors(records.to_fit)
     seconds = []
     for first in one_of_each.values():
         if (
             first is not failed.tried[0]
-            and decisions.difference(fitted, first.fitted.errors(records.to_fit)) > decisions.SURE
+            and judge.difference(fitted, first.fitted.errors(records.to_fit)) > acceptance.P_SURE
         ):
             continue
-        second = _step(first.fitted, gap, records, least=decisions.ABOVE_NOISE)
+        second = _step(first.fitted, gap, records, least=acceptance.FIRST_REMOVES)
         if second is not None and second.merit is not None and second.best.name != first.name:
             seconds.append((first, second))
     for first, second in sorted(seconds, key=lambda pair: pair[1].best.held_out):
         alone = _without(second.best.fitted, first.name, records)
-        back = None if alone is None else _step(alone, gap, records, least=decisions.ABOVE_NOISE)
+        back = None if alone is None else _step(alone, gap, records, least=acceptance.FIRST_REMOVES)
         if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
             continue
-        merit = decisions.merit_of(failed.now, back.best, records)
+        merit = judge.merit_of(failed.now, back.best, records)
         if merit is not None and merit.worth(gap, records):
-            return replace(_found(second, records), before=gap, after=min(records.left(alone), gap)), back
+            return replace(_found(second, records), before=gap, after=min(records.residual(alone), gap)), back
     return None
 
 
 def _found(step: _Step, records: Records) -> Found:
     best, merit = step.best, step.merit
     assert merit is not None
-    rivals = tuple(dict.fromkeys([*best.names[1:], *decisions.left_open(step.now, best, step.tried, records)]))
-    return Found(best.name, best.option.label, records.left(step.now), best.held_out, merit.p_value, rivals)
+    rivals = tuple(dict.fromkeys([*best.names[1:], *judge.left_open(step.now, best, step.tried, records)]))
+    return Found(best.name, best.option.label, records.residual(step.now), best.held_out, merit.p_value, rivals)
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Those without the effects, which is linear, then with them: a sensor's curve far from where it was found leads on
-    to anywhere."""
+    """Weights without the effects, a linear fit, then with them: far from its outputs a sensor's curve leads astray."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -263,17 +251,17 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
 def _without_needless(
     now: Fitted, found: list[Found], records: Records
 ) -> tuple[Fitted, list[Found], dict[str, Fitted]]:
-    """Drop effects accepted earlier that those accepted later have made needless.
+    """Drop effects accepted earlier that later ones have made needless.
 
-    With it the model less each of the others of these.
+    Returns the model, the remaining effects, and for each earlier one the model without it.
     """
     less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
         fitted = _without(now, found[k].name, records)
         if fitted is None:
             continue
-        with_it, without = records.left(now), records.left(fitted)
-        if decisions.apart(without, with_it) < 0.5 * decisions.ABOVE_NOISE * records.noise:
+        with_it, without = records.residual(now), records.residual(fitted)
+        if apart(without, with_it) < acceptance.NEEDLESS * records.noise:
             return _without_needless(fitted, _rest(found, k, without), records)
         less[found[k].name] = fitted
     return now, found, less
@@ -282,27 +270,26 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Put another effect or shape in the place of one accepted earlier, where those accepted later make it the better.
+    """Replace effects accepted earlier by others, or other shapes, that are better beside those accepted later.
 
-    The first of two has been chosen while the second was missing, and may have taken part of its place; and the second
-    beside a wrong first one. Which names are alike shows beside all the others too. `less`: the model less an effect,
-    where that is known; `names`: effects that were followed up so far, since one that was among the best beside none of
-    the others is not worth another search.
+    The first of two was chosen while the second was missing, and may have taken part of its place; the second was
+    chosen beside a wrong first one. Rivals, too, are judged beside all the others. `less`: the model without an effect,
+    where it is known; `names`: effects that were among the best in some round, the only ones worth another search.
     """
-    latest, left = found[-1].name, EXCHANGES
-    while left:
-        left -= 1
+    latest = found[-1].name
+    for _ in range(acceptance.MOST_EXCHANGES):
         for k, old in enumerate(found):
             fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
             if fitted is None:
                 continue
-            start = _left_as_it_is(now, old.name, records)  # the others' numbers without any may be far from all others
-            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, decisions.ABOVE_NOISE)
+            start = _without_refit(now, old.name, records)  # refitted without it, the others' numbers may be far off
+            step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
             other = _found(step, records)
             if not _gives_way(now, old.name, step.best, records):
-                if step.best.held_out <= (1.0 + decisions.UNSURE) * records.left(now):  # else it was not found again
+                # otherwise the search did not find the effect again
+                if step.best.held_out <= (1.0 + acceptance.ALIKE) * records.residual(now):
                     alike = dict.fromkeys([other.name, *other.rivals])
                     found[k] = replace(old, rivals=tuple(name for name in alike if name != old.name))
                 continue
@@ -317,38 +304,39 @@ def _exchanged(
 
 
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
-    """Whether a hypothesis leaves so much more than another one, or no less on equal terms with more numbers.
+    """Whether an effect gives way to a better one.
 
-    Or as much with as many, where the catalogue has the other effect before that of this name.
+    By error, by fewer numbers with no larger error on equal terms, or, if equal, by its later place in the catalogue.
     """
-    held, left, fewer = records.held, records.left(now), free_numbers(now, records.held) - best.numbers(records.held)
-    if best.held_out <= (1.0 - EXCHANGE) * left:
+    held, residual = records.held, records.residual(now)
+    fewer = free_numbers(now, held) - best.numbers(held)
+    if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
     if fewer == 0:
-        return best.held_out <= (1.0 + decisions.EQUAL) * left and decisions.place(best.name) < decisions.place(name)
-    return fewer > 0 and fits.rms(best.fitted.errors(held, now)) <= left
+        return best.held_out <= (1.0 + acceptance.EQUAL) * residual and judge.place(best.name) < judge.place(name)
+    return fewer > 0 and rms(best.fitted.errors(held, now)) <= residual
 
 
 def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
-    """What was found, with the errors of the models before and after each; empty where one makes it no smaller."""
-    lefts = [records.left(now)]
+    """The effects with the errors before and after each of them; empty if one does not lower the error."""
+    residuals = [records.residual(now)]
     for each in reversed(found[1:]):
         smaller = _without(now, each.name, records)
         if smaller is None:
             return []
         now = smaller
-        lefts.append(records.left(now))
-    lefts = [gap, *reversed(lefts)]
-    if any(after >= before for before, after in itertools.pairwise(lefts)):
+        residuals.append(records.residual(now))
+    residuals = [gap, *reversed(residuals)]
+    if any(after >= before for before, after in itertools.pairwise(residuals)):
         return []
     return [
         replace(each, before=before, after=after)
-        for each, (before, after) in zip(found, itertools.pairwise(lefts), strict=True)
+        for each, (before, after) in zip(found, itertools.pairwise(residuals), strict=True)
     ]
 
 
 def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
-    """What was found but the k-th; each step of the gap is between two models that there are."""
+    """The effects without the k-th; the errors before and after each remain those of existing models."""
     later = [replace(found[k + 1], before=found[k].before), *found[k + 2 :]] if k + 1 < len(found) else []
     rest = [*found[:k], *later]
     rest[-1] = replace(rest[-1], after=without)
@@ -356,13 +344,13 @@ def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
 
 
 def _without(now: Fitted, name: str, records: Records) -> Fitted | None:
-    """The hypothesis less one effect, fitted anew."""
+    """The hypothesis without one effect, refitted."""
     smaller = _less(now, name)
     return None if smaller is None else fits.fit(smaller[0], records.quick, smaller[1], now.weights)
 
 
-def _left_as_it_is(now: Fitted, name: str, records: Records) -> Fitted | None:
-    """The hypothesis less one effect, the others' numbers unchanged."""
+def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
+    """The hypothesis without one effect, with the others' numbers unchanged."""
     smaller = _less(now, name)
     if smaller is None:
         return None

@@ -1,4 +1,4 @@
-"""How sure the numbers of the effects are: 95 % intervals from the system that is linear about the fit."""
+"""95 % intervals for the numbers of the effects, from the linear system about the fit."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis import structure
-from hystgen.diagnosis.structure import Fitted, Item
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import fits
+from hystgen.diagnosis.search.fits import Fitted
 from hystgen.effects.base import Effect
 from hystgen.identification import stage_content
 from hystgen.identification.uncertainty import correlation_time
@@ -24,29 +25,29 @@ TAILS = (0.025, 0.975)
 SEED = 1
 
 HALVINGS = 20
-"""Halvings of the way to a shape that cannot be, to where it can: a millionth of an interval's width."""
+"""Bisections on the way to an inadmissible shape: down to a millionth of an interval's width."""
 
 WEAKEST = 1e-9
-"""Directions whose singular value is below this share of the largest tell nothing of the numbers."""
+"""Singular values below this share of the largest are raised to it: such directions are not determined."""
 
 Numbers = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Sure:
-    """Low and high of every number, by the keys of the entries: of the front's stage, and of each part."""
+    """Low and high of every number under the keys of the entries: of the front's stage, and of each part."""
 
     front: dict[str, Any]
     parts: tuple[dict[str, Any], ...]
 
     def of(self, fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-        """Those of an effect that was found, `later` of its name having been found after it."""
+        """The intervals of an effect; `later`: how many of its name were found after it."""
         k = place(fitted, name, later)
         return self.front if k is None else self.parts[k]
 
 
 def place(fitted: Fitted, name: str, later: int) -> int | None:
-    """Which part an effect is, `later` of its name having been found after it; None for a front."""
+    """The part that an effect is, None for a front; `later`: how many of its name were found after it."""
     parts = [k for k, part in enumerate(fitted.structure.parts) if part.name == name]
     return parts[-1 - later] if later < len(parts) else None
 
@@ -63,13 +64,13 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     front = len(fitted.structure.front.straight)
     if not len(shape):
         return Sure({}, tuple({} for _ in fitted.structure.parts))
-    system = structure.linear(fitted.structure, items, shape, p).system.whole
+    system = fits.linear(fitted.structure, items, shape, p).system.whole
     n1 = len(p)
     active = np.flatnonzero(np.append(p > 0.0, np.ones(len(shape), dtype=bool)))
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
     inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
-    # Only the numbers' part of the covariance is needed; its triangular root with a positive diagonal is the only one,
-    # where singular vectors may come with other signs and in another order, and would draw other numbers
+    # Only the numbers' part of the covariance is needed. Its triangular root with a positive diagonal is unique, unlike
+    # singular vectors, whose signs and order depend on the library and would draw other numbers
     root = np.asarray(np.linalg.qr((right.T * inverse)[np.count_nonzero(active < n1) :].T, mode="r"))
     root = root * np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, None]
     errors = fitted.errors(items)
@@ -97,7 +98,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
 
 
 def _admissible(fitted: Fitted, drawn: Array) -> Array:
-    """The shape nearest to a drawn one, on the way to it from the one found, that is as possible as that is."""
+    """The last admissible shape on the way from the fitted one to a drawn one."""
     limits, found = fitted.structure, fitted.shape
     least = np.minimum(limits.slack(found), 0.0)
     if np.all(limits.slack(drawn) >= least):
@@ -124,7 +125,7 @@ def entry(effect: Effect) -> dict[str, Any]:
 
 
 def _spread(made: Sequence[Numbers], at: Numbers) -> dict[str, Any]:
-    """`[low, high]` of each key that varies; for a list or a mapping the same of what is in it."""
+    """`[low, high]` of each key that varies; for a list or a mapping that of its entries."""
     found = {key: _interval([each.get(key) for each in made], value) for key, value in at.items()}
     return {key: sure for key, sure in found.items() if sure}
 

@@ -1,4 +1,4 @@
-"""What the drives of records are like: where they turn, and whether all of them pass one loop."""
+"""The drives of records: where they turn, and whether all of them pass one loop."""
 
 from __future__ import annotations
 
@@ -7,20 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.structure import Item
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
-
-TURNS = 0.02
-"""A reversal counts from this share of the drive range on."""
-
-SAME_PLACE, SAME_TIME = 0.1, 1.5
-"""Loops are one where their ends lie within this share of the drive's range, at one speed up to this ratio of times."""
-
-STANDING = 0.3
-"""A drive stands still between its turns where it does so for this share of the time from one to the next."""
 
 
 def reversals(v: Array) -> Places:
@@ -29,8 +21,7 @@ def reversals(v: Array) -> Places:
 
 
 def one_loop(items: Sequence[Item]) -> bool:
-    """Whether the drive goes to and fro between the same two ends in all records, and stands still nowhere: a hold
-    tells more than a loop."""
+    """Whether the drive moves between the same two ends in all records without a hold, which would show more."""
     ends = []
     for item in items:
         v, t = item.run.v, item.run.t
@@ -38,29 +29,29 @@ def one_loop(items: Sequence[Item]) -> bool:
         if not len(turns):
             return False
         passing = float(np.ptp(t[moved])) / (len(turns) + 1)
-        if np.max(np.diff(t[moved])) > STANDING * passing:
+        if np.max(np.diff(t[moved])) > acceptance.LOOP_STANDS * passing:
             return False
         at = _between_ends(turns)
         ends += [v[at], np.array([v[at[0] :].min(), v[at[0] :].max()])]
     levels = np.concatenate(ends)
     low, high = float(levels.min()), float(levels.max())
-    return bool(np.minimum(levels - low, high - levels).max() <= SAME_PLACE * (high - low))
+    return bool(np.minimum(levels - low, high - levels).max() <= acceptance.LOOP_ENDS * (high - low))
 
 
 def one_speed(items: Sequence[Item]) -> bool:
     """Whether the drive takes the same time from each of its ends to the next in all records."""
     passed = np.concatenate([np.diff(item.run.t[_between_ends(reversals(item.run.v))]) for item in items])
-    return not len(passed) or bool(passed.max() <= SAME_TIME * passed.min())
+    return not len(passed) or bool(passed.max() <= acceptance.LOOP_SPEEDS * passed.min())
 
 
 def _moves(v: Array) -> tuple[Places, Places]:
     """Samples behind which the drive moves on, and those at which it turns, without its noise: as a play follows it."""
-    z = operators.plays(v, np.array([0.5 * TURNS * float(np.ptp(v))]), np.array([v[0]]))[0]
+    z = operators.plays(v, np.array([0.5 * acceptance.REVERSAL * float(np.ptp(v))]), np.array([v[0]]))[0]
     steps = np.diff(z)
     moved = np.flatnonzero(steps)
     return moved, moved[np.flatnonzero(np.diff(np.sign(steps[moved])))] + 1
 
 
 def _between_ends(turns: Places) -> Places:
-    """The way to the first turn begins anywhere."""
+    """The turns without the first one: the way to it may begin anywhere."""
     return turns[1:] if len(turns) > 1 else turns

@@ -1,7 +1,7 @@
-"""Fewer samples to search with: those that are compared, and those without which the others would come out wrong.
+"""Fewer samples to search with: those that are compared, and those that the prediction at these depends on.
 
-What an actuator does between two samples depends on the course of the drive and of the plays alone, so a stretch over
-which both are straight needs no samples in it: plays depend on turning points, and filters are exact on straight lines.
+A stretch over which drive and plays are straight needs no samples in it: plays depend on turning points alone, and
+filters are exact on straight lines.
 """
 
 from __future__ import annotations
@@ -13,30 +13,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.structure import Item
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LONGEST = 32
-"""Steps of the longest stretch without a sample in it, a power of two."""
-
-STRAIGHT, TURNING = 0.3, 0.03
-"""What a model predicts over a stretch may differ from a straight line by so many times the noise, and the drive by as
-much as makes that much output; at a turning point by so many times that."""
-
-LIKE_NOISE = 1.6
-"""What the model leaves may by so many times the noise, rms: white noise differs by 1.3 times from lines through it."""
-
-COLUMN = 0.01
-"""And further columns by this share of their range, rms."""
-
-
 def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[Mask]:
-    """Samples of each record without which what a model does at the others would differ by a part of the noise.
+    """Samples of each record without which the prediction at the others would change by a part of the noise.
 
-    `errors`: what a model leaves of the records, NaN where that is not known.
+    `errors`: errors of a model over the records, NaN where they are not known.
     """
     return [_needed(item, left, noise) for item, left in zip(items, errors, strict=True)]
 
@@ -47,14 +34,14 @@ def _needed(item: Item, left: Array, noise: float) -> Mask:
         return np.ones(number, dtype=bool)
     left, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (left, item.y - left))
     as_drive = float(np.ptp(run.v)) / max(float(np.ptp(predicted)), 1e-300)
-    bends = [  # of signals, by how much, and whether each sample or their rms may
-        (predicted, STRAIGHT * noise, False),
-        (run.v, STRAIGHT * noise * as_drive, False),
-        (left, LIKE_NOISE * noise, True),
-        *((column, COLUMN * float(np.ptp(column)), True) for column in run.extra.values()),
+    bends = [  # signal, how far it may be off a straight line, and whether that is its rms or every sample
+        (predicted, acceptance.THIN_STRAIGHT * noise, False),
+        (run.v, acceptance.THIN_STRAIGHT * noise * as_drive, False),
+        (left, acceptance.THIN_RESIDUAL * noise, True),
+        *((column, acceptance.THIN_COLUMN * float(np.ptp(column)), True) for column in run.extra.values()),
     ]
     found, straight = np.zeros(number, dtype=bool), np.zeros(number, dtype=bool)
-    size = LONGEST
+    size = acceptance.THIN_STEPS
     while size > 1:
         first = np.arange(0, number, size)
         ends, sizes = np.append(first, number - 1), np.diff(np.append(first, number))
@@ -69,22 +56,22 @@ def _needed(item: Item, left: Array, noise: float) -> Mask:
         size //= 2
     found |= ~straight
     found[[0, -1]] = True
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(run.v)))) + 1  # which plays remember
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(run.v)))) + 1  # the plays remember these
     kept = np.flatnonzero(found)
     beyond = np.abs(run.v[turns] - np.interp(run.t[turns], run.t[kept], run.v[kept]))
-    found[turns[beyond > TURNING * noise * as_drive]] = True
+    found[turns[beyond > acceptance.THIN_TURNING * noise * as_drive]] = True
     return found
 
 
 def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
-    """The same where no sample may be left out."""
+    """Masks under which no sample may be left out."""
     return [[np.ones(len(item.run.t), dtype=bool) for item in group] for group in groups]
 
 
 def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
-    """Groups of records with at most so many samples compared in each, every so many-th, beside the samples needed.
+    """Groups of records with evenly spaced samples, at most `most` of them compared in each group, and the needed ones.
 
-    `masks`: the needed samples of each record. Groups that need not be thinned are the same as before.
+    `masks`: the needed samples of each record. Groups that are small enough come back as they are.
     """
     every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
     if max(every) == 1:

@@ -1,0 +1,1 @@
+"""What was found: typed results, their sentences and `diagnosis.json`."""

@@ -1,0 +1,395 @@
+"""Entries of `unexplained`: a type for each kind of thing that is seen but not named, with its sentence."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+from hystgen.basics.words import counted
+
+INTERPOLATION = "the sensor's interpolation error looks like this"
+
+
+@dataclass(frozen=True)
+class Finding(ABC):
+    """An entry of `unexplained`.
+
+    `kind`: its name in `diagnosis.json`; `optional`: keys that are left out there where they are None or False.
+    """
+
+    kind: ClassVar[str]
+    optional: ClassVar[frozenset[str]] = frozenset()
+
+    def entry(self) -> dict[str, Any]:
+        """The entry as `diagnosis.json` has it."""
+        entry: dict[str, Any] = {"kind": self.kind}
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.name not in self.optional or (value is not None and value is not False):
+                entry[each.metadata.get("key", each.name)] = value
+        return entry
+
+    @abstractmethod
+    def sentence(self, unit: str | None) -> str:
+        """The entry as a sentence without its full stop; `unit` of the displacement."""
+
+    def advice(self) -> list[str]:
+        """Experiments that would show more of it, one sentence each."""
+        return []
+
+
+@dataclass(frozen=True)
+class Fault(Finding):
+    """A fault of the recording that is left out of the comparison or put right: the remaining record is sound.
+
+    `noun`: the thing that is counted of it; `qualifier`: the words behind that.
+    """
+
+    noun: ClassVar[str]
+    qualifier: ClassVar[str] = ""
+
+    @property
+    def times(self) -> int:
+        """How often it occurred."""
+        return 1
+
+
+# Whole records -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SwappedChannels(Fault):
+    """A record with drive and displacement exchanged, which was put right."""
+
+    kind, noun, qualifier = "swapped_channels", "record", " with exchanged columns"
+    record: str
+    repaired: bool = True
+
+    def sentence(self, unit: str | None) -> str:
+        return (
+            f"{self.record}: drive and displacement are exchanged (the model fits them the other way round); put right"
+        )
+
+
+@dataclass(frozen=True)
+class ExchangedRecords(Finding):
+    """A record with the output of another one, which was left out."""
+
+    kind = "exchanged_records"
+    record: str
+    other: str = field(metadata={"key": "with"})
+
+    def sentence(self, unit: str | None) -> str:
+        return f"{self.record}: left out, its output belongs to the drive of {self.other}"
+
+
+@dataclass(frozen=True)
+class Scale(Finding):
+    """An output `factor` times the expected one, of one record or of `all`."""
+
+    kind = "scale"
+    record: str
+    factor: float
+
+    def sentence(self, unit: str | None) -> str:
+        if self.record == "all":
+            return (
+                f"the output of all records is {self.factor:.4g} times what the nominal model predicts: other units, "
+                "or another sensitivity"
+            )
+        return (
+            f"{self.record}: left out, its output is {self.factor:.4g} times what the other records let expect: other "
+            "units of drive or output, another gain of the sensor, or a dead one"
+        )
+
+
+@dataclass(frozen=True)
+class OtherHistory(Fault):
+    """A given history that the starts of the records contradict: rms errors of the starts and of the rest."""
+
+    kind, noun, qualifier = "history", "history", " that the starts contradict"
+    record: str
+    samples: int
+    start: float
+    rest: float
+
+    def sentence(self, unit: str | None) -> str:
+        u = _unit(unit)
+        return (
+            f"the {counted(self.samples, 'sample')} at the start, whose output depends on the history, are off by "
+            f"{self.start:.3g}{u} rms, all others by {self.rest:.3g}{u}: the actuator came from elsewhere, and the "
+            "history is left out"
+        )
+
+
+# Single samples ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Saturated(Fault):
+    """Samples at an end of the converter; `first`: time of the first one, s; `end`: `largest` or `least`."""
+
+    kind, noun, qualifier = "saturated", "sample", " at the converter's end"
+    optional = frozenset(("first", "end", "level"))
+    record: str
+    first: float | None
+    end: str | None
+    level: float | None
+    count: int
+
+    @property
+    def times(self) -> int:
+        return self.count
+
+    def sentence(self, unit: str | None) -> str:
+        samples = f"{counted(self.count, 'sample')} at the converter's end, {self.level:.6g}{_unit(unit)}"
+        return f"{self.record}: {samples}, not compared{_first(self.first)}"
+
+
+@dataclass(frozen=True)
+class DropOuts(Fault):
+    """Stretches over which the output was lost; `level`: where it was all the while, if at one value."""
+
+    kind, noun = "drop_outs", "drop-out"
+    optional = frozenset(("level",))
+    record: str
+    first: float
+    level: float | None
+    count: int
+    samples: int
+
+    @property
+    def times(self) -> int:
+        return self.count
+
+    def sentence(self, unit: str | None) -> str:
+        level = "" if self.level is None else f" to {self.level:.6g}{_unit(unit)}"
+        number = counted(self.count, "drop-out")
+        return f"{self.record}: {number}{level}, {counted(self.samples, 'sample')} not compared{_first(self.first)}"
+
+
+@dataclass(frozen=True)
+class HeldSamples(Fault):
+    """Stretches over which the output repeats a value while the drive moves."""
+
+    kind, noun, qualifier = "held_samples", "stretch", " of held samples"
+    optional = frozenset(("first",))
+    record: str
+    first: float | None
+    count: int
+    samples: int
+
+    @property
+    def times(self) -> int:
+        return self.count
+
+    def sentence(self, unit: str | None) -> str:
+        held = counted(self.samples, "sample")
+        stands = f"the output stands still {counted(self.count, 'time')} while the drive moves"
+        return f"{self.record}: {stands}, {held} not compared{_first(self.first)}"
+
+
+@dataclass(frozen=True)
+class IsolatedSamples(Fault):
+    """Single samples of a channel, `v` or `y`, far from their neighbours."""
+
+    kind, noun = "isolated_samples", "isolated sample"
+    record: str
+    channel: str
+    first: float
+    count: int
+
+    @property
+    def times(self) -> int:
+        return self.count
+
+    def sentence(self, unit: str | None) -> str:
+        done = "bridged" if self.channel == "v" else "not compared"
+        number = counted(self.count, "isolated sample")
+        return f"{self.record}: {number} of {self.channel} far from the neighbours, {done}{_first(self.first)}"
+
+
+# Disturbances ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Line(Finding):
+    """A line over time at a frequency, Hz; `share`: of the error's variance in the `records` that have it."""
+
+    kind = "line"
+    optional = frozenset(("mains", "repaired"))
+    frequency: float
+    amplitude: float
+    share: float
+    records: tuple[str, ...]
+    mains: float | str | None = None
+    repaired: bool = False
+
+    @property
+    def place(self) -> float:
+        """Where it lies on its axis."""
+        return self.frequency
+
+    def sentence(self, unit: str | None) -> str:
+        mains = self.mains
+        hum = "" if mains is None else f" (mains hum{'' if isinstance(mains, float) else f', {mains}'})"
+        return (
+            f"a line at {self.frequency:.4g} Hz{hum}, amplitude {self.amplitude:.3g}{_unit(unit)}, in "
+            f"{several(self.records)}: {100.0 * self.share:.0f} % of the error's variance there"
+            + _taken_out(self.repaired)
+        )
+
+
+@dataclass(frozen=True)
+class Ripple(Finding):
+    """A line over the position with a pitch in output units; `converter_step`: which is the step of the converter."""
+
+    kind = "ripple"
+    optional = frozenset(("repaired",))
+    pitch: float
+    amplitude: float
+    share: float
+    records: tuple[str, ...]
+    converter_step: bool
+    repaired: bool = False
+
+    @property
+    def place(self) -> float:
+        """Where it lies on its axis."""
+        return self.pitch
+
+    def sentence(self, unit: str | None) -> str:
+        u = _unit(unit)
+        return (
+            f"a ripple over the position with a pitch of {self.pitch:.4g}{u}, amplitude {self.amplitude:.3g}{u}, in "
+            f"{several(self.records)}: {100.0 * self.share:.0f} % of the error's variance; "
+            + ("its pitch is the step of the converter" if self.converter_step else INTERPOLATION)
+            + _taken_out(self.repaired)
+        )
+
+
+Periodic = Line | Ripple
+
+
+@dataclass(frozen=True)
+class StickSlip(Finding):
+    """Jumps of the output after standing still: their number, the time of the first one (s) and their median size."""
+
+    kind = "stick_slip"
+    record: str
+    count: int
+    first: float
+    size: float
+
+    def sentence(self, unit: str | None) -> str:
+        jumps = f"{counted(self.count, 'jump')} of about {self.size:.3g}{_unit(unit)}"
+        return f"{self.record}: stick-slip, {jumps} after standing still, the first at {self.first:.6g} s"
+
+
+# The remaining error -----------------------------------------------------------------------------------------
+
+VARIABLE_NAMES = {
+    "drive": "the drive", "rate": "the drive rate", "displacement": "the displacement", "memory": "the memory",
+    "loop centre": "the loop's centre", "session time": "the session time",
+    "time in the record": "the time in the record", "travel": "the distance travelled",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Structure(Finding):
+    """An error that is not noise and that no effect removes.
+
+    `share_by_variable`: of its variance, by smooth functions of one variable on samples that they have not seen, and
+    `main_variable` the one with most, None where none matters; `rate_free`, `repeatable`: None where the records cannot
+    show it; `even_share`: of what goes with drive and direction, the part that is even about the middle of the range;
+    `held_out_alone`: held-out records that have it where the fitted ones do not.
+    """
+
+    kind = "structure"
+    rms: float
+    above_floor: float | None
+    main_variable: str | None
+    share_by_variable: Mapping[str, float]
+    rate_free: bool | None
+    repeatable: bool | None
+    repeatable_share: float | None
+    even_share: float | None
+    held_out_alone: tuple[str, ...]
+
+    def sentence(self, unit: str | None) -> str:
+        times = f", {self.above_floor:.3g} times the noise" if self.above_floor else ""
+        return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
+
+    def words(self) -> str:
+        """What it depends on, a predicate."""
+        parts = []
+        if self.main_variable:
+            share = 100.0 * self.share_by_variable[self.main_variable]
+            parts.append(f"goes mostly with {VARIABLE_NAMES[self.main_variable]} ({share:.0f} % of its variance)")
+        else:
+            parts.append("goes with none of drive, rate, displacement, memory, loop centre, time and travel alone")
+        if self.rate_free is not None:
+            parts.append("does not depend on the rate" if self.rate_free else "depends on the rate")
+        if self.repeatable is not None:
+            returns = "comes back when the drive repeats itself"
+            parts.append(returns if self.repeatable else "does not come back when the drive does")
+        if self.even_share is not None:
+            odd = EVEN[0] > self.even_share
+            parity = "even" if self.even_share > EVEN[1] else "odd" if odd else "neither even nor odd"
+            parts.append(f"is {parity} about the middle of the drive")
+        return ", ".join(parts[:-1]) + " and " + parts[-1] if len(parts) > 1 else parts[0]
+
+    def advice(self) -> list[str]:
+        advice = []
+        if self.held_out_alone:  # never fitted, so that an effect they alone show cannot be found
+            alone = several(self.held_out_alone)
+            advice.append(f"fit {alone} too and hold out others: what is left shows in held-out records alone")
+        if self.rate_free is None:
+            advice.append(
+                "record the same loops at two rates a decade apart: that tells whether what is left is rate-free"
+            )
+        if self.repeatable is None:
+            advice.append("repeat a record ten times: that tells what of the rest comes back and what is noise")
+        return advice
+
+
+EVEN = 0.3, 0.7
+"""Even shares of odd and of even errors, in words."""
+
+
+# Words -------------------------------------------------------------------------------------------------------
+
+FAULTS = (SwappedChannels, Saturated, DropOuts, HeldSamples, IsolatedSamples, OtherHistory)
+"""The order in which faults are listed."""
+
+
+def faults(findings: Sequence[Finding]) -> str:
+    """The kinds of faults with their counts, in a few words; empty without any."""
+    parts = []
+    for fault in FAULTS:
+        found = [each for each in findings if isinstance(each, fault)]
+        if not found:
+            continue
+        number = sum(each.times for each in found)
+        plural = "stretches" if fault.noun == "stretch" and number != 1 else None
+        parts.append(f"{f'{number} {plural}' if plural else counted(number, fault.noun)}{fault.qualifier}")
+    return ", ".join(parts)
+
+
+def several(names: Sequence[str]) -> str:
+    """Names of records, in short where there are more than three."""
+    return ", ".join(names) if len(names) <= 3 else f"{len(names)} records ({names[0]}, {names[1]}, ..)"
+
+
+def _unit(unit: str | None) -> str:
+    return f" {unit}" if unit else ""
+
+
+def _first(first: float | None) -> str:
+    return "" if first is None else f", the first at {first:.6g} s"
+
+
+def _taken_out(repaired: bool) -> str:
+    return "; taken out of the records before effects were sought" if repaired else ""

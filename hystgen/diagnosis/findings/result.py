@@ -1,0 +1,254 @@
+"""The result of a diagnosis: typed, as `diagnosis.json`, in a sentence, and written into a folder."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.findings import kinds
+from hystgen.diagnosis.findings.kinds import Fault, Finding, Structure
+from hystgen.diagnosis.search import acceptance
+
+if TYPE_CHECKING:
+    from hystgen.parameters.files import Parameters
+
+Array = NDArray[np.float64]
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class Errors:
+    """rms errors over fitted and held-out records, output units."""
+
+    fit: float
+    holdout: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Errors of the model as given, of the same model refitted, and of the one with the effects."""
+
+    as_given: Errors
+    refitted: Errors
+    after: Errors
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that was found: `parameters` as its entry of a parameter file has them, `intervals` of 95 % for them.
+
+    `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units.
+    """
+
+    name: str
+    parameters: Mapping[str, Any]
+    intervals: Mapping[str, Any]
+    share_of_gap: float
+    holdout_before: float
+    holdout_after: float
+    p_value: float
+    evidence: str
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a record where the refitted model does badly: from and to (s), and the rms error there."""
+
+    record: str
+    kind: str
+    interval: tuple[float, float]
+    rms: float
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A shape of an effect that was fitted to the end, with its rms errors."""
+
+    name: str
+    shape: str
+    fit: float
+    holdout: float
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Whether the static part of the written model has an inverse, and warnings about it."""
+
+    exists: bool
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Everything in `diagnosis.json`, under the names of its keys; numbers have eight digits."""
+
+    verdict: str
+    noise_floor: float
+    output_range: float
+    unit: str | None
+    gap: Gap
+    effects: tuple[NamedEffect, ...]
+    unexplained: tuple[Finding, ...]
+    where: tuple[Stretch, ...]
+    not_separable: tuple[tuple[str, str], ...]
+    advice: tuple[str, ...]
+    ranking: tuple[tuple[Contender, ...], ...]
+    inverse: Inverse
+
+
+@dataclass(frozen=True)
+class Signals:
+    """A record with the errors of the refitted model and of the one with the effects; NaN where not compared."""
+
+    name: str
+    held_out: bool
+    t: Array
+    v: Array
+    y: Array
+    before: Array
+    after: Array
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A finished diagnosis: its `result`, and `parameters` with the effects added.
+
+    `notes`: what was done to the records, one sentence each; `signals`: the records with their errors; `page`: makes
+    `report.html` of this and the text of the parameter file, None where no report is written.
+    """
+
+    result: Result
+    parameters: Parameters
+    notes: tuple[str, ...]
+    signals: tuple[Signals, ...] = field(compare=False)
+    page: Callable[[Diagnosis, str], str] | None = field(default=None, compare=False, repr=False)
+
+    FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """The result as `diagnosis.json` has it."""
+        content: dict[str, Any] = plain(self.result)
+        return {"hystgen": 1, **content}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about the inverse of the written model, one or two sentences each."""
+        return self.result.inverse.warnings
+
+    @property
+    def verdict(self) -> str:
+        """`nothing_missing`, `effects_found` or `unexplained`."""
+        return self.result.verdict
+
+    def sentence(self) -> str:
+        """The verdict in a sentence."""
+        result = self.result
+        gap, unit, seen = result.gap, result.unit, result.unexplained
+        before, after = (
+            f"{error:.4g}{' ' if unit else ''}{unit or ''}" for error in (gap.refitted.holdout, gap.after.holdout)
+        )
+        wrong = kinds.faults(seen)
+        but = f" The data have faults: {wrong}." if wrong else ""
+        structured = any(isinstance(each, Structure) for each in seen)
+        if self.verdict == "effects_found":
+            names = ", ".join(self._name(effect.name) for effect in result.effects)
+            more = ""
+            if result.noise_floor and structured:
+                times = gap.after.holdout / result.noise_floor
+                more = f", {times:.2g} times the noise and with structure"
+            return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}.{but}"
+        if self.verdict == "nothing_missing":
+            noise = f"the refitted model leaves {after} rms on held-out records, which is noise"
+            return f"Nothing is missing: {noise}.{but}"
+        missing = (
+            f"Something is missing that the catalogue does not hold or the records cannot show: {after} rms is left"
+        )
+        disturbing = [each for each in seen if not isinstance(each, Fault | Structure)]
+        if not disturbing:
+            return f"{missing}.{but}"
+        first = disturbing[0].sentence(unit)
+        more = f", and {len(disturbing) - 1} more below" if len(disturbing) > 1 else ""
+        share = max(getattr(each, "share", 1.0) for each in disturbing)
+        if share >= acceptance.MAIN_SHARE or not structured:
+            return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
+        return f"{missing}. The records are disturbed too: {first}{more}.{but}"
+
+    def not_emitted(self) -> str:
+        """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
+        from hystgen.basics.problems import UnsupportedEffectsError
+        from hystgen.emission.calls import emit_options
+        from hystgen.model import Model
+
+        try:
+            emit_options(Model(self.parameters))
+        except UnsupportedEffectsError as error:
+            return str(error)
+        return ""
+
+    def _name(self, name: str) -> str:
+        """An effect with those that cannot be separated from it."""
+        others = [other for one, other in self.result.not_separable if one == name]
+        return f"{name} (or {' or '.join(others)})" if others else name
+
+    def to_json(self) -> str:
+        """`diagnosis.json`."""
+        return json.dumps(self.content, indent=2, allow_nan=False) + "\n"
+
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write `diagnosis.json`, `report.html` and `params.yaml` into a folder, all or nothing; returns the paths.
+
+        Raises PlotError without matplotlib.
+        """
+        from hystgen.emission import files
+        from hystgen.parameters.files import dump_parameters
+
+        said = [f"Diagnosed by hystgen. {self.sentence()}", *(f"Warning: {text}" for text in self.warnings)]
+        text = dump_parameters(self.parameters, header="\n".join(said))
+        pages = [] if self.page is None else [self.page(self, text)]
+        names = self.FILES if pages else (self.FILES[0], self.FILES[2])
+        made = zip(names, (self.to_json(), *pages, text), strict=True)
+        return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
+
+
+def rounded(value: Value) -> Value:
+    """The value with eight digits in all its numbers, so that the same input gives the same text."""
+    return _rounded(value)  # type: ignore[no-any-return]
+
+
+def _rounded(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return type(value)(**{each.name: _rounded(getattr(value, each.name)) for each in fields(value)})
+    if isinstance(value, Mapping):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(map(_rounded, value))
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and math.isfinite(value):
+        return float(f"{value:.8g}")
+    return value
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON has it: mappings, lists, text and finite numbers, None for others."""
+    if isinstance(value, Finding):
+        return plain(value.entry())
+    if is_dataclass(value) and not isinstance(value, type):
+        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,252 @@
+"""A diagnosis from records to result: check the records, refit, clean, search, and extend the parameter file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics import arguments, threads
+from hystgen.diagnosis.data import channels, disturbances, preparing, starts
+from hystgen.diagnosis.data.disturbances import Cleaned
+from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.noise_floor import NoiseFloor, noise_floor
+from hystgen.diagnosis.data.preparing import Prepared
+from hystgen.diagnosis.findings import intervals
+from hystgen.diagnosis.findings.content import result_of
+from hystgen.diagnosis.findings.kinds import OtherHistory
+from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
+from hystgen.diagnosis.search import nominal, selection
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.screening import Records
+from hystgen.diagnosis.search.selection import Outcome
+from hystgen.effects.base import Place
+from hystgen.identification import P0_FLOOR, remarks, stage_content
+from hystgen.identification.fit import visited
+from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError
+from hystgen.identification.thresholds import rounded
+from hystgen.identification.weights import Weights
+from hystgen.records import Record, Source, read_records, several
+
+if TYPE_CHECKING:
+    from hystgen.cascade import Cascade
+    from hystgen.effects.base import Effect
+    from hystgen.parameters.files import Parameters
+
+Array = NDArray[np.float64]
+History = tuple[float, ...] | None
+
+STEPS = 120
+"""Fits of a diagnosis, about, for the progress bar."""
+
+
+def diagnose(
+    parameters: Any,
+    records: Source | Iterable[Source],
+    *,
+    holdout: Source | Iterable[Source] = (),
+    history: Sequence[float] | None = None,
+    rest: float = 0.0,
+    effects: Sequence[type[Effect]] = (),
+    columns: dict[str, str] | None = None,
+    sample_time: float | None = None,
+    delimiter: str | None = None,
+    progress: bool = False,
+) -> Diagnosis:
+    """Find what a nominal model is missing.
+
+    `parameters`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
+    waveforms that judge; without them, or where too little of them can be compared, every third record, or the end of
+    one, is held out. `history`: drive values visited before every record, ignored where the starts of the records
+    contradict it; `rest`: seconds of pause after them. `effects`: further effects that take part.
+
+    The nominal model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
+    weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance does
+    not explain. Raises RecordError, IdentificationError, ValueError.
+    """
+    from hystgen.basics.progress import Progress
+    from hystgen.effects import Effect
+    from hystgen.model import as_model
+
+    model = as_model(parameters)
+    given, unit = model.parameters.model.effects, model.parameters.units.output
+    fitted, others = several(records), several(holdout)
+    if not fitted:
+        raise ValueError("there is no record to fit")
+    arguments.number("rest", rest, "seconds", 0.0)
+    if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
+        raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
+    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
+    before = None if history is None else visited(history)
+    with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
+        first = nominal.as_given(model.cascade, given)
+        usable, odd = channels.checked(read, lambda record: nominal.predicted(record, *first, before))
+        to_fit, to_hold = (
+            [record for record in group if record is not None]
+            for group in (usable[: len(fitted)], usable[len(fitted) :])
+        )
+        task = _Task(
+            model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, effects, lambda: bar.tick(1)
+        )
+        done, wrong = task.with_history(before, unit)
+        found, made = selection.invertible(done.found, done.records, P0_FLOOR)
+        ready = done.cleaned.clean
+        extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
+        result = result_of(
+            unit,
+            ready,
+            done.noise,
+            found,
+            Errors(*(rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held))),
+            [*odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
+            done.records.one_loop,
+            _inverse(extended, made),
+        )
+    notes = [f"{record.name}: {note}" for record in read for note in record.notes]
+    notes += [*remarks.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
+    notes += done.cleaned.notes(unit)
+    return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
+
+
+@dataclass(frozen=True)
+class _Done:
+    """A finished search, with the records that it was over."""
+
+    cleaned: Cleaned
+    noise: NoiseFloor
+    records: Records
+    found: Outcome
+
+
+@dataclass(frozen=True)
+class _Task:
+    """The records and the nominal model of a diagnosis, to be searched with a history or without one."""
+
+    cascade: Cascade
+    given: Sequence[Effect]
+    to_fit: Sequence[Record]
+    held: Sequence[Record]
+    rest: float
+    user: Sequence[type[Effect]]
+    tick: Callable[[], None]
+
+    def with_history(self, history: History, unit: str | None) -> tuple[_Done, OtherHistory | None]:
+        """The search with the history, or without it where the records contradict it, which is then returned too."""
+        done = None
+        wrong = self._foreign(history)
+        if wrong is None:
+            done = self._searched(history)
+            wrong = starts.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
+        if wrong is not None or done is None:
+            try:
+                done = self._searched(None)
+            except IdentificationError as error:
+                assert wrong is not None
+                raise IdentificationError(f"{wrong.sentence(unit)}, and without it {error}") from None
+        return done, wrong
+
+    def _begun(self, history: History) -> tuple[Prepared, Callable[[Prepared], Fitted]]:
+        """The records as they are compared, and how the nominal model is refitted to such records."""
+        ready = preparing.prepare(self.to_fit, self.held, history, self.rest)
+        base, start = nominal.structure_of(self.cascade, self.given, ready)
+        weights = nominal.nominal_weights(self.cascade, base)
+        return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
+
+    def _foreign(self, history: History) -> OtherHistory | None:
+        """The finding about a history to which the model can be bent, and should not be."""
+        if history is None:
+            return None
+        ready, refit = self._begun(history)
+        try:
+            others, refit_others = self._begun(None)
+        except IdentificationError:  # everything that is compared depends on it
+            return None
+        return starts.bends(ready.to_fit, refit(ready), refit_others(others))
+
+    def _searched(self, history: History) -> _Done:
+        ready, refit = self._begun(history)
+        refitted = refit(ready)
+        cleaned = disturbances.taken_out(Cleaned(ready, ready), refitted, refit)
+        if cleaned.lines:
+            refitted = refit(cleaned.clean)
+        noise, records = self._records(cleaned.clean, refitted)
+        found = selection.select(records, refitted, cleaned.left_by)
+        if found.found and cleaned.left_by(found.fitted):  # beside the effects it can be seen as it is
+            cleaned = disturbances.taken_out(cleaned, found.fitted, partial(selection.again, found.fitted))
+            refitted = refit(cleaned.clean)
+            noise, records = self._records(cleaned.clean, refitted)
+            found = selection.select(records, refitted)
+        return _Done(cleaned, noise, records, found)
+
+    def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records]:
+        noise = noise_floor([*clean.to_fit, *clean.held])
+        return noise, Records.of(clean.to_fit, clean.held, refitted, noise.rms, self.user, self.tick)
+
+
+def _inverse(extended: Parameters, made: Weights) -> Inverse:
+    """Whether the static part of the written model has an inverse, and what the user should know about it."""
+    from hystgen.model import cascade_of
+
+    problems = cascade_of(extended).inverse_problems()
+    warnings = remarks.about_inverse(np.array(extended.model.pi.weights), made)
+    if problems and extended.model.pi.weights[0] > 0.0:
+        warnings = [*warnings, f"the model has no inverse: {'; '.join(problems)}"]
+    return Inverse(not problems, tuple(warnings))
+
+
+def _signals(ready: Prepared, found: Outcome) -> tuple[Signals, ...]:
+    made = []
+    for held_out, group in ((False, ready.to_fit), (True, ready.held)):
+        for item, before, after in zip(group, found.refitted.errors(group), found.fitted.errors(group), strict=True):
+            made.append(Signals(item.name, held_out, item.run.t, item.run.v, item.y, before, after))
+    return tuple(made)
+
+
+def _extended(
+    parameters: Parameters, cascade: Cascade, fitted: Fitted, ready: Prepared, user: Sequence[type[Effect]]
+) -> Parameters:
+    """The parameter file with the model refitted and the effects added; `cascade`: the nominal model.
+
+    Raises IdentificationError where nothing is left of it.
+    """
+    from hystgen.parameters.files import make_parameters
+
+    p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
+    p[p < DUST * float(np.sum(p))] = 0.0
+    if not np.any(p > 0.0):
+        raise IdentificationError(FALLS)
+    r = fitted.structure.thresholds
+    kept = (p > 0.0) | (r == 0.0)
+    actuator = fitted.actuator
+    if actuator.at(Place.PLAYS):  # an effect on the plays may refer to the largest threshold
+        kept[-1] = True
+    fewer = tuple(r[kept].tolist())
+    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # numbers of its own for every play
+        kept[:] = True
+    offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
+    plays: dict[str, Any] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}
+    start = cascade.pi.start
+    if np.any(start) and not cascade.stages and not actuator.stages:  # in front of plays they see the drive
+        plays["initial_state"] = np.interp(r[kept], cascade.pi.thresholds, start).tolist()
+    content = {
+        **parameters.model_dump(),
+        "input_range": list(parameters.input_range),
+        "model": {
+            "pi": plays,
+            "memoryless": [stage_content(stage) for stage in actuator.stages],
+            "output_offset": offset,
+            "effects": [{"name": effect.name, **intervals.entry(effect)} for effect in actuator.effects],
+        },
+    }
+    return make_parameters(content, user_effects=user)
+
+
+def _offset(fitted: Fitted, item: Item) -> float:
+    actuator = fitted.actuator
+    rows, constant = actuator.columns(item, fitted.weights)
+    predicted = actuator.compared(rows[0] + constant, item) + actuator.added(item)
+    return float(np.mean(item.y[item.compared] - predicted))

@@ -1,0 +1,1 @@
+"""The search for what the nominal model is missing."""

@@ -1,0 +1,545 @@
+"""Every number of a diagnosis that decides something: its unit, its reason, and the run that set it or would change it.
+
+The unit stands first, in brackets. `Set by` names the run that a number comes from; where none is recorded the reason
+says what the number is derived from or compared with, and `Changed by` names the run that would show it wrong. Runs:
+
+- blind: `make blind`, the cases of the report block, seeds from 0 (single 260, pair 80, none 200, foreign 100, poor 65,
+  snr 130); `blind none` is that kind alone;
+- tune: the same commands with `--block tune`, whose cases may be looked at;
+- disturbances, selection, diagnosis, thinning, faults: `pytest tests/test_NAME.py`.
+
+`python -m tests.threshold_mutants` doubles and halves every number and lists the tests that notice. Other modules read
+the numbers as attributes of this one, so that a number can be changed in one place.
+"""
+
+from __future__ import annotations
+
+import math
+
+# Noise -------------------------------------------------------------------------------------------------------
+
+NOISE = 1.25
+"""[times the noise floor] An error up to this is noise, whatever it depends on: the floor is an estimate from a part of
+the samples, which may miss slow noise. Changed by: blind none."""
+
+FAR_ABOVE_NOISE = 2.0
+"""[times the noise floor] An error above this is not noise, whatever it depends on; of records of one loop alone it
+supports no name, since a right name in a wrong shape leaves as much as a wrong name. Coloured noise stays below it.
+Changed by: blind none, blind poor."""
+
+STRUCTURE_SHARE = 0.15
+"""[share of the error's variance] An error of which one variable explains more than this on unseen samples is
+structured: more than `VARIABLE_SHARE`, so that what counts is reported too. Changed by: blind none."""
+
+
+def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
+    """Whether an rms error is no more than noise.
+
+    `share`: of its variance that depends on something known; without structure only `FAR_ABOVE_NOISE` speaks against
+    noise, since coloured noise exceeds its floor.
+    """
+    limit = NOISE if share > STRUCTURE_SHARE else FAR_ABOVE_NOISE
+    return bool(noise) and not error / noise > limit
+
+
+def apart(more: float, less: float) -> float:
+    """rms of what one error contains and a smaller one does not."""
+    return math.sqrt(max(more**2 - less**2, 0.0))
+
+
+def above_noise(removed: float) -> float:
+    """An error as a multiple of the noise, if it consists of noise and `removed` times as much of something else."""
+    return math.sqrt(1.0 + removed**2)
+
+
+# Whether an effect gets a name -------------------------------------------------------------------------------
+
+NAME_SHARE = 0.07
+"""[share of the refitted gap, rms] An effect removes at least this of held-out or of fitted records: what a right name
+in a wrong shape leaves to a second name is up to 0.05. Set by: tune single (seeds not recorded)."""
+
+NEARLY_ALL = 0.25
+"""[share of the error before it] Or it leaves at most this: beside a far larger effect `NAME_SHARE` is out of reach.
+Changed by: blind pair, selection."""
+
+FIRST_REMOVES = 0.6
+"""[times the remaining error or the noise, whichever is larger] The least that a first effect removes, and the least
+difference that counts between two effects. Changed by: blind none (false names), blind snr (missed ones)."""
+
+FURTHER_REMOVES = 1.0
+"""[the same] The least that a further effect removes: leftovers of a right name in a wrong shape were 0.7 to 0.98 in 4
+of 60 single cases, real second effects at least 1.2 in 120 cases. Set by: report block, single and pair (633f8e9)."""
+
+NEEDLESS = 0.3
+"""[times the noise] An earlier effect whose loss adds less than this is dropped: half of `FIRST_REMOVES`, so that an
+accepted effect is not dropped by chance. Changed by: blind pair."""
+
+P_SURE = 1e-3
+"""[probability] Largest p-value of the difference that an effect makes; tens of shapes are tried in a round, so a few
+per cent of effect-free cases would pass this test alone. Changed by: blind none."""
+
+P_REPEATED = 0.05
+"""[probability] The same on held-out records where fitted ones show it with `P_SURE`: the usual level of one test.
+Changed by: blind none."""
+
+P_DIFFERENT = 0.01
+"""[probability] Two effects whose difference is less likely by chance are separable. Changed by: blind pair."""
+
+BLOCK_MEMORIES = 2.0
+"""[correlation times] Length of the blocks that a test takes as independent: neighbours are then hardly correlated.
+Changed by: selection (coloured noise), blind none."""
+
+BLOCKS = 20
+"""[blocks] Least number of blocks of a record where its errors remember longer than that allows. Changed by:
+selection."""
+
+SEEN_IN_FIT = 0.25
+"""[times the remaining error or the noise] What an effect removes at least from the records its numbers are fitted to;
+an effect of held-out records alone may be another one's. Changed by: selection, blind pair."""
+
+ALIKE = 0.25
+"""[share of the held-out rms] Effects within this are not separable, unless chance explains it with less than
+`P_DIFFERENT`. Changed by: blind single (names right or among the alternatives)."""
+
+BETTER = 0.05
+"""[share of an error] An error lower by less than this is no reason for more numbers, for another effect in the place
+of an accepted one, or for following a shape further. Changed by: blind single, selection."""
+
+FAR_LESS = 0.5
+"""[share of an error] A fitted error at most this of another outweighs a small lead of that on held-out records, which
+yet another effect may rule. Changed by: selection."""
+
+EQUAL = 0.005
+"""[share of an error] Errors closer than this are equal, and the order of the catalogue decides: far above what the
+last steps of a search change. Changed by: selection."""
+
+MOST_OF_GAP = 0.5
+"""[share of the gap above the noise] Records of one loop support a name only where at most this is left, and leave open
+all names that leave at most this: two functions, up and down, show little more than whose shape is handier. Set by:
+report block, 180 cases of kind poor, 7 of which had a false second name without it (86e5f08)."""
+
+MOST_EFFECTS = 5
+"""[effects] Most effects that are added: no case of any block has more than two. Changed by: run time of blind."""
+
+MOST_RIVALS = 3
+"""[effects] Alternatives that are tried in place of the latest effect. Changed by: blind pair."""
+
+MOST_EXCHANGES = 4
+"""[exchanges] Most exchanges of an accepted effect in a round, so that two cannot replace each other for ever. Changed
+by: run time of blind."""
+
+HELD_OUT_ALONE = 3.0
+"""[times the fitted error] A held-out record with more than this shows something that no fitted one does. Changed by:
+diagnosis."""
+
+# How far a search goes ---------------------------------------------------------------------------------------
+
+SCREENED = 6_000
+"""[samples] Compared while all shapes are screened, fitted and held out each. Changed by: run time and names of
+blind."""
+
+SEARCHED = 12_000
+"""[samples] Fitted in later searches, and used where many variables are regressed together. Changed by: as before."""
+
+PLAYS = 32
+"""[plays] Thresholds of a fit: with half as many the steps between them leave up to 1.4 times the noise in effect-free
+records, with more no less. Set by: tune none (9f9a31e, seeds not recorded)."""
+
+FIRST_STEPS = 2
+"""[steps] Of a search from each start while shapes are screened. Changed by: blind single."""
+
+SCREENING_STEPS = 2
+"""[steps] Of a search from the best start, repeated while it still falls. Changed by: blind single."""
+
+FALLING = 0.8
+"""[share of the error] A search whose error falls below this within `SCREENING_STEPS` continues: the minimum of a light
+damping is too narrow for the first steps. Set by: tune single with resonance (47d9267, seeds not recorded)."""
+
+LONGER = 4
+"""[times] `SCREENING_STEPS` are repeated at most this often. Set by: as before."""
+
+TOO_FAR = 5.0
+"""[times the error of the best start] A start with more is not searched from: the best end was reached from up to 3.5
+(a limit of the output does nothing beyond the measured range). Set by: tune single (0f80f02, seeds not recorded)."""
+
+IDLE = 0.01
+"""[share of the error] A start that changes the error by less does nothing yet, and others go first: behind a large
+effect every start of the next may be worse than none. Changed by: blind pair."""
+
+COARSE = 1e-3
+"""[share of the error] A screening search ends with a step that lowers the error by less; ranks differ by per cents.
+Changed by: blind single."""
+
+POLISHED = 1e-5
+"""[share of the error] A final search ends with a step that lowers the error by less: far below `EQUAL`, the finest
+difference that decides anything. Derived."""
+
+KEPT = 5
+"""[shapes] Followed up after the screening, the best on held-out records. Changed by: blind single."""
+
+ALSO_KEPT = 2
+"""[shapes] And others that fit best. Changed by: blind single."""
+
+SHAPES_OF_ONE = 2
+"""[shapes] Most of one effect among those: the others go to other effects. Changed by: blind single."""
+
+TWIN = 0.02
+"""[share of the errors] An effect that leaves as much as one of those, fitted and held out, is followed too: which of a
+lag and a delay is cut off would be chance. Changed by: selection."""
+
+PROMISING = 2.0
+"""[times the error of the best shape] A shape that leaves more, fitted and held out, is not searched jointly. Changed
+by: blind pair."""
+
+JOINT_STEPS = 5
+"""[steps] Of a joint search before the shapes are compared again. Changed by: blind single."""
+
+HOPEFUL = 1.3
+"""[times the held-out error of the best shape] A shape that leaves more after those steps is not polished. Changed by:
+blind single."""
+
+RINGING_STARTS = 3
+"""[frequencies] At which the error rings, as starts for a resonance. Changed by: blind single with resonance."""
+
+BREAKS = 4
+"""[breaks] Of the dead-zone sum with which an asymmetry is sought. Changed by: blind single with asymmetry."""
+
+FINER_BREAKS = 8
+"""[breaks] Of the sum that is tried where that helps: each interval halved. Derived."""
+
+TANH_BEND, TANH_SIDE = 0.3, 2.0
+"""[1], [half ranges] Curvature and place of tanh envelopes as further starts: bent one way over the whole range.
+Changed by: blind single with asymmetry."""
+
+LIMITERS = (0.03, 0.1)
+"""[shares of the range] Depths at either end of limiters as starts. Changed by: blind single with saturation."""
+
+NOMINAL_RANGE = 3.0
+"""[factor] Numbers of the nominal model's effects are refitted up to this times as large and as small: farther off, the
+effect is a different one. Changed by: diagnosis."""
+
+SINGLE_FACTORS = 4
+"""[numbers] A longer list of numbers has one common factor: each of more would be a fit of its own. Changed by:
+diagnosis."""
+
+TOUCHING = 1e-6
+"""[of the slack] By this a nominal front may violate its constraints: ten digits of a file are rounded. Derived."""
+
+START_SPAN = 2.0
+"""[times the recorded drive range] The start state comes from a drive at most this wide: farther off its response would
+explain a drift. Changed by: diagnosis."""
+
+# What a front is called --------------------------------------------------------------------------------------
+
+LIMITER_STRAIGHT = 0.6
+"""[share of the range] A limiter has the middle slope over at least this. Changed by: diagnosis."""
+
+LIMITER_NEAR = 0.1
+"""[share of the range of slopes] A slope within this of the middle one is equal to it. Changed by: diagnosis."""
+
+LIMITER_SLOPE = 0.6
+"""[times the middle slope] A smaller slope at an end is a limit's alone. Changed by: diagnosis."""
+
+ODD_FRONT = 2.0
+"""[times] A front whose odd bend has more than this times the power of the even one saturates. Changed by:
+diagnosis."""
+
+# Which records are fitted and held out -----------------------------------------------------------------------
+
+COMPARED_SAMPLES = 100
+"""[samples] More than this are compared of a record that fits or judges: `BLOCKS` of five samples. Changed by:
+diagnosis."""
+
+SET_ASIDE = 0.3
+"""[share of a record] Its end, held out where no record can be: nearly the third that is taken of several records.
+Changed by: diagnosis."""
+
+FAST_RECORD = 0.5
+"""[share of the largest] A record is fast, or wide, from this rate, or swing, on. Changed by: diagnosis."""
+
+THIN_STEPS = 32
+"""[samples] Longest stretch without a needed sample, a power of two. Changed by: run time, thinning."""
+
+THIN_STRAIGHT = 0.3
+"""[times the noise] The prediction over a stretch is off a straight line by at most this, and the drive by what makes
+that much output. Changed by: thinning."""
+
+THIN_TURNING = 0.03
+"""[times the noise] The same at a turning point, which the plays remember: a tenth. Changed by: thinning."""
+
+THIN_RESIDUAL = 1.6
+"""[times the noise, rms] The same for the remaining error: white noise is off lines through itself by sqrt(1 + 2/3) =
+1.3, and noise of an unlucky stretch by a quarter more. Derived."""
+
+THIN_COLUMN = 0.01
+"""[share of its range, rms] The same for a further column. Changed by: thinning."""
+
+# Noise floor -------------------------------------------------------------------------------------------------
+
+HOLD_SAMPLES = 40
+"""[samples] Fewest of a hold that measures noise: its trend has four numbers, and 24 samples behind `HOLD_SETTLING`.
+Changed by: diagnosis."""
+
+HOLD_DRIVE = 2e-4
+"""[share of the drive range] The drive holds while it stays within this: three codes of a 14-bit converter. Changed by:
+diagnosis, disturbances."""
+
+HOLD_SETTLING = 0.4
+"""[share of a hold] Its beginning, which is left out: what still moves there is no noise. Changed by: diagnosis."""
+
+HOLD_WEIGHT = 50
+"""[times] A long hold counts at most this often. Changed by: blind none."""
+
+QUIET_HOLDS = 0.25
+"""[quantile of the variances] The holds that count: in others something may still ring or creep. Changed by: blind."""
+
+RING_DECAY = 0.9
+"""[1 a sample] A hold rings where its oscillation decays less. Changed by: diagnosis (holds that ring)."""
+
+RING_UNPREDICTED = 0.3
+"""[share of the variance] And two samples leave at most this of the next unpredicted. Changed by: the same."""
+
+PERIOD_REPEATS = 2e-3
+"""[share of the drive range, rms] Periods whose drives differ by less measure noise: the response to the difference
+adds as large a share of the output to it. Changed by: diagnosis."""
+
+# Faults of whole records and samples -------------------------------------------------------------------------
+
+SCALE_OF_ALL = 3.0
+"""[factor] An output of all records this far off the prediction is in other units, or of another actuator. Changed by:
+disturbances, blind foreign."""
+
+SCALE_OF_ONE = 1.7
+"""[factor] The same of one record against the others: an actuator's sensitivity changes less with amplitude and rate.
+Changed by: disturbances, blind foreign."""
+
+WIDE_DRIVE = 0.3
+"""[share of the widest drive] Only records with a wider drive show their scale. Changed by: disturbances."""
+
+OTHER_UNIT = 30.0
+"""[times the median width] A wider drive is in another unit, and no measure for the others: between the swing of small
+loops and a factor of 1000. Changed by: disturbances."""
+
+DEAD_SENSOR = 0.1
+"""[share of the expected spread] An output that moves less and does not follow the drive is dead. Changed by:
+disturbances."""
+
+FOLLOWS = 0.9
+"""[correlation] Least correlation with the prediction at which a scale means something. Changed by: disturbances."""
+
+FOREIGN_CORRELATION, OWN_CORRELATION = 0.95, 0.5
+"""[correlation] An output belongs to another record whose prediction it follows better than the first number, if it
+follows its own worse than the second. Changed by: disturbances, blind foreign."""
+
+LOOP_AREA = 0.3
+"""[share of the expected area] An output follows its drive if its loop has at least this, in the right sense. Changed
+by: disturbances."""
+
+LOOP_SIGMAS = 5.0
+"""[standard deviations] An area counts if it exceeds this times what white noise makes. Derived: one in a million."""
+
+OFF_LINE, ON_LINE = 6.0, 0.8
+"""[scatters], [share of the samples] Samples farther off a line do not count, unless they are more than the second
+number leaves. Changed by: disturbances."""
+
+RAIL_PASSED = 0.01
+"""[share of the output range] Another record may pass a converter's end by this: two records differ by an offset.
+Changed by: disturbances."""
+
+HISTORY_COSTS = 1.5
+"""[times the error] A history that raises the error of what does not depend on it by more has bent the model. Changed
+by: diagnosis, blind single (wrong histories)."""
+
+# Lines and ripples -------------------------------------------------------------------------------------------
+
+LINE_SHARE = 0.03
+"""[share of the error's variance] Of a line at least: smaller ones are not worth a sentence. Changed by:
+disturbances."""
+
+RULING_SHARE = 0.3
+"""[share of the error's variance] Of a line that is taken out before effects are sought, or that is in a few records
+alone: what a missing effect leaves may look like a weaker one. Changed by: disturbances, blind foreign."""
+
+LINE_HEIGHT = 30.0
+"""[times the median power around it] Of a line: the highest of 10000 bins of noise reaches 13. Changed by: blind
+none."""
+
+PEAK_HEIGHT = 10.0
+"""[the same] Of a line of the drive, and of ringing in averaged spectra, whose noise is lower. Changed by:
+disturbances."""
+
+DRIVE_LINE_SHARE = 1e-6
+"""[share of the drive's power] A peak of the drive with at least this is a line of its own: an amplitude of a
+thousandth. Changed by: disturbances."""
+
+CARRIER_SHARE = 0.5
+"""[share of the drive's power] A drive with this in one line makes harmonics, even if its swing changes. Changed by:
+disturbances."""
+
+HARMONICS = 10
+"""[harmonics] Of that line which the actuator answers with. Changed by: disturbances."""
+
+LINE_PERIODS = 8
+"""[periods] Fewest in a record for a line, and pitches in the travel: trends fill the bins below. Changed by:
+disturbances."""
+
+LINE_SAMPLES = 64
+"""[samples] Fewest of a record with a line or a period: eight for each of `LINE_PERIODS`. Derived."""
+
+SPECTRUM_SAMPLES = 256
+"""[samples] Fewest of a spectrum, and of a ripple: three surroundings of a peak. Changed by: disturbances."""
+
+SPECTRUM_PARTS = (8, 64)
+"""[parts of a record] Whose mean spectra show ringing that fades: of 0.4 to 3 % damping in steps of five seconds. Set
+by: disturbances (8380866)."""
+
+SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
+"""[bins] On either side of a peak, in the spectrum of a record and in those of its parts. Changed by: disturbances."""
+
+SAME_BINS = 1.5
+"""[bins] Lines closer than this are one: less than the two bins of half a Hann window's main lobe. Derived."""
+
+SAME_RINGING = 0.02
+"""[share of the frequency] Ringing closer than this is one start for a resonance. Changed by: blind single."""
+
+SAME_LINE = 0.05
+"""[share of the frequency or pitch] A line within this of a stronger one is its remainder. Changed by: disturbances."""
+
+MOST_LINES = 4
+"""[lines] That are sought: mains, two harmonics and a ripple. Changed by: blind foreign."""
+
+CRESTS = 5
+"""[bins] The highest of a spectrum that are examined, as many as `MOST_LINES` and one of the drive. Derived."""
+
+SEEN_IN = 0.4
+"""[share of the records that are long enough] A line is in at least this of them, unless it rules. Changed by:
+disturbances."""
+
+COMMON_SHARE = 0.6
+"""[share of the records, or of the passes] In which a line holds: most. Changed by: disturbances."""
+
+STEADY_SHARE = 0.5
+"""[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this of what the
+other half's own fit removes. Changed by: disturbances (ringing is no line)."""
+
+AMPLITUDE_SAMPLES = 2.2
+"""[samples a period] Below this the amplitude of a line cannot be seen. Derived: Nyquist's two, and a tenth."""
+
+MAINS_TOLERANCE = 0.002
+"""[share of the frequency] A line within this of the mains is hum: 0.1 Hz, twice the band to which the grid is held.
+Derived."""
+
+RIPPLE_RESOLVED = 0.25
+"""[pitches a sample] A sample shows a ripple if the position moves by less. Derived: four samples a period."""
+
+CONVERTER_STEP = 0.02
+"""[share of the pitch] A pitch within this of the smallest step of the output is the converter's. Changed by:
+disturbances."""
+
+PITCH_SAMPLES = 20_000
+"""[samples] From which a pitch is refined. Changed by: run time of disturbances."""
+
+POSITION_BINS = 4096
+"""[bins] Of the range, in which errors are averaged to find a pitch: pitches of a thousandth of it are found. Changed
+by: disturbances."""
+
+PITCHES = 3
+"""[pitches] The highest that are examined. Changed by: disturbances."""
+
+PASS_SAMPLES, PASS_PITCHES = 32, 3.0
+"""[samples], [pitches] Fewest of a pass up or down that confirms a ripple. Changed by: disturbances."""
+
+DRIVE_REPEATS = 0.01
+"""[share of the drive range, rms] A drive repeats itself where it differs by less from itself a period later: the noise
+of a measured drive is less. Changed by: disturbances."""
+
+DRIVE_AWAY = 0.25
+"""[share of the drive range, rms] A period begins once it differed by more. Changed by: disturbances."""
+
+# Stick-slip --------------------------------------------------------------------------------------------------
+
+SLIP_RESOLVED = 7.0
+"""[times the noise] Stretches over which the prediction moves by this are examined: noise then makes the output stand
+in one of a hundred. Derived."""
+
+SLIP_STRETCH = 0.5, 3.0
+"""[times that] Least and most motion of a stretch that counts. Changed by: disturbances."""
+
+SLIP_OFF = 0.6
+"""[share of the predicted motion] The output stands where it misses this of it, and leaps where it exceeds it by this.
+Changed by: disturbances."""
+
+SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
+"""[share of the stretches] In which the output stands, and leaps, at least. Changed by: disturbances, blind foreign."""
+
+SLIP_CONTINUES = 0.3
+"""[correlation] Largest of neighbouring stretches: a lag continues, a leap makes up for the standing before it. Changed
+by: disturbances (a lag is no stick-slip)."""
+
+SLIP_MOVING = 0.25
+"""[share of the upper quartile of moves] A drive that moves less stands. Changed by: disturbances."""
+
+SLIP_JUMPS = 5
+"""[jumps] Fewest of stick-slip; ten times as many samples, and five times as many stretches, have to move. Changed by:
+disturbances."""
+
+# What drives are like ----------------------------------------------------------------------------------------
+
+REVERSAL = 0.02
+"""[share of the drive range] A reversal is at least this large: above the noise of a measured drive. Changed by:
+disturbances."""
+
+LOOP_ENDS = 0.1
+"""[share of the drive range] Loops are one if their ends lie within this. Changed by: blind poor."""
+
+LOOP_SPEEDS = 1.5
+"""[ratio of times] And at one speed up to this. Changed by: blind poor."""
+
+LOOP_STANDS = 0.3
+"""[share of the time between turns] A drive that stands still longer holds. Changed by: disturbances."""
+
+# How the remaining error is described ------------------------------------------------------------------------
+
+MAIN_SHARE = 0.5
+"""[share of the error's variance] A disturbance with at least this is the subject of the verdict's sentence: most of
+it. Derived."""
+
+STRETCH_ABOVE_NOISE = 1.5
+"""[times the noise floor] A stretch with more is listed: it has a 24th of the samples of a record, and the rms of
+coloured noise over so few scatters more than over all. Changed by: blind none."""
+
+FAST_QUANTILE = 0.9
+"""[quantile of the rates] A stretch that is faster on average is fast. Changed by: disturbances."""
+
+RANGE_END, RANGE_END_SHARE = 0.1, 0.6
+"""[share of the drive range], [share of a stretch] A stretch that is mostly this near to the ends. Changed by:
+disturbances."""
+
+VARIABLE_SHARE = 0.1
+"""[share of the error's variance] A variable that explains less does not matter. Changed by: disturbances."""
+
+VARIABLE_BINS = 24
+"""[bins] Of a function of one variable. Changed by: disturbances."""
+
+FOLD_BLOCKS = 16
+"""[blocks] In which samples alternate between fit and test: longer than errors remember. Changed by: disturbances."""
+
+DESCRIBED_SAMPLES = 200
+"""[samples] Fewest that describe an error: eight a bin. Derived."""
+
+MEMORY_WINS = 1.25
+"""[times] Memory is reported in place of one variable if it explains more by this. Changed by: disturbances."""
+
+RATE_FREE_SHARE = 0.75
+"""[share] An error is rate-free if drive and memory explain this of what they explain with rates. Changed by:
+disturbances."""
+
+REPEATABLE_SHARE = 0.5
+"""[share of the error's variance] That returns with the drive, for an error to be repeatable: most. Derived."""
+
+PARITY_BINS, PARITY_SAMPLES = 20, 10
+"""[bins], [samples] Of the drive's range, and more than this in each, for the even share. Changed by: disturbances."""
+
+PARITY_SHARE = 0.05
+"""[share of the error's variance] The mean over drive and direction has at least this, or parity means nothing: half of
+`VARIABLE_SHARE`. Derived."""

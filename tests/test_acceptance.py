@@ -1,0 +1,1052 @@
+"""What lies on either side of the numbers in `acceptance`: each test has a case just below a number and one just above.
+
+`python -m tests.threshold_mutants` counts the numbers whose double and half some test notices.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import threshold_mutants
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import wilcoxon
+from test_diagnosis import STRUCTURE, result
+from test_disturbances import sweep
+from test_selection import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
+
+from hystgen.diagnosis import Diagnosis
+from hystgen.diagnosis.data import (
+    bad_samples,
+    channels,
+    disturbances,
+    drives,
+    lines,
+    periodic,
+    ripple,
+    spectra,
+    starts,
+    stick_slip,
+    thinning,
+)
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.data.noise_floor import noise_floor
+from hystgen.diagnosis.data.preparing import Prepared, prepare
+from hystgen.diagnosis.findings import content, residual, stretches
+from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
+from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
+from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.structure import Structure
+from hystgen.effects.base import Run
+from hystgen.effects.creep.model import ExponentialCreep
+from hystgen.front.dead_zone.model import DeadZone
+from hystgen.identification.fronts import Kept
+from hystgen.identification.reduction import settled
+from hystgen.identification.uncertainty import correlation_time
+from hystgen.records import Record
+
+Array = NDArray[np.float64]
+
+
+class TestTheModule:
+    def test_every_number_has_a_unit_a_reason_and_a_run(self) -> None:
+        texts = threshold_mutants.documented()
+        assert set(texts) == set(threshold_mutants.names())
+        for name, text in texts.items():
+            assert text.startswith("["), name
+            assert any(words in text for words in ("Set by:", "Changed by:", "Derived")), name
+
+    def test_every_number_is_read_somewhere(self) -> None:
+        sources = "".join(path.read_text() for path in (threshold_mutants.ROOT / "hystgen").rglob("*.py"))
+        inside = threshold_mutants.read_inside()
+        unread = [name for name in threshold_mutants.names() if f"acceptance.{name}" not in sources]
+        assert set(unread) <= inside
+
+    def test_only_the_known_ones_go_unnoticed(self) -> None:
+        assert set(threshold_mutants.UNNOTICED) <= set(threshold_mutants.names())
+
+    @pytest.mark.parametrize("name", ["NOISE", "FAR_ABOVE_NOISE", "P_SURE", "P_DIFFERENT"])
+    @pytest.mark.parametrize("factor", threshold_mutants.FACTORS)
+    def test_a_mutant_is_noticed(self, name: str, factor: float) -> None:
+        """The script itself, on tests of a moment."""
+        here = [f"tests/test_acceptance.py::{each}" for each in ("test_noise", "test_chance")]
+        assert threshold_mutants.noticed(name, factor, here)
+        assert not threshold_mutants.noticed(name, 1.0, here)
+
+
+@pytest.mark.parametrize(
+    ("error", "share", "noise"),
+    [(1.2, 0.2, True), (1.3, 0.2, False), (1.9, 0.1, True), (2.1, 0.1, False), (1.9, 0.16, False)],
+)
+def test_noise(error: float, share: float, noise: bool) -> None:
+    """Above the floor, structured or not."""
+    assert acceptance.is_noise(error, 1.0, share) is noise
+
+
+@pytest.mark.parametrize(
+    ("held_out", "fitted", "named"),
+    [(0.0015, 0.5, False), (0.0007, 0.5, True), (0.07, 1e-6, False), (0.04, 1e-6, True), (0.04, 0.0015, False)],
+)
+def test_chance(held_out: float, fitted: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The p-value of held-out records, or a larger one beside a small one of the fitted records."""
+    better = Made("better", 1, (0.5, 0.5))
+    best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
+    monkeypatch.setattr(merit, "difference", lambda _, after: held_out if after is best.errors else fitted)
+    assert (merit.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    for p_value, open_ in ((0.015, True), (0.007, False)):
+        monkeypatch.setattr(merit, "difference", lambda *_, p_value=p_value: p_value)
+        other: Any = SimpleNamespace(held_out=1.2, errors=[])
+        assert merit.alike(other, SimpleNamespace(held_out=1.0, errors=[]), 0.1) is open_  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("fitted", "named"), [(0.98, False), (0.95, True)])
+def test_an_effect_has_to_show_in_fitted_records(fitted: float, named: bool) -> None:
+    """It removes 0.2 or 0.33 of what it leaves of them."""
+    better = Made("better", 1, (fitted, 0.5))
+    best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
+    assert (merit.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("memory", [1, 30])
+def test_blocks_are_longer_than_errors_remember(memory: int) -> None:
+    """Against the test on blocks cut here: two correlation times long, or a twentieth of the record."""
+    random = np.random.default_rng(3)
+    before = np.sqrt(1.0 + np.repeat(random.uniform(0.0, 1.0, 600 // memory), memory) + random.uniform(0.0, 0.1, 600))
+    after = np.sqrt(1.3 + random.uniform(0.0, 0.1, 600))
+    gain = before**2 - after**2
+    size = min(round(2.0 * correlation_time(gain)), 600 // 20)
+    blocks = [np.mean(gain[k : k + size]) for k in range(0, 600 - size + 1, size)]
+    assert size == (2 if memory == 1 else 30)
+    expected = wilcoxon(blocks, alternative="greater").pvalue
+    assert merit.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize(("more", "first"), [(1.006, "lag"), (1.015, "delay")])
+def test_equal_effects_come_in_the_order_of_the_catalogue(more: float, first: str) -> None:
+    """Over all records one leaves 0.3 or 0.9 % more."""
+    assert first_of(Made("delay", 1, (1.0, 1.0)), Made("lag", 1, (more, 1.0))) == first
+
+
+class TestForwardSelection:
+    @pytest.fixture(autouse=True)
+    def _without_fits(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def without(now: Hypothesis, name: str, _: Any) -> Hypothesis:
+            return Hypothesis(now.world, now.names - {name})
+
+        monkeypatch.setattr(selection, "_without", without)
+        monkeypatch.setattr(selection, "_without_refit", without)
+        monkeypatch.setattr(selection.fits, "begun", lambda *_: SimpleNamespace(found=lambda _: self.now))
+        monkeypatch.setattr(selection.fits, "fit", lambda *_: self.now)
+
+    def test_no_more_than_five_effects(self) -> None:
+        """Six letters that help in their order, each as much as a further effect has to."""
+        every = [frozenset(each) for n in range(7) for each in itertools.combinations("abcdef", n)]
+        prefix = {each: next((k for k, name in enumerate("abcdef") if name not in each), 6) for each in every}
+        world = World({each: 0.68 ** prefix[each] for each in every}, "abcdef")
+        self.now: Any = Hypothesis(world, frozenset())
+        found = selection.select(world.records, self.now)
+        assert [each.name for each in found.found] == list("abcde")
+
+    @pytest.mark.parametrize(("without", "kept_names"), [(0.2, "b"), (0.4, "ab")])
+    def test_a_needless_effect_is_dropped(self, without: float, kept_names: str) -> None:
+        """Of times the noise that its loss adds."""
+        shares = {"ab": 0.02, "b": float(np.sqrt(0.02**2 + 2.0 * (without * NOISE) ** 2)), "a": 0.5}
+        world = World({frozenset(names): share for names, share in shares.items()}, "ab")
+        # noise that differs between the hypotheses would hide this difference
+        world.colour = lambda *_: np.zeros(2000)  # type: ignore[method-assign]
+        now: Any = Hypothesis(world, frozenset("ab"))
+        found = [selection.Found(name, name, 1.0, 0.5, 0.0, ()) for name in "ab"]
+        _, left, _ = selection._without_needless(now, found, world.records)
+        assert "".join(each.name for each in left) == kept_names
+
+    def test_three_rivals_are_tried(self) -> None:
+        """Five are alike; what comes next helps beside the last of them alone."""
+        left = {name: 0.5 + 0.001 * k for k, name in enumerate("abcde")}
+        tried: dict[str, list[str]] = {}
+        for good in "de":
+            shares = {**left, "x": 1.0, good + "x": 0.02}
+            world = World({frozenset(names): share for names, share in shares.items()}, "abcdex")
+            world.left |= {frozenset(a + b): left[a] for a, b in itertools.permutations("abcde", 2)}
+            self.now = Hypothesis(world, frozenset())
+            latest = selection._step(self.now, world.gap(self.now), world.records)
+            assert latest is not None
+            step = selection._Step(latest.best.fitted, latest.tried, latest.best, None)
+            pair = selection._with_rival(latest, step, world.gap(self.now), world.records)
+            tried[good] = [] if pair is None else [each.best.name for each in pair]
+        assert tried == {"d": ["d", "x"], "e": []}
+
+    def test_exchanges_end(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Where another one always seems better, after four."""
+        world = World({}, "ab")
+        now: Any = Hypothesis(world, frozenset("ab"))
+        seen: list[str] = []
+
+        def step(*_: Any) -> Any:
+            seen.append("asked")
+            return selection._Step(now, [], world.tried(now, "c"), merit.Merit(1.0, 1.0, 0.1, 0.0))
+
+        monkeypatch.setattr(selection, "_step", step)
+        monkeypatch.setattr(selection, "_gives_way", lambda *_: True)
+        monkeypatch.setattr(selection, "_found", lambda *_: selection.Found(f"n{len(seen)}", "", 1.0, 0.5, 0.0, ()))
+        monkeypatch.setattr(selection, "_without_needless", lambda now, found, _: (now, found, {}))
+        monkeypatch.setattr(selection, "_in_place", lambda _, found, *__: list(found))
+        found = [selection.Found(name, name, 1.0, 0.5, 0.0, ()) for name in "ab"]
+        selection._exchanged(now, found, {}, {"a", "b"}, world.records)
+        assert len(seen) == 4
+
+
+class Path:
+    """A search whose error is known after every step."""
+
+    def __init__(self, errors: Sequence[float], at: int = 0, log: list[tuple[int, float]] | None = None) -> None:
+        self.errors, self.at, self.log = errors, at, [] if log is None else log
+        self.now = SimpleNamespace(rms=errors[min(at, len(errors) - 1)])
+
+    def further(self, steps: int, little: float) -> Path:
+        self.log.append((steps, little))
+        return Path(self.errors, self.at + steps, self.log)
+
+    def found(self, _: Any) -> float:
+        return float(self.now.rms)
+
+
+def screened(monkeypatch: pytest.MonkeyPatch, *paths: Path) -> float:
+    """The error at the end of a screening that begins at several starts, the error without the effect being 1."""
+    waiting = list(paths)
+    monkeypatch.setattr(fits, "begun", lambda *_: waiting.pop(0))
+    option: Any = SimpleNamespace(front=True, starts=range(len(paths)), grown=None, name="lag", alone=None)
+    rough: Any = SimpleNamespace(errors=lambda _: [np.ones(10)], weights=None)
+    searches = screening._Searches(None, rough, [], SimpleNamespace(thin=None))  # type: ignore[arg-type]
+    return searches._screen(option, None)  # type: ignore[return-value]
+
+
+class TestScreening:
+    @pytest.mark.parametrize(("factor", "calls"), [(0.75, 5), (0.85, 2)])
+    def test_a_search_that_falls_goes_on(self, factor: float, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Four times two steps behind the first two, or two in all."""
+        path = Path([0.5 * factor ** (k / 2.0) for k in range(40)])
+        screened(monkeypatch, path)
+        assert len(path.log) == calls
+        assert sum(steps for steps, _ in path.log) == 2 * calls
+
+    @pytest.mark.parametrize(("start", "reached"), [(4.5, True), (5.5, False)])
+    def test_a_start_far_off_is_left(self, start: float, reached: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        """The best end is on its way."""
+        far, near = Path([0.1 * start, 0.01]), Path([0.1])
+        assert (screened(monkeypatch, near, far) == 0.01) is reached
+
+    @pytest.mark.parametrize(("change", "acts"), [(0.015, True), (0.007, False)])
+    def test_a_start_that_does_nothing_waits(self, change: float, acts: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Another one is worse than none at first; the idle one counts where it changes the error."""
+        idle, busy = Path([1.0 - change, 1.0 - change, 1.0 - change]), Path([1.5, 1.45, 1.4, 0.3])
+        assert (screened(monkeypatch, idle, busy) == 0.3) is not acts
+
+    @pytest.mark.parametrize(("left", "fitted", "joined"), [(1.9, 3.0, True), (3.0, 1.9, True), (2.1, 2.1, False)])
+    def test_what_promises_nothing_is_not_searched_jointly(self, left: float, fitted: float, joined: bool) -> None:
+        steps = _followed([(1.0, 1.0), (left, fitted)], [1.0, 1.0])
+        assert (steps[0][0], steps[1][0]) == (5, 5 if joined else 0)
+
+    @pytest.mark.parametrize(("left", "polished"), [(1.2, True), (1.4, False)])
+    def test_what_is_behind_after_a_few_steps_is_not_polished(self, left: float, polished: bool) -> None:
+        assert (len(_followed([(1.0, 1.0), (1.0, 1.0)], [1.0, left])[1]) == 2) is polished
+
+    @pytest.mark.parametrize(("name", "number"), [("lag", 2), ("other", 3)])
+    def test_no_more_than_two_shapes_of_an_effect(self, name: str, number: int) -> None:
+        def one(name: str, held_out: float) -> Any:
+            option = SimpleNamespace(name=name, label=str(held_out))
+            return SimpleNamespace(option=option, residual=held_out, fitted=SimpleNamespace(rms=held_out))
+
+        tried = [one("lag", 0.1), one("lag", 0.2), one(name, 0.3)]
+        assert len(screening._kept(tried, [])) == number
+
+    @pytest.mark.parametrize(("apart", "follows"), [(0.015, True), (0.025, False)])
+    def test_a_twin_follows(self, apart: float, follows: bool) -> None:
+        def one(name: str, error: float) -> Any:
+            option = SimpleNamespace(name=name, label=name)
+            return SimpleNamespace(option=option, residual=error, fitted=SimpleNamespace(rms=error))
+
+        tried = [one(name, 1.0) for name in "abcdefg"] + [one("twin", 1.0 + apart)]
+        names = [each.option.name for each in screening._kept(tried, tried)]
+        assert ("twin" in names) is follows
+
+
+def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> dict[int, list[int]]:
+    """Steps that each option gets; `screen`: its held-out and fitted error, `joint`: its held-out error after that."""
+    steps: dict[int, list[int]] = {k: [] for k in range(len(screen))}
+
+    class Crew:
+        def each(self, tasks: Sequence[Any], _: Any) -> Any:
+            for task in tasks:
+                steps[task.k].append(task.steps)
+                yield task, screening._Numbers(np.zeros(0), np.zeros(0), 2.0, joint[task.k])
+
+    option: Any = SimpleNamespace(
+        joined=lambda *_: np.zeros(0), structure=SimpleNamespace(start=()), alone=SimpleNamespace(start=()), starts=()
+    )
+    kept_ones: Any = [
+        SimpleNamespace(k=k, residual=left, fitted=SimpleNamespace(rms=fitted, shape=None))
+        for k, (left, fitted) in enumerate(screen)
+    ]
+    pairs = [screening._Pair(option, option) for _ in screen]
+    now: Any = SimpleNamespace(rms=1.0, weights=None)
+    searches = screening._Searches(now, now, pairs, SimpleNamespace(tick=None, held=[]))  # type: ignore[arg-type]
+    screening._followed_up(searches, kept_ones, Crew())  # type: ignore[arg-type]
+    return steps
+
+
+def sine(samples: int, seed: int = 0) -> Item:
+    t = np.arange(samples) * 1e-3
+    v = 50.0 - 50.0 * np.cos(2.0 * np.pi * t)
+    y = 0.1 * v + np.random.default_rng(seed).normal(0.0, 0.01, samples)
+    return Item(f"r{seed}", Run(t, v), y, (0.0,), 10.0)
+
+
+def test_samples_of_a_search() -> None:
+    """Every n-th of 30000 is compared: no more than a number, and more than half of it."""
+    items = [sine(30_000, seed) for seed in range(2)]
+    refitted = Fitted(Structure(np.array([0.0, 10.0]), Kept()), np.empty(0), np.array([0.1, 0.0]), 0.01)
+    records = screening.Records.of(items[:1], items[1:], refitted, 0.01)
+    assert 3_000 < np.count_nonzero(records.thin[0].known) <= 6_000
+    assert 3_000 < np.count_nonzero(records.thin_held[0].known) <= 6_000
+    assert 6_000 < np.count_nonzero(records.quick[0].known) <= 12_000
+
+
+def test_plays_of_a_fit() -> None:
+    """Fine enough that their steps leave less than the noise, and no finer."""
+    records = [Record(f"r{k}", sine(4000, k).run.t, sine(4000, k).run.v, sine(4000, k).y) for k in range(2)]
+    assert 25 <= len(prepare(records[:1], records[1:], (0.0,), 0.0).thresholds) <= 40
+
+
+class TestNominal:
+    effect = ExponentialCreep(name="creep", time_constants=(0.1, 1.0, 10.0, 100.0), weights=(0.02,) * 4)
+
+    def test_numbers_move_by_up_to_a_factor(self) -> None:
+        low, high = np.exp(nominal._near(self.effect).low), np.exp(nominal._near(self.effect).high)
+        assert np.all((low > 0.2) & (low < 0.5))
+        assert np.all((high > 2.0) & (high < 5.0))
+
+    @pytest.mark.parametrize(("number", "factors"), [(4, 8), (5, 2)])
+    def test_long_lists_have_one_factor(self, number: int, factors: int) -> None:
+        effect = ExponentialCreep(
+            name="creep", time_constants=tuple(10.0**k for k in range(number)), weights=(0.02,) * number
+        )
+        assert len(nominal._near(effect).start) == factors
+
+    @pytest.mark.parametrize(("excess", "kept_as_it_is"), [(0.7e-6, False), (1.5e-6, True)])
+    def test_a_front_at_its_limit_is_refitted(self, excess: float, kept_as_it_is: bool) -> None:
+        family, shape = nominal.front_of([DeadZone((-1.0, 0.0, 1.0), (0.5, 1.0, 0.5))], (-2.0, 2.0))
+
+        class Tight(type(family)):  # type: ignore[misc]
+            def slack(self, _: Array) -> Array:
+                return np.array([-excess])
+
+        assert nominal._inside(Tight(family.drive, family.breaks), shape) is not kept_as_it_is
+
+
+def bent(*slopes: tuple[float, float]) -> Any:
+    """A curve of straight pieces: the share of the range of each, and its slope."""
+    ends = np.concatenate([[0.0], np.cumsum([100.0 * share for share, _ in slopes])])
+    values = np.concatenate([[0.0], np.cumsum([100.0 * share * slope for share, slope in slopes])])
+    return lambda v: np.interp(v, ends, values)
+
+
+def curved(odd: float, even: float) -> Any:
+    """A smooth curve with an odd and an even bend."""
+    return lambda v: v - 50.0 * odd * (v / 50.0 - 1.0) ** 3 + 50.0 * even * (v / 50.0 - 1.0) ** 2
+
+
+BOTH_NAMES = "saturation", "asymmetry"
+
+
+@pytest.mark.parametrize(
+    ("curve", "names"),
+    [
+        (bent((0.65, 1.0), (0.35, 0.3)), BOTH_NAMES[:1]),
+        (bent((0.27, 0.9), (0.46, 1.0), (0.27, 0.3)), BOTH_NAMES[1:]),  # not straight over most of the range
+        # 0.07 is more than a tenth of the slopes' range
+        (bent((0.25, 1.0), (0.25, 1.07), (0.25, 1.0), (0.25, 0.5)), BOTH_NAMES[1:]),
+        (bent((0.2, 0.97), (0.55, 1.0), (0.25, 0.5)), BOTH_NAMES[:1]),
+        (bent((0.8, 1.0), (0.2, 0.5)), BOTH_NAMES[:1]),
+        (bent((0.8, 1.0), (0.2, 0.7)), BOTH_NAMES),
+        (curved(0.2, 0.0617), BOTH_NAMES[:1]),  # the odd bend has 2.7 times the power of the even one
+        (curved(0.2, 0.0828), BOTH_NAMES[1:]),  # 1.5 times
+    ],
+)
+def test_what_a_front_is_called(curve: Any, names: tuple[str, ...]) -> None:
+    front: Any = SimpleNamespace(stages=lambda _: [SimpleNamespace(forward=curve)])
+    assert options.front_names(front, np.empty(0), (0.0, 100.0)) == names
+
+
+def test_what_limits_the_start_of_an_effect() -> None:
+    """Its start state comes from a drive of at most twice the range."""
+    effect = ExponentialCreep(name="creep", time_constants=(1.0,), weights=(0.1,))
+    item = sine(2000)
+    item = Item("r", item.run, item.y, None, 10.0)
+    actuator = Actuator(np.array([0.0]), (), (effect,))
+    responses = actuator.largest(item, np.array([0.1]))[1:]
+    assert np.allclose(responses, 2.0 * 0.1 * item.run.drive_range * effect.largest(item.run))
+
+
+# Thinning and the noise floor --------------------------------------------------------------------------------
+
+
+def needed(v: Array, y: Array, noise: float, column: Array | None = None) -> NDArray[np.bool_]:
+    """Samples that are needed of a record that a model predicts exactly."""
+    run = Run(np.arange(len(v)) * 1e-3, v, {} if column is None else {"temperature": column})
+    return thinning.needed([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
+
+
+class TestThinning:
+    v = np.linspace(0.0, 100.0, 65)
+
+    @pytest.mark.parametrize(("height", "seen"), [(0.25, False), (0.35, True)])
+    def test_a_bump_of_the_prediction(self, height: float, seen: bool) -> None:
+        """Of times the noise, over a straight drive."""
+        bump = np.interp(np.arange(65), [8, 16, 24], [0.0, height * 0.01, 0.0])
+        assert needed(self.v, 0.1 * self.v + bump, 0.01)[16] == seen
+
+    @pytest.mark.parametrize(("noise", "seen"), [(11.0, True), (16.5, False)])
+    def test_a_small_turn_of_the_drive(self, noise: float, seen: bool) -> None:
+        """0.4 in the output, which is 0.036 or 0.024 times the noise."""
+        v = self.v.copy()
+        v[16] += 4.0
+        assert needed(v, 0.1 * v, noise)[16] == seen
+
+    @pytest.mark.parametrize(("rms", "seen"), [(0.007, False), (0.014, True)])
+    def test_a_column_that_jitters(self, rms: float, seen: bool) -> None:
+        """Of its range, in every other sample."""
+        column = self.v / 100.0
+        column[1::2] += np.sqrt(2.0) * rms
+        assert (np.count_nonzero(needed(self.v, 0.1 * self.v, 0.01, column)) > 60) == seen
+
+    @pytest.mark.parametrize(("rms", "seen"), [(1.3, False), (2.0, True)])
+    def test_what_is_not_predicted(self, rms: float, seen: bool) -> None:
+        """Of times the noise, about a line."""
+        left = np.zeros(65)
+        left[1::2] = np.sqrt(2.0) * rms * 0.01
+        item = Item("r", Run(np.arange(65) * 1e-3, self.v), 0.1 * self.v + left, None, 10.0)
+        (mask,) = thinning.needed([item], [left], 0.01)
+        assert (np.count_nonzero(mask) > 60) == seen
+
+    def test_the_longest_stretch(self) -> None:
+        """No sample is needed over 32 of a straight drive."""
+        v = np.linspace(0.0, 100.0, 513)
+        assert np.diff(np.flatnonzero(needed(v, 0.1 * v, 0.01))).max() == 32
+
+
+def steps(lengths: Sequence[int], sigmas: Sequence[float], seed: int = 0) -> Item:
+    """Holds at two levels in turn, with white noise of their own."""
+    random = np.random.default_rng(seed)
+    v = np.repeat(np.resize([0.0, 100.0], len(lengths)), lengths).astype(np.float64)
+    y = 0.1 * v + np.concatenate([random.normal(0.0, s, n) for n, s in zip(lengths, sigmas, strict=True)])
+    return Item("steps", Run(np.arange(len(v)) * 1e-3, v), y, None, 10.0)
+
+
+def coloured(b: float, a: float, samples: int) -> Item:
+    """A hold with an oscillation that white noise keeps alive."""
+    e = np.random.default_rng(2).normal(0.0, 0.01, samples)
+    item = steps([30, samples], [0.0, 0.0])
+    return replace(item, y=item.y + np.concatenate([np.zeros(30), lfilter([1.0], [1.0, -a, b], e)]))
+
+
+class TestNoiseFloor:
+    @pytest.mark.parametrize(("samples", "measured"), [(50, True), (30, False)])
+    def test_length_of_a_hold(self, samples: int, measured: bool) -> None:
+        assert (noise_floor([steps([samples] * 20, [0.01] * 20)]).holds is not None) is measured
+
+    @pytest.mark.parametrize(("jitter", "measured"), [(0.015, True), (0.03, False)])
+    def test_jitter_of_the_drive(self, jitter: float, measured: bool) -> None:
+        """Steps of a hold, of a range of 100."""
+        item = steps([60] * 20, [0.01] * 20)
+        v = item.run.v + jitter * (np.arange(len(item.run.v)) % 2)
+        assert (noise_floor([replace(item, run=Run(item.run.t, v))]).holds is not None) is measured
+
+    def test_settling_is_no_noise(self) -> None:
+        item = steps([80] * 20, [0.01] * 20)
+        y = item.y + np.where(np.arange(len(item.y)) % 80 < 28, 1.0, 0.0) * np.sin(np.arange(len(item.y)))
+        assert noise_floor([replace(item, y=y)]).holds == pytest.approx(0.01, rel=0.2)
+
+    @pytest.mark.parametrize(("quiet", "noise"), [(6, 0.01), (4, 0.1)])
+    def test_quiet_holds_count(self, quiet: int, noise: float) -> None:
+        """Of twenty, a little more or less than a quarter."""
+        item = steps([400] * 20, [0.01] * quiet + [0.1] * (20 - quiet))
+        assert noise_floor([item]).holds == pytest.approx(noise, rel=0.2)
+
+    @pytest.mark.parametrize(("quiet", "noise"), [(30, 0.01), (12, 0.1)])
+    def test_a_long_hold_counts_as_fifty(self, quiet: int, noise: float) -> None:
+        item = steps([41] * quiet + [8000], [0.01] * quiet + [0.1])
+        assert noise_floor([item]).holds == pytest.approx(noise, rel=0.4)
+
+    @pytest.mark.parametrize(
+        ("b", "a", "samples", "rings"),
+        [
+            (0.49, 2.0 * 0.7 * np.cos(0.32), 4000, False),  # decays by 0.7 a sample
+            (0.95**2, 2.0 * 0.95 * np.cos(0.32), 4000, True),
+            (0.846, 0.0, 20_000, True),  # 0.28 of the variance is not predicted
+            (0.825, 0.0, 20_000, False),  # 0.32
+        ],
+    )
+    def test_a_hold_that_rings(self, b: float, a: float, samples: int, rings: bool) -> None:
+        assert (noise_floor([coloured(b, a, samples)]).holds is None) is rings
+
+    @pytest.mark.parametrize(("jitter", "measured"), [(0.1, True), (0.2, False)])
+    def test_periods_of_a_jittering_drive(self, jitter: float, measured: bool) -> None:
+        """1.4e-3 or 2.8e-3 of the range, rms between periods."""
+        random = np.random.default_rng(5)
+        turns = np.concatenate([[0.0, 100.0], random.uniform(0.0, 100.0, 18)])
+        item = sine(5000)
+        v = np.tile(np.interp(np.arange(1000), np.arange(21) * 50, [*turns, 0.0]), 5) + random.normal(0.0, jitter, 5000)
+        assert (noise_floor([replace(item, run=Run(item.run.t, v))]).periods is not None) is measured
+
+
+# Whole records -----------------------------------------------------------------------------------------------
+
+
+def smooth(seed: int, samples: int = 2000) -> Array:
+    """A random drive of unit variance and zero mean without noise."""
+    decay = float(np.exp(-1.0 / 20.0))
+    x = lfilter([1.0], [1.0, -2.0 * decay, decay**2], np.random.default_rng(seed).normal(size=samples + 200))[200:]
+    return np.asarray((x - np.mean(x)) / np.std(x))
+
+
+def late(record: Record) -> Array:
+    """What a model with a small lag predicts."""
+    return np.asarray(lfilter([0.5], [1.0, -0.5], record.v, zi=[0.5 * record.v[0]])[0])
+
+
+def record(name: str, v: Array, y: Array) -> Record:
+    return Record(name, np.arange(len(v)) * 1e-3, v, y)
+
+
+def straight(record: Record) -> Array:
+    """What a model without a loop predicts."""
+    return np.asarray(0.1 * record.v)
+
+
+def good(width: float = 100.0) -> list[Record]:
+    return [record(f"good{k}", width * smooth(k), 0.1 * width * smooth(k)) for k in range(3)]
+
+
+def kinds_of(records: Sequence[Record], predict: channels.Predict = straight) -> list[tuple[str, str]]:
+    return [(each.kind, str(each.entry()["record"])) for each in channels.checked(records, predict)[1]]
+
+
+class TestWholeRecords:
+    @pytest.mark.parametrize(("factor", "seen"), [(2.5, False), (3.5, True)])
+    def test_other_units_of_all(self, factor: float, seen: bool) -> None:
+        given = [replace(each, y=factor * np.asarray(each.y)) for each in good()]
+        assert kinds_of(given) == [("scale", "all")] * seen
+
+    @pytest.mark.parametrize(("width", "seen"), [(40.0, True), (20.0, False)])
+    def test_a_narrow_record_shows_no_scale(self, width: float, seen: bool) -> None:
+        v = np.clip(smooth(0), -1.0, 1.0)
+        wide = [record(f"wide{k}", 100.0 * v, 10.0 * v) for k in range(3)]
+        assert kinds_of([*wide, record("odd", width * v, 0.2 * width * v)]) == [("scale", "odd")] * seen
+
+    @pytest.mark.parametrize(("times", "seen"), [(25.0, False), (35.0, True)])
+    def test_a_drive_in_another_unit_is_no_measure(self, times: float, seen: bool) -> None:
+        """Beside it the other drives would all be narrow."""
+        v = np.clip(smooth(0), -1.0, 1.0)
+        given = [record("a", v, 0.1 * v), record("b", v, 0.1 * v), record("odd", v, 0.2 * v)]
+        assert kinds_of([*given, record("wide", times * v, 0.1 * times * v)]) == [("scale", "odd")] * seen
+
+    @pytest.mark.parametrize(("share", "seen"), [(0.07, True), (0.14, False)])
+    def test_a_dead_sensor(self, share: float, seen: bool) -> None:
+        dead = record("dead", 100.0 * smooth(7), share * 10.0 * smooth(8))
+        assert kinds_of([*good(), dead]) == [("scale", "dead")] * seen
+
+    @pytest.mark.parametrize(("correlation", "seen"), [(0.85, False), (0.95, True)])
+    def test_an_output_that_hardly_follows_shows_no_scale(self, correlation: float, seen: bool) -> None:
+        v, other = smooth(7), _orthogonal(smooth(8), smooth(7))
+        y = 2.0 * 10.0 * (v + np.sqrt(1.0 / correlation**2 - 1.0) * other)
+        assert kinds_of([*good(), record("loose", 100.0 * v, y)]) == [("scale", "loose")] * seen
+
+    @pytest.mark.parametrize(
+        ("foreign", "own", "seen"), [(0.97, 0.0, True), (0.93, 0.0, False), (1.0, 0.45, True), (1.0, 0.55, False)]
+    )
+    def test_the_output_of_another_record(self, foreign: float, own: float, seen: bool) -> None:
+        """Correlations with the other's prediction and with its own."""
+        other = smooth(0)
+        rest = _orthogonal(smooth(8), other)
+        v = own * other + np.sqrt(1.0 - own**2) * rest
+        y = foreign * other + np.sqrt(1.0 - foreign**2) * _orthogonal(_orthogonal(smooth(9), rest), other)
+        found = kinds_of([*good(), record("foreign", 100.0 * v, 10.0 * y)])
+        assert (("exchanged_records", "foreign") in found) is seen
+
+    @pytest.mark.parametrize(("area", "seen"), [(0.4, True), (0.2, False)])
+    def test_an_output_follows_its_drive(self, area: float, seen: bool) -> None:
+        """Exchanged columns, of a loop of this area against the expected one."""
+        v = smooth(3)
+        y = v + area * (late(record("", v, v)) - v)
+        assert (("swapped_channels", "r") in kinds_of([record("r", y, v)], late)) is seen
+
+    @pytest.mark.parametrize(("sigmas", "seen"), [(7.5, True), (3.5, False)])
+    def test_a_loop_counts_against_noise(self, sigmas: float, seen: bool) -> None:
+        """Exchanged columns, with noise that makes an area of its own."""
+        v = smooth(3, 4000)
+        y = late(record("", v, v))
+        area = 0.5 * abs(float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1])))
+        noise = area / sigmas / (0.5 * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))))
+        y = y + np.random.default_rng(1).normal(0.0, noise, len(y))
+        assert (channels._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
+
+    @pytest.mark.parametrize(
+        ("share", "scatters", "left_out"),
+        [(0.05, 8.0, True), (0.05, 4.5, False), (0.15, 12.0, True), (0.25, 12.0, False)],
+    )
+    def test_a_few_samples_far_off_do_not_count(self, share: float, scatters: float, left_out: bool) -> None:
+        random = np.random.default_rng(4)
+        x = random.uniform(-1.0, 1.0, 4000)
+        y = x + random.normal(0.0, 0.05, 4000)
+        without = channels._line(x, y)[1]
+        y[: int(4000 * share)] = x[: int(4000 * share)] + 0.05 * scatters
+        assert (channels._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
+
+    @pytest.mark.parametrize(("share", "kind"), [(0.007, "saturated"), (0.014, "held_samples")])
+    def test_a_converter_ends_at_its_end(self, share: float, kind: str) -> None:
+        """Another record goes beyond it by a share of the range."""
+        items = [Item(name, Run(np.arange(3.0), np.arange(3.0)), np.array([0.0, 1.0, top]), None, 10.0)
+                 for name, top in (("a", 10.0 * (1.0 - share)), ("b", 10.0))]  # fmt: skip
+        (each,) = bad_samples.not_at_the_end([Saturated("a", None, "largest", 10.0 * (1.0 - share), 5)], items)
+        assert each.kind == kind
+
+    @pytest.mark.parametrize(("rest", "foreign"), [(0.14, False), (0.16, True)])
+    def test_a_history_that_costs_the_rest(self, rest: float, foreign: bool) -> None:
+        v = np.interp(np.arange(400), [0, 50, 150, 400], [50.0, 100.0, 0.0, 50.0])
+        item = Item("r", Run(np.arange(400) * 1e-3, v), v, (0.0,), 100.0)
+
+        def model(start: float, rest: float) -> Any:
+            error = np.where(np.arange(400) < settled(v, 10.0), start, rest) * np.resize([1.0, -1.0], 400)
+            return SimpleNamespace(reach=10.0, errors=lambda _: [error])
+
+        assert (starts.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
+
+
+def _orthogonal(x: Array, to: Array) -> Array:
+    """A signal without what it has of another, of unit variance again."""
+    rest = x - float(x @ to) / float(to @ to) * to
+    rest = rest - np.mean(rest)
+    return np.asarray(rest / np.std(rest))
+
+
+# Lines -------------------------------------------------------------------------------------------------------
+
+
+def tone(frequency: float, samples: int, size: float = 1.0, step: float = 1e-3) -> Array:
+    return np.asarray(size * np.sin(2.0 * np.pi * frequency * step * np.arange(samples) + 0.3))
+
+
+def hiss(samples: int, seed: int = 0) -> Array:
+    """White noise of unit variance."""
+    return np.random.default_rng(seed).normal(size=samples)
+
+
+def driven(v: Array, step: float = 1e-3, name: str = "r") -> Item:
+    return Item(name, Run(np.arange(len(v)) * step, v), 0.1 * v, None, 10.0)
+
+
+def ramp(samples: int, step: float = 1e-3, name: str = "r") -> Item:
+    """A record whose drive has no lines."""
+    return driven(np.linspace(0.0, 100.0, samples), step, name)
+
+
+def of_share(share: float) -> float:
+    """Amplitude of a tone with this share of the variance of it and noise."""
+    return float(np.sqrt(2.0 * share / (1.0 - share)))
+
+
+def heard(item: Item, error: Array) -> list[float]:
+    return sorted(frequency for _, frequency in spectra.peaks(item, error))
+
+
+class TestSpectra:
+    @pytest.mark.parametrize(("share", "seen"), [(0.055, True), (0.024, False)])
+    def test_share_of_a_line(self, share: float, seen: bool) -> None:
+        assert bool(heard(ramp(20_000), tone(130.0, 20_000, of_share(share)) + hiss(20_000))) is seen
+
+    @pytest.mark.parametrize(("height", "seen"), [(45.0, True), (20.0, False)])
+    def test_height_of_a_line(self, height: float, seen: bool) -> None:
+        """Over its surroundings, in a short record."""
+        noise, line = hiss(600), tone(125.0, 600)
+        window = np.hanning(600)
+        power = np.abs(np.fft.rfft(noise * window)) ** 2
+        around = np.median(np.concatenate([power[35:72], power[79:115]]))
+        with_line = np.abs(np.fft.rfft(line * window))[75]
+        phase = np.angle(np.fft.rfft(noise * window)[75]) - np.angle(np.fft.rfft(line * window)[75])
+        size = (np.sqrt(height * around) - np.sqrt(power[75])) / with_line
+        error = noise + size * np.sin(2.0 * np.pi * 0.125 * np.arange(600) + 0.3 + phase)
+        assert (heard(ramp(600), error) == [pytest.approx(125.0)]) is seen
+
+    @pytest.mark.parametrize(("share", "seen"), [(1.5e-6, False), (0.7e-6, True)])
+    def test_a_line_of_the_drive(self, share: float, seen: bool) -> None:
+        """However small, beside one and a half slow swings."""
+        slow = 50.0 * np.cos(2.0 * np.pi * 0.375 * np.arange(4000) * 1e-3)
+        v = slow + tone(125.0, 4000, float(np.sqrt(share)) * 50.0)
+        assert bool(heard(driven(v), tone(125.0, 4000) + hiss(4000))) is seen
+
+    @pytest.mark.parametrize(("height", "seen"), [(14.0, False), (7.0, True)])
+    def test_height_of_a_line_of_the_drive(self, height: float, seen: bool) -> None:
+        noise, window = hiss(2000, 1), np.hanning(2000)
+        spectrum = np.fft.rfft(noise * window)
+        around = np.median(np.abs(np.concatenate([spectrum[210:247], spectrum[254:290]])) ** 2)
+        line = np.fft.rfft(tone(125.0, 2000) * window)[250]
+        phase = np.angle(spectrum[250]) - np.angle(line)
+        size = (np.sqrt(height * around) - np.abs(spectrum[250])) / np.abs(line)
+        v = noise + size * np.sin(2.0 * np.pi * 0.125 * np.arange(2000) + 0.3 + phase)
+        assert bool(heard(driven(v), tone(125.0, 2000) + hiss(2000))) is seen
+
+    @pytest.mark.parametrize(
+        ("carried", "harmonic", "seen"),
+        [
+            (0.7, 3.0, False), (0.35, 3.0, True), (0.7, 8.0, False), (0.7, 12.0, True), (0.7, 3.025, False),
+            (0.7, 3.05, True),
+        ],
+    )
+    def test_harmonics_of_a_carrier(self, carried: float, harmonic: float, seen: bool) -> None:
+        """A share of the drive's power in 40 swings; a fortieth of the harmonic is one bin."""
+        rest = smooth(5, 4000)
+        v = tone(10.0, 4000, float(np.sqrt(2.0 * carried))) + np.sqrt(1.0 - carried) * rest
+        found = heard(driven(v), tone(10.0 * harmonic, 4000) + 0.3 * hiss(4000))
+        assert (pytest.approx(10.0 * harmonic) in found) is seen
+
+    @pytest.mark.parametrize(("periods", "seen"), [(10, True), (6, False)])
+    def test_periods_of_a_line(self, periods: int, seen: bool) -> None:
+        assert bool(heard(driven(hiss(4000, 9)), tone(periods / 4.0, 4000) + 0.3 * hiss(4000))) is seen
+
+    @pytest.mark.parametrize(("samples", "seen"), [(300, True), (200, False)])
+    def test_samples_of_a_spectrum(self, samples: int, seen: bool) -> None:
+        assert bool(heard(ramp(samples), tone(250.0, samples) + 0.1 * hiss(samples))) is seen
+
+    @pytest.mark.parametrize(("first", "last", "seen"), [(44, 80, True), (16, 40, False)])
+    def test_surroundings_of_a_line(self, first: int, last: int, seen: bool) -> None:
+        """Strong noise in these bins on either side."""
+        random = np.random.default_rng(6)
+        spectrum = random.normal(size=2001) + 1j * random.normal(size=2001)
+        for k in range(first, last):
+            spectrum[[500 - k, 500 + k]] *= 30.0
+        spectrum[500] = 120.0
+        assert (pytest.approx(125.0) in heard(ramp(4000), np.fft.irfft(spectrum, 4000))) is seen
+
+    def test_the_highest_bins(self) -> None:
+        """Of seven equal tones five are looked at."""
+        error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(7)) + 0.1 * hiss(4000)
+        assert len(heard(ramp(4000), error)) == 5
+
+    @pytest.mark.parametrize(("apart", "number"), [(0.013, 1), (0.03, 2)])
+    def test_ringing_at_nearly_the_same_frequency(self, apart: float, number: int) -> None:
+        errors = [tone(f, 20_000) + 0.3 * hiss(20_000) for f in (100.0, 100.0 * (1.0 + apart))]
+        found = spectra.ringing([ramp(20_000), ramp(20_000)], errors, 5)
+        assert len([f for f in found if 99.0 < f < 104.0]) == number
+
+    @pytest.mark.parametrize(("samples", "repeats"), [(80, True), (50, False)])
+    def test_a_short_drive_does_not_repeat(self, samples: int, repeats: bool) -> None:
+        v = np.cos(2.0 * np.pi * np.arange(samples) / 20.0)
+        assert (spectra.repetition(v) == 20) is repeats
+
+    @pytest.mark.parametrize(("noise", "repeats"), [(0.7, True), (1.4, False)])
+    def test_a_noisy_drive_repeats(self, noise: float, repeats: bool) -> None:
+        """Of a range of 100, rms between periods."""
+        v = np.tile(np.interp(np.arange(500), [0, 100, 250, 400, 500], [0.0, 100.0, 20.0, 70.0, 0.0]), 6)
+        assert (spectra.repetition(v + noise / np.sqrt(2.0) * hiss(3000)) is not None) is repeats
+
+    @pytest.mark.parametrize(("duty", "repeats"), [(0.05, True), (0.015, False)])
+    def test_a_drive_that_mostly_rests(self, duty: float, repeats: bool) -> None:
+        """It differs from itself by the root of twice that, rms."""
+        v = np.tile(np.where(np.arange(400) < 400 * duty, 1.0, 0.0), 6)
+        assert (spectra.repetition(v) is not None) is repeats
+
+
+class TestLines:
+    @pytest.mark.parametrize(("share", "ruled"), [(0.4, True), (0.2, False)])
+    def test_a_line_rules(self, share: float, ruled: bool) -> None:
+        error = tone(130.0, 4000, of_share(share)) + hiss(4000)
+        assert bool(periodic.ruling([ramp(4000)], [error])[0]) is ruled
+
+    @pytest.mark.parametrize(("share", "rules"), [(0.4, True), (0.2, False)])
+    def test_a_line_in_a_few_records(self, share: float, rules: bool) -> None:
+        """In one of ten, unless it rules that one."""
+        items = [ramp(2000, name=f"r{k}") for k in range(10)]
+        errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(share)) if k == 0 else 0.0) for k in range(10)]
+        assert bool(periodic.lines(items, errors)[0]) is rules
+
+    @pytest.mark.parametrize(("having", "seen"), [(5, True), (3, False)])
+    def test_a_line_in_many_records(self, having: int, seen: bool) -> None:
+        items = [ramp(2000, name=f"r{k}") for k in range(10)]
+        errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(0.15)) if k < having else 0.0) for k in range(10)]
+        assert bool(periodic.lines(items, errors)[0]) is seen
+
+    @pytest.mark.parametrize(("steady", "seen"), [(7, True), (5, False)])
+    def test_steady_in_most_records(self, steady: int, seen: bool) -> None:
+        """In the others it is gone after half the time."""
+        items = [ramp(2000, name=f"r{k}") for k in range(10)]
+        fading = np.where(np.arange(2000) < 1000, 1.0, 0.0)
+        errors = [3.0 * tone(130.0, 2000) * (1.0 if k < steady else fading) + hiss(2000, k) for k in range(10)]
+        assert (lines.steady(items, errors) is not None) is seen
+
+    def test_four_lines(self) -> None:
+        error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(6)) + 0.1 * hiss(4000)
+        assert len(periodic.lines([ramp(4000)], [error])[0]) == 4
+
+    @pytest.mark.parametrize(("rate", "size"), [(1080.0, 1.5), (945.0, 1.0)])
+    def test_two_samples_a_period_do_not_show_an_amplitude(self, rate: float, size: float) -> None:
+        """A line of 450 Hz, twice as large in the record with the other sampling rate."""
+        items = [ramp(4000, 1.0 / 2000.0, "a"), ramp(4000, 1.0 / rate, "b")]
+        errors = [tone(450.0, 4000, 1.0, 1.0 / 2000.0), tone(450.0, 4000, 2.0, 1.0 / rate)]
+        (line, *_), _ = periodic.lines(items, [e + 0.1 * hiss(4000, k) for k, e in enumerate(errors)])
+        assert line.amplitude == pytest.approx(size, rel=0.1)
+
+    @pytest.mark.parametrize(
+        ("frequency", "mains"), [(50.08, 50.0), (50.15, None), (149.8, "3 x 50 Hz"), (59.97, 60.0)]
+    )
+    def test_mains(self, frequency: float, mains: object) -> None:
+        assert lines._mains(frequency, 1e-3) == mains
+
+    @pytest.mark.parametrize(("frequency", "known"), [(103.0, True), (108.0, False)])
+    def test_the_rest_of_a_line(self, frequency: float, known: bool) -> None:
+        line = Line(100.0, 1.0, 0.5, ("r",))
+        assert disturbances.is_known(replace(line, frequency=frequency), [line]) is known
+        assert not disturbances.is_known(Ripple(100.0, 1.0, 0.5, ("r",), False), [line])
+
+
+# Ripples and stick-slip --------------------------------------------------------------------------------------
+
+
+def rippled(places: Array, pitch: float, seed: int, grain: float = 0.0) -> tuple[Item, Array]:
+    """A record that moves over these places, with a ripple of unit amplitude and some noise; and its error."""
+    error = np.sin(2.0 * np.pi * places / pitch) + 0.1 * hiss(len(places), seed)
+    y = places + error
+    if grain:
+        y = grain * np.round(y / grain)
+        error = y - places
+    return Item(f"r{seed}", Run(np.arange(len(places)) * 1e-3, places), y, None, 10.0), error
+
+
+def there_and_back(low: float, high: float, samples: int) -> Array:
+    """A pass up and one down, with these samples each."""
+    return np.concatenate([np.linspace(low, high, samples), np.linspace(high, low, samples)[1:]])
+
+
+def pitches(made: Sequence[tuple[Item, Array]]) -> list[float]:
+    found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+    return [] if found is None else [found.finding.place]
+
+
+class TestRipple:
+    @pytest.mark.parametrize(("step", "seen"), [(0.2, True), (0.35, False)])
+    def test_samples_a_pitch(self, step: float, seen: bool) -> None:
+        made = [rippled(there_and_back(0.0, 40.0, round(40.0 / step)), 1.0, k) for k in range(3)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("samples", "seen"), [(42, True), (26, False)])
+    def test_samples_of_a_pass(self, samples: int, seen: bool) -> None:
+        made = [rippled(there_and_back(1.3 * k, 1.3 * k + 4.5, samples), 1.0, k) for k in range(12)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("length", "seen"), [(4.0, True), (2.4, False)])
+    def test_pitches_of_a_pass(self, length: float, seen: bool) -> None:
+        made = [rippled(there_and_back(1.3 * k, 1.3 * k + length, 60), 1.0, k) for k in range(12)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("number", "seen"), [(400, True), (700, False)])
+    def test_the_finest_pitch(self, number: int, seen: bool) -> None:
+        """Pitches in the range."""
+        made = [rippled(there_and_back(0.0, float(number), 6000), 1.0, k) for k in range(2)]
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
+    @pytest.mark.parametrize(("beside", "step"), [(0.014, True), (0.03, False)])
+    def test_a_pitch_of_the_converter(self, beside: float, step: bool) -> None:
+        made = [rippled(there_and_back(0.0, 40.0, 2000), 1.0, k, 1.0 + beside) for k in range(3)]
+        found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+        assert found is not None
+        assert found.finding.place == pytest.approx(1.0, rel=0.005)
+        assert found.finding.entry()["converter_step"] is step
+
+
+SLIP = 0.0, 2.2
+"""What a stretch that stands, and one that leaps, moves of what it should."""
+
+
+def slipping(ratios: Sequence[float], moves: float = 1.0, jump: float = 9.0, noise: float = 1.0) -> bool:
+    """Whether stick-slip is seen where stretches of seven samples move by these shares of the prediction.
+
+    A stretch that moves more than predicted does so in one jump, and falls behind again a little where that is more.
+    """
+    e = [0.0]
+    for ratio in ratios:
+        change = 7.0 * moves * (ratio - 1.0)
+        rest = (change - jump) / 6.0 if ratio > 1.0 else change / 7.0
+        e += list(e[-1] + np.cumsum([jump if ratio > 1.0 else rest, *([rest] * 6)]))
+    error = np.array(e)
+    predicted = moves * np.arange(len(error))
+    item = Item("r", Run(np.arange(len(error)) * 1e-3, predicted), predicted + error, None, 10.0)
+    return bool(stick_slip.stick_slip([item], [error], noise))
+
+
+def pattern(pairs: int, stretches: int, stands: float = 0.0, leaps: float = 2.2) -> list[float]:
+    """Pairs of standing and leaping, spread evenly among stretches that follow."""
+    found = [1.0] * stretches
+    for k in range(pairs):
+        at = k * stretches // pairs
+        found[at : at + 2] = [stands, leaps]
+    return found
+
+
+class TestStickSlip:
+    @pytest.mark.parametrize(("pairs", "seen"), [(20, True), (11, False)])
+    def test_how_much_stands(self, pairs: int, seen: bool) -> None:
+        assert slipping(pattern(pairs, 100)) is seen
+
+    @pytest.mark.parametrize(("leaping", "seen"), [(7, True), (3, False)])
+    def test_how_much_leaps(self, leaping: int, seen: bool) -> None:
+        """Of a hundred stretches; the others that stand make up for it slowly."""
+        ratios = pattern(20, 100, -0.2, 1.5)
+        for k in [k for k, ratio in enumerate(ratios) if ratio == 1.5][:leaping]:
+            ratios[k] = 2.2
+        assert slipping(ratios) is seen
+
+    @pytest.mark.parametrize(("off", "seen"), [(0.7, True), (0.5, False)])
+    def test_how_far_off_a_stretch_is(self, off: float, seen: bool) -> None:
+        assert slipping(pattern(20, 100, 1.0 - off, 1.0 + off)) is seen
+
+    @pytest.mark.parametrize(("jump", "seen"), [(8.5, True), (5.5, False)])
+    def test_how_large_a_jump_is(self, jump: float, seen: bool) -> None:
+        """Of times the noise."""
+        assert slipping(pattern(20, 100, 0.0, 1.9), jump=jump) is seen
+
+    @pytest.mark.parametrize(("pairs", "stretches", "seen"), [(7, 40, True), (4, 26, False)])
+    def test_how_many_jumps(self, pairs: int, stretches: int, seen: bool) -> None:
+        assert slipping(pattern(pairs, stretches)) is seen
+
+    @pytest.mark.parametrize(("length", "seen"), [(1, True), (3, False)])
+    def test_what_goes_on(self, length: int, seen: bool) -> None:
+        """Stretches that stand, and those that leap, in a row."""
+        row = [0.0] * length + [2.0] * length + [1.0] * 4
+        assert slipping(row * (100 // len(row))) is seen
+
+
+# Drives and descriptions -------------------------------------------------------------------------------------
+
+
+class TestDrives:
+    @pytest.mark.parametrize(("turn", "number"), [(1.4, 0), (3.0, 2)])
+    def test_a_small_turn(self, turn: float, number: int) -> None:
+        v = np.interp(np.arange(300), [0, 100, 130, 299], [0.0, 50.0, 50.0 - turn, 100.0])
+        assert len(drives.reversals(v)) == number
+
+    @pytest.mark.parametrize(("top", "one"), [(93.0, True), (86.0, False)])
+    def test_ends_of_loops(self, top: float, one: bool) -> None:
+        assert drives.one_loop([sweep(0, 100, 0, 100, 0), sweep(0, top, 0, top, 0)]) is one
+
+    @pytest.mark.parametrize(("slower", "one"), [(1.35, True), (1.8, False)])
+    def test_speeds_of_loops(self, slower: float, one: bool) -> None:
+        assert drives.one_speed([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=slower)]) is one
+
+    @pytest.mark.parametrize(("hold", "one"), [(50, True), (160, False)])
+    def test_a_loop_that_stands_is_none(self, hold: int, one: bool) -> None:
+        """Samples beside 200 of each move."""
+        move = np.linspace(0.0, 100.0, 200)
+        v = np.concatenate([move, np.full(hold, 100.0), move[::-1], np.zeros(hold)] * 3)
+        assert drives.one_loop([driven(v)]) is one
+
+
+def scattered(samples: int, seed: int = 0) -> Item:
+    """A drive that goes everywhere in every block of samples."""
+    return driven(np.random.default_rng(seed).uniform(0.0, 100.0, samples))
+
+
+class TestDescription:
+    @pytest.mark.parametrize(("share", "matters"), [(0.14, True), (0.07, False)])
+    def test_a_variable_that_matters(self, share: float, matters: bool) -> None:
+        item = scattered(20_000)
+        error = of_share(share) * np.sin(2.0 * np.pi * item.run.v / 100.0) + hiss(20_000, 1)
+        assert ("drive" in residual.shares([item], [error])[1]) is matters
+
+    def test_bins_of_a_variable(self) -> None:
+        """Eight waves over the range, of which 24 bins see two thirds."""
+        item = scattered(20_000)
+        shares = residual.shares([item], [np.sin(2.0 * np.pi * 8.0 * item.run.v / 100.0)])[1]
+        assert 0.6 < shares["drive"] < 0.8
+
+    def test_folds(self) -> None:
+        """A drift is seen in half of the blocks of time alone: a bin is two thirds of one."""
+        item = scattered(9600)
+        assert 0.25 < residual.shares([item], [np.linspace(-1.0, 1.0, 9600)])[1]["session time"] < 0.45
+
+    @pytest.mark.parametrize(("samples", "described"), [(300, True), (150, False)])
+    def test_samples_of_a_description(self, samples: int, described: bool) -> None:
+        item = scattered(samples)
+        assert (residual.shares([item], [item.run.v - 50.0])[0] > 0.0) is described
+
+    @pytest.mark.parametrize(("free", "main"), [(0.6, "memory"), (0.45, "drive")])
+    def test_memory_in_place_of_one_variable(self, free: float, main: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(residual, "shares", lambda *_: (0.4, {"drive": 0.4}))
+        monkeypatch.setattr(residual, "together", lambda *_: (free, 0.7))
+        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).main_variable == main
+
+    @pytest.mark.parametrize(("free", "rate_free"), [(0.8, True), (0.6, False)])
+    def test_rate_free(self, free: float, rate_free: bool) -> None:
+        assert residual._rate_free(free, 1.0) is rate_free
+
+    @pytest.mark.parametrize(("share", "repeatable"), [(0.6, True), (0.4, False)])
+    def test_repeatable(self, share: float, repeatable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(residual, "repeatable", lambda *_: share)
+        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).repeatable is repeatable
+
+    @pytest.mark.parametrize(
+        ("share", "waves", "samples", "known"),
+        [
+            (0.09, 1, 40_000, True), (0.035, 1, 40_000, False),  # of the variance
+            (0.1, 8, 40_000, True), (0.1, 12, 40_000, False),  # twenty bins see 0.57 or 0.25 of these
+            (0.9, 1, 640, True), (0.9, 1, 300, False),  # 16 or 7 a bin
+        ],
+    )  # fmt: skip
+    def test_parity(self, share: float, waves: int, samples: int, known: bool) -> None:
+        item = scattered(samples)
+        error = of_share(share) * np.cos(2.0 * np.pi * waves * item.run.v / 100.0) + hiss(samples, 1)
+        assert (residual.even_share([item], [error]) is not None) is known
+
+
+class TestStretches:
+    @pytest.mark.parametrize(("times", "listed"), [(1.6, True), (1.4, False)])
+    def test_above_the_noise(self, times: float, listed: bool) -> None:
+        error = np.where(np.arange(2400) < 300, times, 1.0) * np.resize([1.0, -1.0], 2400)
+        assert bool(stretches.worst([ramp(2400)], [error], 1.0)) is listed
+
+    def test_ends_of_the_range(self) -> None:
+        """Windows of 4 % of the range: the third one is two fifths within a tenth of it."""
+        found = stretches.worst([ramp(2400)], [np.ones(2400)], 0.1)
+        assert {(each.kind, each.interval) for each in found} == {
+            ("range_end", (0.0, 0.199)), ("moving", (0.2, 2.199)), ("range_end", (2.2, 2.399)),
+        }  # fmt: skip
+
+    def test_fast(self) -> None:
+        """A third of the record is twice as fast as most of it, a twelfth ten times."""
+        rates = np.repeat([1.0, 2.0, 1.0, 10.0, 1.0], [700, 800, 300, 200, 400])
+        item = driven(np.cumsum(np.resize(np.repeat([1.0, -1.0], 25), 2400) * rates))
+        found = stretches.worst([item], [np.ones(2400)], 0.1)
+        assert [each.interval for each in found if each.kind == "fast"] == [(1.8, 1.999)]
+
+
+@pytest.mark.parametrize(("share", "begins"), [(0.6, "The records are disturbed"), (0.4, "Something is missing")])
+def test_what_the_sentence_is_about(share: float, begins: str) -> None:
+    line = Line(frequency=50.0, amplitude=0.1, share=share, records=("r",))
+    found = result("unexplained", (), 0.5, [line, STRUCTURE])
+    assert Diagnosis(found, None, (), ()).sentence().startswith(begins)  # type: ignore[arg-type]
+
+
+def test_held_out_records_that_are_alone() -> None:
+    """With 2.5 or 3.5 times the error of a fitted one."""
+    items = [ramp(2000, name=name) for name in ("fit", "a", "b")]
+    errors = [size * hiss(2000, k) for k, size in enumerate((1.0, 2.5, 3.5))]
+    ready = Prepared(items[:1], items[1:], [], [], (0.0, 100.0), np.zeros(1))
+    (left,) = content._unexplained(ready, [errors[:1], errors[1:]], 0.5, 1.0, [])
+    assert left.entry()["held_out_alone"] == ("b",)

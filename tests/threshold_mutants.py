@@ -1,0 +1,197 @@
+"""The numbers of `hystgen.diagnosis.search.acceptance`, doubled and halved: which fast tests of the diagnosis notice?
+
+    python -m tests.threshold_mutants [--only NAME]... [--tests FILE]... [--seconds 3] [--json FILE]
+
+All fast tests are run once to learn which numbers each of them reads and how long it takes; then, for each number and
+factor, those that read it, the shortest first, until one fails. Exits with 1 if a number is noticed by no test and is
+not in `UNNOTICED`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import contextlib
+import itertools
+import json
+import multiprocessing
+import os
+import signal
+import sys
+import time
+import types
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hystgen.diagnosis.search import acceptance
+
+ROOT = Path(__file__).parent.parent
+FILES = tuple(f"tests/test_{name}.py" for name in ("selection", "disturbances", "thinning", "diagnosis"))
+FACTORS = (2.0, 0.5)
+
+UNNOTICED: dict[str, str] = {}
+"""Numbers that no fast test notices, with the reason."""
+
+
+def names() -> list[str]:
+    """All numbers, in their order."""
+    found = vars(acceptance).items()
+    return [name for name, value in found if name.isupper() and isinstance(value, int | float | tuple)]
+
+
+def changed(value: Any, factor: float) -> Any:
+    """A number, or each of several, times a factor; whole numbers stay whole and at least one."""
+    if isinstance(value, tuple):
+        return tuple(changed(each, factor) for each in value)
+    return max(1, round(value * factor)) if isinstance(value, int) else value * factor
+
+
+def documented() -> dict[str, str]:
+    """The text below each number."""
+    found: dict[str, str] = {}
+    body = ast.parse(Path(acceptance.__file__).read_text()).body
+    for each, text in itertools.pairwise(body):
+        if isinstance(each, ast.Assign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+            targets = each.targets[0].elts if isinstance(each.targets[0], ast.Tuple) else each.targets
+            words = " ".join(str(text.value.value).split())
+            found |= {target.id: words for target in targets if isinstance(target, ast.Name)}
+    return found
+
+
+def read_inside() -> set[str]:
+    """Numbers that the functions of the module itself read, which no test can be seen to do."""
+    body = ast.parse(Path(acceptance.__file__).read_text()).body
+    functions = [each for each in body if isinstance(each, ast.FunctionDef)]
+    used = (node.id for function in functions for node in ast.walk(function) if isinstance(node, ast.Name))
+    return {name for name in used if name.isupper()}
+
+
+# Tests run here ----------------------------------------------------------------------------------------------
+
+
+class Watch:
+    """A pytest plugin: which numbers each test reads, and its seconds; a test that takes too long is given up."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self.tests: dict[str, tuple[float, list[str]]] = {}
+        self._read: set[str] = set()
+        self._passed = False
+
+    @contextlib.contextmanager
+    def watching(self) -> Iterator[None]:
+        """Reads of the module's attributes are seen meanwhile."""
+        read = self._read
+
+        class Seen(types.ModuleType):
+            def __getattribute__(self, name: str) -> Any:
+                if name.isupper():
+                    read.add(name)
+                return super().__getattribute__(name)
+
+        acceptance.__class__ = Seen
+        try:
+            yield
+        finally:
+            acceptance.__class__ = types.ModuleType
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Any:
+        """The test itself, without its fixtures."""
+        self._read.clear()
+
+        def late(*_: object) -> None:
+            pytest.skip("takes too long")
+
+        signal.signal(signal.SIGALRM, late)
+        signal.setitimer(signal.ITIMER_REAL, self.seconds)
+        began = time.perf_counter()
+        try:
+            result = yield
+            self.tests[item.nodeid] = time.perf_counter() - began, sorted(self._read)
+            return result
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def apart(what: Callable[[], Any]) -> Any:
+    """What a function returns in a process of its own, so that nothing of it stays here."""
+    here, there = multiprocessing.Pipe(duplex=False)
+    child = os.fork()
+    if child == 0:
+        try:
+            with open(os.devnull, "w") as nowhere:
+                os.dup2(nowhere.fileno(), 1)
+                os.dup2(nowhere.fileno(), 2)
+            there.send(what())
+        finally:
+            os._exit(0)
+    there.close()
+    try:
+        return here.recv()
+    except EOFError:
+        return None
+    finally:
+        os.waitpid(child, 0)
+
+
+def table(files: Sequence[str], seconds: float) -> dict[str, tuple[float, list[str]]]:
+    """The fast tests: their seconds, and the numbers that each reads."""
+
+    def run() -> dict[str, tuple[float, list[str]]]:
+        watch = Watch(seconds)
+        with watch.watching():
+            pytest.main(["-q", "-p", "no:cacheprovider", *files], plugins=[watch])
+        return watch.tests
+
+    return apart(run) or {}
+
+
+def noticed(name: str, factor: float, tests: Sequence[str]) -> bool:
+    """Whether one of the tests fails with the number changed."""
+
+    def run() -> int:
+        setattr(acceptance, name, changed(getattr(acceptance, name), factor))
+        return int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", *tests]))
+
+    return bool(tests) and apart(run) == pytest.ExitCode.TESTS_FAILED
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The table and the count, one line a number."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
+    parser.add_argument("--only", action="append", default=[], metavar="NAME")
+    parser.add_argument("--tests", action="append", default=[], metavar="FILE")
+    parser.add_argument("--seconds", type=float, default=3.0, help="a test that takes longer is not fast")
+    parser.add_argument("--json", type=Path)
+    given = parser.parse_args(arguments)
+    wrong = set(given.only) - set(names())
+    if wrong:
+        parser.error(f"no such number: {', '.join(sorted(wrong))}")
+    os.chdir(ROOT)
+    fast = table(given.tests or FILES, given.seconds)
+    print(f"{len(fast)} fast tests, {sum(seconds for seconds, _ in fast.values()):.0f} s")
+    inside, results = read_inside(), {}
+    for name in given.only or names():
+        readers = [test for test, (_, read) in sorted(fast.items(), key=lambda pair: pair[1][0])
+                   if name in read or name in inside]  # fmt: skip
+        found = {str(factor): noticed(name, factor, readers) for factor in FACTORS
+                 if changed(getattr(acceptance, name), factor) != getattr(acceptance, name)}  # fmt: skip
+        results[name] = {"tests": len(readers), **found}
+        said = ", ".join(f"x {factor} {'noticed' if seen else 'NOT noticed'}" for factor, seen in found.items())
+        print(f"{name}: read by {len(readers)} tests; {said}", flush=True)
+        if given.json:
+            given.json.write_text(json.dumps(results, indent=1) + "\n")
+    silent = [name for name, found in results.items() if not any(found[str(f)] for f in FACTORS if str(f) in found)]
+    half = [name for name, found in results.items() if name not in silent and not all(
+        found[str(f)] for f in FACTORS if str(f) in found)]  # fmt: skip
+    print(f"{len(results) - len(silent) - len(half)} noticed both ways, {len(half)} one way, {len(silent)} not at all")
+    print("not at all: " + (", ".join(silent) or "none"))
+    return int(bool(set(silent) - set(UNNOTICED)))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
