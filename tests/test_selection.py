@@ -14,6 +14,7 @@ from hystgen.diagnosis.search import merit, screening, selection
 
 Array = NDArray[np.float64]
 
+
 def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, float] | None = None) -> list[str]:
     """Names of the two that are found; `alone`: what an effect leaves when it is sought from where both are."""
 
