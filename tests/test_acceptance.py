@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 import threshold_mutants
+from made_up import HELD, NOISE, STRUCTURE, TO_FIT, Hypothesis, Made, World, first_of, result, sweep
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import wilcoxon
-from test_diagnosis import STRUCTURE, result
-from test_disturbances import sweep
-from test_selection import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
 
 from hystgen.diagnosis import Diagnosis
 from hystgen.diagnosis.data import (
@@ -1050,3 +1048,64 @@ def test_held_out_records_that_are_alone() -> None:
     ready = Prepared(items[:1], items[1:], [], [], (0.0, 100.0), np.zeros(1))
     (left,) = content._unexplained(ready, [errors[:1], errors[1:]], 0.5, 1.0, [])
     assert left.entry()["held_out_alone"] == ("b",)
+
+
+# Starts of searches ------------------------------------------------------------------------------------------
+
+
+class TestStarts:
+    fronts = options._fronts(Structure(np.array([0.0]), Kept()), Structure(np.array([0.0]), Kept()), (0.0, 100.0))
+
+    def starts(self, label: str) -> list[Array]:
+        (found,) = [each for each in self.fronts if each.label == label]
+        return [np.asarray(start) for start in found.starts]
+
+    def slopes(self, label: str, start: Array) -> Array:
+        """Of the front at 200 drives, over their mean."""
+        (found,) = [each for each in self.fronts if each.label == label]
+        w = np.linspace(0.0, 100.0, 201)
+        for stage in found.structure.front.stages(start):
+            w = stage.forward(w)
+        return np.asarray(np.diff(w) / np.mean(np.diff(w)))
+
+    @pytest.mark.parametrize("depth", [0.02, 0.03, 0.05, 0.08, 0.12, 0.15])
+    def test_a_limiter_is_near_a_start(self, depth: float) -> None:
+        """Within a factor of two, from a fiftieth of the range to three."""
+        assert any(abs(np.log2(depth / start[0])) < 1.0 for start in self.starts("front with flatter ends"))
+
+    @pytest.mark.parametrize(("label", "wide"), [("front of dead zones", 0.25), ("front of more dead zones", 0.125)])
+    def test_breaks_divide_the_range(self, label: str, wide: float) -> None:
+        (found,) = [each for each in self.fronts if each.label == label]
+        breaks = np.array([0.0, *found.structure.front.breaks, 100.0])  # type: ignore[attr-defined]
+        assert 0.5 * wide < np.max(np.diff(np.unique(breaks))) / 100.0 <= wide
+
+    def test_envelopes_bend_either_way(self) -> None:
+        """Over the whole range, the slope at one end some times that at the other."""
+        label = "front of one tanh"
+        slopes = [self.slopes(label, start) for start in self.starts(label)]
+        bends = [float(np.log(each[-1] / each[0])) for each in slopes]
+        assert min(bends) == pytest.approx(-max(bends))
+        assert 0.5 < max(bends) < 0.8
+
+
+def test_shapes_that_are_followed() -> None:
+    """Five by held-out error, and two more by fitted error."""
+
+    def one(k: int) -> Any:
+        option = SimpleNamespace(name=f"e{k}", label=f"e{k}")
+        return SimpleNamespace(option=option, residual=1.0 + k, fitted=SimpleNamespace(rms=20.0 - k))
+
+    names = [each.option.name for each in screening._kept([one(k) for k in range(12)], [])]
+    assert names == ["e0", "e1", "e2", "e3", "e4", "e11", "e10"]
+
+
+@pytest.mark.parametrize(("first", "last", "seen"), [(14, 24, True), (6, 12, False)])
+def test_surroundings_of_ringing_that_fades(first: int, last: int, seen: bool) -> None:
+    """Strong noise in these bins of the spectrum of a part, on either side of a peak as wide as a bin."""
+    random = np.random.default_rng(6)
+    spectrum = random.normal(size=2049) + 1j * random.normal(size=2049)
+    for k in range(8 * first, 8 * last):
+        spectrum[[1024 - k, 1024 + k]] *= 30.0
+    spectrum[1020:1028] *= 40.0
+    found = spectra._fading(ramp(4096), np.fft.irfft(spectrum, 4096))
+    assert any(abs(frequency - 250.0) < 3.0 for _, frequency in found) is seen

@@ -10,13 +10,14 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
+from made_up import STRUCTURE, result
 from numpy.typing import NDArray
 from recordings import brute_output, noisy, part_of_file, record, wander, write_csv
 from scipy.signal import lfilter
@@ -29,8 +30,8 @@ from hystgen.diagnosis.data.held_out import set_aside
 from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.noise_floor import noise_floor
 from hystgen.diagnosis.findings.content import ONE_LOOP
-from hystgen.diagnosis.findings.kinds import Finding, Line, Structure
-from hystgen.diagnosis.findings.result import Errors, Gap, Inverse, NamedEffect, Result
+from hystgen.diagnosis.findings.kinds import Line
+from hystgen.diagnosis.findings.result import Errors, Gap, Result
 from hystgen.diagnosis.run import _extended
 from hystgen.diagnosis.search import acceptance, merit, options, screening, selection, structure
 from hystgen.diagnosis.search.actuator import Actuator
@@ -221,23 +222,6 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     assert content["effects"][0]["name"] == "lag"
     assert ["lag", "delay"] in content["not_separable"]
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
-
-
-def result(
-    verdict: str,
-    names: Sequence[str],
-    after: float,
-    unexplained: Sequence[Finding],
-    rivals: Sequence[tuple[str, str]] = (),
-) -> Result:
-    """A result with a refitted error of 0.5 um and noise of 0.02 um."""
-    gap = Gap(Errors(0.5, 0.5), Errors(0.5, 0.5), Errors(after, after))
-    effects = tuple(NamedEffect(name, {}, {}, 0.5, 0.5, after, 0.0, "") for name in names)
-    inverse = Inverse(True, ())
-    return Result(verdict, 0.02, 10.0, "um", gap, effects, tuple(unexplained), (), tuple(rivals), (), (), inverse)
-
-
-STRUCTURE = Structure(0.05, 2.5, None, {}, None, None, None, None, ())
 
 
 def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 import pytest
+from made_up import sweep
 from numpy.typing import NDArray
 from recordings import brute_output, wander
 from scipy.signal import lfilter
@@ -292,14 +293,6 @@ def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
             at.append(k)
         out[k] = place
     return out, at
-
-
-def sweep(*ends: float, seconds: float = 1.0, noise: float = 0.0) -> Item:
-    """Straight moves between drives, 200 samples each."""
-    v = np.interp(np.arange(200 * (len(ends) - 1) + 1) / 200, np.arange(len(ends)), ends)
-    v = v + np.random.default_rng(1).normal(0.0, noise, len(v))
-    run = Run(np.arange(len(v)) * seconds / 200, v)
-    return Item("made", run, v, None, 10.0)
 
 
 @pytest.mark.parametrize(

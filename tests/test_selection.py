@@ -2,88 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from made_up import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.search import merit, screening, selection
 
 Array = NDArray[np.float64]
-
-NOISE, HIDDEN = 0.02, 1.0
-
-
-def missing(record: int, samples: int = 2000) -> Array:
-    """What the effects leave where they are missing: slow against a sample."""
-    return np.asarray(HIDDEN * np.sin(0.05 * np.arange(samples) + record))
-
-
-class Hypothesis:
-    """Effects that are in, and the error that they leave: a share of what is missing, and noise of its own colour."""
-
-    def __init__(self, world: World, names: frozenset[str], left: float | None = None) -> None:
-        self.world, self.names = world, names
-        self.left = world.left.get(names, 1.0) if left is None else left
-        self.shape, self.weights = np.zeros(len(names)), np.zeros(0)
-        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0))
-        self.bare = not names
-        self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
-
-    @property
-    def rms(self) -> float:
-        return self.world.rms(self.errors(list(self.world.to_fit)))
-
-    def errors(self, items: list[int], _: Any = None) -> list[Array]:
-        noise = [np.random.default_rng([item, *map(ord, sorted(self.names))]) for item in items]
-        return [
-            self.left * missing(item) + self.world.colour(random)
-            for item, random in zip(items, noise, strict=True)
-        ]
-
-
-class World:
-    """Which hypotheses there are, and how much of what is missing each leaves; those not told leave everything."""
-
-    to_fit, held, noise = (0, 1, 2), (3, 4, 5), NOISE
-    one_loop = one_speed = False
-
-    def __init__(self, left: dict[frozenset[str], float], names: str, memory: float = 0.0) -> None:
-        self.left, self.all, self.memory = left, names, memory
-
-    def colour(self, random: np.random.Generator, samples: int = 2000) -> Array:
-        white, noise = random.normal(0.0, NOISE * np.sqrt(1.0 - self.memory**2), samples), np.zeros(samples)
-        for k in range(1, samples):
-            noise[k] = self.memory * noise[k - 1] + white[k]
-        return noise
-
-    def tried(self, now: Hypothesis, name: str) -> Any:
-        extended = Hypothesis(self, now.names | {name})
-        errors = extended.errors(list(self.held))
-        option: Any = SimpleNamespace(label=name, name=name)
-        return screening.Tried(option, extended, (name,), self.rms(errors), errors)
-
-    def extensions(self, now: Hypothesis, worth: Any = None) -> list[Any]:
-        found = [self.tried(now, name) for name in self.all if name not in now.names]
-        found = [each for each in found if worth is None or worth(each.option)]
-        return sorted(found, key=lambda each: each.held_out)
-
-    def gap(self, now: Hypothesis) -> float:
-        return self.rms(now.errors(list(self.held)))
-
-    @staticmethod
-    def rms(errors: list[Array]) -> float:
-        return float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
-
-    @property
-    def records(self) -> Any:
-        return SimpleNamespace(
-            to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
-            residual=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
-        )  # fmt: skip
 
 
 def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, float] | None = None) -> list[str]:
@@ -331,39 +260,6 @@ def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.Mon
     monkeypatch.setattr(merit, "rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
     now, records = made("", 2.0), SimpleNamespace(noise=NOISE, one_loop=False)
     assert merit.left_open(now, made("a", 1.0), [], records) == ["b"]  # type: ignore[arg-type]
-
-
-TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
-
-
-class Made:
-    """What an option leaves of records to fit and of held-out ones; `on_equal_terms`: of these with what is free in
-    the other option's."""
-
-    def __init__(
-        self, name: str, free: int, left: tuple[float, float], on_equal_terms: tuple[float, float] | None = None
-    ) -> None:
-        self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
-        self.rms = left[0]
-        self.structure = SimpleNamespace(bounds=(np.full(2, -1.0), np.full(2, 1.0)))
-        self.bare = True
-        self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
-
-    def errors(self, items: Sequence[int], like: Any = None) -> list[Array]:
-        random = np.random.default_rng(0)
-        share = self.left if like is None or like is self else self.on_equal_terms
-        return [share[item in HELD] * random.normal(size=2000) for item in items]
-
-
-def first_of(best: Made, other: Made, effect: str | None = None) -> str:
-    """Which of two is taken; `effect`: of which both are shapes."""
-    tried: list[Any] = [
-        screening.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
-        for made in (best, other)
-    ]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    first: Any = merit.simplest_first(tried, records)[0].fitted
-    return str(first.name)
 
 
 def test_what_a_shape_leaves_free_is_part_of_the_effect() -> None:

@@ -22,6 +22,7 @@ from hystgen.records import Record
 
 Array = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class Prepared:
     """Records to fit and held-out ones, and what was done to them.

@@ -20,6 +20,7 @@ from hystgen.effects.base import Run
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+
 def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[Mask]:
     """Samples of each record without which the prediction at the others would change by a part of the noise.
 

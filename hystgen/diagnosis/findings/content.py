@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.diagnosis.data import bad_samples, disturbances, periodic, stick_slip
 from hystgen.diagnosis.data.items import Item, rms
@@ -17,6 +18,8 @@ from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, N
 from hystgen.diagnosis.search import acceptance
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.selection import Found, Outcome
+
+Array = NDArray[np.float64]
 
 ONE_LOOP = (
     "all records pass one loop, which tells little more than of one effect: add smaller loops inside it, other speeds "
@@ -80,7 +83,7 @@ def result_of(
 
 
 def _unexplained(
-    ready: Prepared, after: Sequence[list[np.ndarray[Any, Any]]], noise: float, usual: float, odd: Sequence[Finding]
+    ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
     """What the model leaves that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]

@@ -39,7 +39,7 @@ def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
     noise, since coloured noise exceeds its floor.
     """
     limit = NOISE if share > STRUCTURE_SHARE else FAR_ABOVE_NOISE
-    return bool(noise) and not error / noise > limit
+    return not error > limit * noise
 
 
 def apart(more: float, less: float) -> float:

@@ -25,6 +25,7 @@ from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 
+
 class _Block:
     """A record's part of the system about a shape and weights: plays and measured output, reduced; then derivatives.
 

@@ -24,6 +24,7 @@ from hystgen.records import Record
 
 Array = NDArray[np.float64]
 
+
 def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
     """The nominal front as a member of a family, and its shape in that family."""
     if not stages:

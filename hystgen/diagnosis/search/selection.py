@@ -27,6 +27,7 @@ from hystgen.identification.weights import Weights
 
 Array = NDArray[np.float64]
 
+
 @dataclass(frozen=True)
 class Found:
     """An effect that was accepted, and the held-out rms before and after it."""
