@@ -31,9 +31,7 @@ from hystgen.verification.compilers import C_WARNINGS
 
 DEVIATIONS = Path(__file__).parent / "deviations.yaml"
 TOOLS = ("cppcheck", "clang-tidy", "gcc", "clang-format")
-STANDING = (("two_branches", "float32", "loop"), ("two_branches", "q15", "loop"), ("listed", "float64", "corners"),
-            ("bent", "q31", "corners"))  # fmt: skip
-"""Units of `units.py`, which have every file of the run time between them."""
+
 
 MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("plain", "inverse", "float32", "corners", "self-contained"),
@@ -188,7 +186,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="hystgen-static-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
         emitted = [emit(Path(name) / "-".join(module), *module) for module in MODULES]
         jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in RUN]
-        jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in STANDING]
+        jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in units.UNITS]
         files = sorted(units.RUNTIME.glob("*.[ch]"))
         jobs.append(pool.submit(lambda: list(clang_format(tools["clang-format"], files))))
         findings = [finding for job in jobs for finding in job.result()]
