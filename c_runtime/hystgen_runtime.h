@@ -53,6 +53,7 @@ typedef hystgen_real_t hystgen_sum_t;
 #define HYSTGEN_KERNEL
 #define HYSTGEN_FIXED_KERNEL
 #define HYSTGEN_APART_IN_FLOAT HYSTGEN_APART
+#define HYSTGEN_APART_IN_FIXED HYSTGEN_APART
 
 #ifdef HYSTGEN_FIXED
 #include "build_fixed.h"

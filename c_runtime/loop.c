@@ -8,14 +8,6 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
     hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_forward_arrive(self, v));
 }
 
-/* What init and reset have in common once the plays are set. */
-static void hystgen_forward_begin(hystgen_forward_t *self)
-{
-    self->status = 0;
-    self->answer = hystgen_forward_output(self);
-    self->status = 0; /* no step has answered yet */
-}
-
 /* The actuator has seen drive v. */
 static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
 {
@@ -43,8 +35,9 @@ static void hystgen_inverse_take(hystgen_inverse_t *self)
 }
 
 /* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
-static hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u,
-                                             hystgen_real_t level, unsigned int bits)
+HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self,
+                                                             hystgen_real_t u, hystgen_real_t level,
+                                                             unsigned int bits)
 {
     if (self->repeat && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;

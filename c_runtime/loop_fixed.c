@@ -5,12 +5,11 @@
 /* One sample. */
 hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
 {
-    const hystgen_reach_t asked = v;
-    if (asked < HYSTGEN_DRIVE_MIN || asked > HYSTGEN_DRIVE_MAX) {
-        v = hystgen_clamp_drive(v);
+    const hystgen_real_t inside = hystgen_clamp_drive(v);
+    if (inside != v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    hystgen_forward_absorb(self, v);
+    hystgen_forward_absorb(self, inside);
     self->answer = hystgen_forward_output(self);
     return self->answer;
 }
@@ -18,15 +17,9 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
 /* One sample. */
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
-    const hystgen_reach_t asked = u;
-    hystgen_real_t level = u;
-    unsigned int bits = 0;
+    const hystgen_real_t level = hystgen_inverse_clamp(u);
     hystgen_inverse_take(self);
-    if (asked < HYSTGEN_OUTPUT_MIN || asked > HYSTGEN_OUTPUT_MAX) {
-        level = hystgen_inverse_clamp(u);
-        bits = HYSTGEN_STATUS_INPUT_CLAMPED;
-    }
-    return hystgen_inverse_search(self, u, level, bits);
+    return hystgen_inverse_search(self, u, level, level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u);
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)

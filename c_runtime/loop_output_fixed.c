@@ -9,6 +9,13 @@ static hystgen_real_t hystgen_forward_output(hystgen_forward_t *self)
                         &self->status);
 }
 
+/* What init and reset have in common once the plays are set. */
+static void hystgen_forward_begin(hystgen_forward_t *self)
+{
+    self->answer = 0; /* no step has answered yet */
+    self->status = 0;
+}
+
 static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
 {
     unsigned int status = 0; /* of what no step has answered */
@@ -17,8 +24,7 @@ static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
 }
 
 /* Input of the plays that gives output code `level`. */
-HYSTGEN_APART hystgen_reach_t hystgen_inverse_solve(const hystgen_inverse_t *self,
-                                                    hystgen_real_t level)
+static hystgen_reach_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level)
 {
     const hystgen_sum_t output =
         (hystgen_sum_t)level * ((hystgen_sum_t)1 << HYSTGEN_FRACTION) - HYSTGEN_OFFSET;

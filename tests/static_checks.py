@@ -1,9 +1,10 @@
-"""Static checks of the emitted C: cppcheck with its MISRA C:2012 addon, clang-tidy, gcc -fanalyzer.
+"""Static checks of the C: cppcheck with its MISRA C:2012 addon, clang-tidy, gcc -fanalyzer, clang-format.
 
     python tests/static_checks.py
 
 Emits the modules of MODULES and fails on every finding of a rule or check that `deviations.yaml` does not list with a
-reason, and on every one listed there that no module shows any more. gcc has to find nothing at all.
+reason, and on every one listed there that no module shows any more. gcc has to find nothing at all. The files of
+`c_runtime/` are looked at as they stand too, by clang-tidy and gcc in the units of UNITS, and by clang-format.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+import units
 from modelfiles import FILES
 from ruamel.yaml import YAML
 
@@ -28,7 +30,8 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.verification.compilers import C_WARNINGS
 
 DEVIATIONS = Path(__file__).parent / "deviations.yaml"
-TOOLS = ("cppcheck", "clang-tidy", "gcc")
+TOOLS = ("cppcheck", "clang-tidy", "gcc", "clang-format")
+
 
 MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("plain", "inverse", "float32", "corners", "self-contained"),
@@ -107,9 +110,9 @@ def cppcheck(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
             yield Finding("cppcheck", found["check"] if found else None, line)
 
 
-def clang_tidy(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
+def clang_tidy(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> Iterator[Finding]:
     """Each file alone."""
-    done = _run([tool, *CLANG_TIDY, *sources, "--", "-std=c99", "-ffreestanding"])
+    done = _run([tool, *CLANG_TIDY, *sources, "--", "-std=c99", "-ffreestanding", *more])
     said = [re.search(r" (warning|error): .* \[([\w.,-]+)\]$", line) for line in done.stdout.splitlines()]
     for found in filter(None, said):
         for check in found[2].split(","):
@@ -118,15 +121,33 @@ def clang_tidy(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
         yield Finding("clang-tidy", None, done.stdout + done.stderr)
 
 
-def gcc(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
+def gcc(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> Iterator[Finding]:
     """Warnings are errors here."""
     for source in sources:
-        done = _run([tool, *GCC, source])
+        done = _run([tool, *GCC, *more, source])
         if done.returncode:
             yield Finding("gcc", None, done.stderr)
 
 
+def clang_format(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
+    """Files that are formatted otherwise than the `.clang-format` beside them says."""
+    done = _run([tool, "--dry-run", "--Werror", *sources])
+    if done.returncode:
+        yield Finding("clang-format", None, done.stderr)
+
+
+def standing(tools: Mapping[str, str], folder: Path, unit: tuple[str, str, str]) -> Iterator[Finding]:
+    """A unit of the run time as it stands; what a model does not call is left out by emission alone."""
+    source = units.write(folder, *unit)
+    more = [f"-I{units.RUNTIME}", *units.FLAGS, *units.DEFINES[unit[1]]]
+    yield from gcc(tools["gcc"], [source], more)
+    for finding in clang_tidy(tools["clang-tidy"], [source], more):
+        if finding.rule != "bugprone-suspicious-include":  # that files are included is what the unit is for
+            yield finding
+
+
 RUN = {"cppcheck": cppcheck, "clang-tidy": clang_tidy, "gcc": gcc}
+"""What looks at a module."""
 
 
 def problems(findings: Sequence[Finding], listed: Mapping[str, Mapping[str, str]], complete: bool = True) -> list[str]:
@@ -164,7 +185,10 @@ def main() -> int:
             return 1
     with tempfile.TemporaryDirectory(prefix="hystgen-static-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
         emitted = [emit(Path(name) / "-".join(module), *module) for module in MODULES]
-        jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in tools]
+        jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in RUN]
+        jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in units.UNITS]
+        files = sorted(units.RUNTIME.glob("*.[ch]"))
+        jobs.append(pool.submit(lambda: list(clang_format(tools["clang-format"], files))))
         findings = [finding for job in jobs for finding in job.result()]
     said = problems(findings, deviations())
     print("\n".join(said) or f"static checks: {', '.join(tools)} find nothing in {len(MODULES)} modules but deviations")

@@ -1,7 +1,8 @@
-"""The hand-written C kernels on their own: they compile clean, and the corner list is the textbook model."""
+"""The files of `c_runtime/` as they stand: they compile clean, and are the textbook model and the bit reference."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -9,7 +10,12 @@ from pathlib import Path
 import cffi
 import numpy as np
 import pytest
+import units
 
+from hystgen import compiled, fixed, reference
+from hystgen.emission import runtime
+from hystgen.verification import signals
+from hystgen.verification.comparison import REALS
 from hystgen.verification.compilers import C_WARNINGS, WARNINGS
 
 RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
@@ -133,3 +139,65 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
         np.testing.assert_allclose(run(loop, 0, v), y, rtol=0, atol=1e-13 * scale)
         drive = run(loop, 1, y)
         np.testing.assert_allclose(brute_output(drive, r, p), y, rtol=0, atol=1e-13 * scale)
+
+
+@pytest.mark.parametrize("unit", units.UNITS, ids="-".join)
+def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str, str, str], tmp_path: Path) -> None:
+    """Compiled clean by gcc and clang, nothing renamed, nothing left out."""
+    name, arithmetic, engine = unit
+    source = units.write(tmp_path, *unit)
+    flags = ["-std=c99", "-O2", "-fPIC", "-shared", *C_WARNINGS, *units.FLAGS, *units.DEFINES[arithmetic]]
+    one, real = units.model(name), REALS[arithmetic]
+    numbers = one.tables(arithmetic, engine)
+    number = {"f4": "float", "f8": "double", "i4": "int32_t", "i2": "int16_t"}[real.str[1:]]
+    for compiler in ("gcc", "clang"):
+        binary = tmp_path / f"{compiler}.so"
+        command = [compiler, *flags, f"-I{units.RUNTIME}", str(source), "-o", str(binary)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        ffi = cffi.FFI()
+        for op in ("forward", "inverse"):
+            ffi.cdef(
+                f"void hystgen_{op}_init(void *); void hystgen_{op}_reset(void *, {number}); "
+                f"{number} hystgen_{op}_step(void *, {number}); unsigned hystgen_{op}_status(void *);"
+            )
+        ffi.cdef(f"void hystgen_inverse_commit(void *, {number});")
+        library = ffi.dlopen(str(binary))
+        for op in ("forward", "inverse"):
+            record = "commits" if op == "inverse" else "resets"
+            _, call, x = next(c for c in signals.suite(numbers, real, op == "inverse", 2000) if c[0] == record)
+            values = x.astype(real).astype(numbers.threshold.dtype)
+            expected, bits = compiled.answers(numbers, int(op == "inverse"), call, values)
+            self = ffi.new("double[]", 4096)
+            found, status = np.zeros(len(x), real), np.zeros(len(x), np.uint8)
+            init, reset, step, read = (getattr(library, f"hystgen_{op}_{w}") for w in ("init", "reset", "step", "status"))
+            init(self)
+            for i, (kind, value) in enumerate(zip(call, values.tolist(), strict=True)):
+                if kind == reference.OP_STEP:
+                    found[i] = step(self, value)
+                elif kind == reference.OP_COMMIT:
+                    library.hystgen_inverse_commit(self, value)
+                elif kind == reference.OP_RESET:
+                    reset(self, value)
+                else:
+                    init(self)
+                status[i] = read(self)
+            assert found.tobytes() == expected.astype(real).tobytes(), (compiler, op)
+            assert status.tolist() == bits.tolist(), (compiler, op)
+
+
+def test_every_file_is_in_a_unit() -> None:
+    found = set().union(*(units.files(*unit) for unit in units.UNITS))
+    states = {"hystgen_corners_state.h", "hystgen_corners_fixed_state.h"}  # of kernels, which all units have
+    files = {path.name for path in [*RUNTIME.glob("*.c"), *RUNTIME.glob("*_state.h")]}
+    assert files - states - {"hystgen_runtime.c"} == found
+
+
+def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
+    """What both operators do alike has their prefixes in C alone; Python has no status function, a run reads it."""
+    own = {function.__name__ for function in (*reference.COMPILED, *fixed.COMPILED)}
+    texts = [path.read_text() for path in RUNTIME.glob("loop*.c")]
+    names = {piece.name.removeprefix("hystgen_") for text in texts for piece in runtime.split_pieces(text)}
+    assert len(names) > 20
+    start = {"loop_init"}  # of two files, one of which is chosen where Python asks how long the list is
+    assert {n for n in names if n not in own and re.sub("^(forward|inverse)_", "", n) not in own} == start

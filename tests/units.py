@@ -6,8 +6,9 @@ The model is called `hystgen`, so that its macros and tables have the names that
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
-from modelfiles import FILES
+from mutants import MODELS
 
 from hystgen.emission import module, runtime
 from hystgen.emission.calls import emit_options
@@ -27,29 +28,45 @@ DEFINES = {
 FLAGS = ["-ffp-contract=off", "-Wno-unused-function"]
 """A file has functions for every model; emission leaves out those that one model does not call."""
 
-UNITS = [
-    (name, arithmetic, engine)
-    for name in ("plain", "listed", "bent", "two_branches", "linear")
-    for arithmetic in DEFINES
-    for engine in ("corners", "loop")
-]
-"""Plays alone, a list to start from, one branch and two; without a play."""
+UNITS = (
+    ("two_branches", "float32", "loop"),
+    ("two_branches", "q15", "loop"),
+    ("two_branches", "float32", "corners"),
+    ("listed", "float64", "loop"),
+    ("bent", "q31", "loop"),
+    ("bent", "q31", "corners"),
+    ("bent", "float64", "corners"),
+    ("plain", "float32", "corners"),
+    ("plain", "q15", "corners"),
+    ("above", "q31", "corners"),
+    ("far_low", "q15", "loop"),
+)
+"""Every file of `c_runtime/` is in one of them."""
 
 
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    return Model(parse_parameters(FILES[name], f"{name}.yaml").model_copy(update={"name": "hystgen"}))
+    return Model(parse_parameters(MODELS[name], f"{name}.yaml").model_copy(update={"name": "hystgen"}))
+
+
+def files(name: str, arithmetic: str, engine: str) -> set[str]:
+    """The files that a unit is made of."""
+    values = _values(name, arithmetic, engine)
+    states = map(values.variant.state, ("forward", "inverse"))
+    return {*values.variant.sources(), *values.family.kernel_files, *states}
+
+
+def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
+    one = model(name)
+    options = emit_options(one, operator="both", arithmetic=arithmetic, engine=engine, layout="self-contained")
+    return module.values_of(one.parameters, one.cascade, options)
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
-    one = model(name)
-    options = emit_options(one, operator="both", arithmetic=arithmetic, engine=engine, layout="self-contained")
-    values = module.values_of(one.parameters, one.cascade, options)
+    values = _values(name, arithmetic, engine)
     operators = ("forward", "inverse")
     headers = [*map(values.variant.state, operators), *(f"hystgen_{op}_api.h" for op in operators)]
-    family = values.family
-    kernels = family.kernel_files
     text = "\n".join(
         [
             '#include "hystgen_runtime.h"',
@@ -58,7 +75,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *values.status,
             *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in values.constants),
             *(f'#include "{header}"' for header in headers),
-            *(f'#include "{file}"' for file in kernels),
+            *(f'#include "{file}"' for file in values.family.kernel_files),
             *values.arrays,
             *values.beside,
             values.glue,

@@ -299,6 +299,7 @@ def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: s
     """Operators, or the types of their instances, as C text of the model `name` with the run time `prefix`."""
     text = "\n".join(piece.text for piece in pieces)
     text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
+    text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
 
 
