@@ -44,6 +44,7 @@ STEPS = 120
 """Fits of a diagnosis, about, for the progress bar."""
 
 
+@arguments.checked
 def diagnose(
     parameters: Any,
     records: Source | Iterable[Source],
