@@ -165,7 +165,8 @@ KILLED = (
         "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX - 1", "far_low", "q15",
     ),
     Mutant(
-        "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX", "code < -HYSTGEN_CODE_MAX ? code", "far_low", "q15",
+        "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX",
+        "code < -HYSTGEN_CODE_MAX ? code", "far_low", "q15",
     ),
     Mutant(
         "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",

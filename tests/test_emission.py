@@ -486,7 +486,7 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", ["plain", "listed", "bent", "two_branches"])
 def test_numbers_of_functions_have_a_name(name: str, arithmetic: str, engine: str) -> None:
-    """None but counts, of coefficients say, stands twice outside of tables and macros, and no offset of 0 is written out."""
+    """None but counts stands twice outside of tables and macros, and no offset of 0 is written out."""
     files = hystgen.api.emitted_files(model(name), operator="both", arithmetic=arithmetic, engine=engine)
     code = re.sub(r"/\*.*?\*/", "", files[f"{name}.c"], flags=re.DOTALL)
     code = re.sub(r"^#(?:.*\\\n)*.*$", "", code, flags=re.MULTILINE)

@@ -170,7 +170,8 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
             expected, bits = compiled.answers(numbers, int(op == "inverse"), call, values)
             self = ffi.new("double[]", 4096)
             found, status = np.zeros(len(x), real), np.zeros(len(x), np.uint8)
-            init, reset, step, read = (getattr(library, f"hystgen_{op}_{w}") for w in ("init", "reset", "step", "status"))
+            own = (getattr(library, f"hystgen_{op}_{word}") for word in ("init", "reset", "step", "status"))
+            init, reset, step, read = own
             init(self)
             for i, (kind, value) in enumerate(zip(call, values.tolist(), strict=True)):
                 if kind == reference.OP_STEP:

@@ -177,7 +177,9 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
             "runtime.c.j2",
             values,
             banner=_banner(values, f"{file}.c", f"see {file}.h"),
-            implementation="\n".join([whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels, whole(*family.closing)]),
+            implementation="\n".join(
+                [whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels, whole(*family.closing)]
+            ),
         ),
     }
 
@@ -221,7 +223,8 @@ def values_of(parameters: Parameters, cascade: Cascade, options: Options) -> Sim
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
-    values.states = runtime.render_operators(runtime.state_pieces(values.variant, operators), name, values.corners, prefix, family)
+    states = runtime.state_pieces(values.variant, operators)
+    values.states = runtime.render_operators(states, name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
     values.api = runtime.api(operators, name, prefix, family)

@@ -66,7 +66,7 @@ def _float_fields(parameters: Parameters, cascade: Cascade, options: Options, pr
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
     stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
     arrays = (_corner_fields if corners else _loop_fields)(numbers, name, prefix, options)
-    own = [] if corners else [_loop_tables(_loop_pointers(numbers, name, options), numbers, name, prefix)]
+    own = [] if corners else [_loop_tables(_loop_pointers(name, options), numbers, name, prefix)]
     return {
         **_limits(numbers),
         "arrays": arrays,
@@ -102,7 +102,7 @@ def _loop_fields(numbers: Tables, name: str, prefix: str, options: Options) -> l
     return arrays
 
 
-def _loop_pointers(numbers: Tables, name: str, options: Options) -> list[str]:
+def _loop_pointers(name: str, options: Options) -> list[str]:
     """Pointers to these arrays, NULL for those that nothing reads."""
     places = {field: f"{name}_play.{own}" for field, own, both in _COLUMNS if both or options.inverse}
     return [places.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
