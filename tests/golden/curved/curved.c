@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 2eeaa1c09817e2fb449317e33e070e63159f134b681ca26289b591b46d4ef590, without this line
+ * Text: sha256 daba7cc92c24657f3510d43ff9fd806e87dc0175d7558028014ab227fc15bc42, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -468,14 +468,14 @@ static curved_real_t curved_clamp_drive(curved_reach_t v)
 {
     return (curved_real_t)(v < CURVED_DRIVE_MIN   ? CURVED_DRIVE_MIN
                            : v > CURVED_DRIVE_MAX ? CURVED_DRIVE_MAX
-                                                   : v);
+                                                  : v);
 }
 
 static curved_real_t curved_inverse_clamp(curved_reach_t u)
 {
     return (curved_real_t)(u < CURVED_OUTPUT_MIN   ? CURVED_OUTPUT_MIN
                            : u > CURVED_OUTPUT_MAX ? CURVED_OUTPUT_MAX
-                                                    : u);
+                                                   : u);
 }
 
 /* Output code of a sum. */
@@ -485,7 +485,7 @@ static curved_real_t curved_code(curved_sum_t sum, unsigned int *status)
     (void)status;
     return (curved_real_t)(code > CURVED_CODE_MAX    ? CURVED_CODE_MAX
                            : code < -CURVED_CODE_MAX ? -CURVED_CODE_MAX
-                                                      : code);
+                                                     : code);
 }
 
 /* Input of the plays: w = G[v]. */
