@@ -235,8 +235,8 @@ EQUIVALENT = (
     # Segments meet at a kink: either of them leads on from there.
     *(
         Mutant(
-            "at a kink the play above does not follow yet", CORNERS, "const bool begun = on >= (by_output",
-            "const bool begun = on > (by_output", name, bits,
+            "at a kink the play above does not follow yet", CORNERS, "                on >= (by_output",
+            "                on > (by_output", name, bits,
         )
         for name, bits in (("plain", "q31"), ("coarse", "q15"))
     ),
