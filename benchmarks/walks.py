@@ -89,6 +89,7 @@ def runs(folder: Path) -> dict[str, Callable[[], object]]:
     model = hystgen.load(parameters)
     crept(model, recording)
     drive = [0.1 * (k % 40) for k in range(80)]
+    session = model.session("inverse", "float32")
 
     def named() -> None:
         if hasattr(os, "sched_setaffinity"):  # one core: no other processes
@@ -99,7 +100,7 @@ def runs(folder: Path) -> dict[str, Callable[[], object]]:
     return {
         "a recording's column v to weights": lambda: hystgen.identify(EXAMPLES / "stage_recording.csv"),
         "a weight to its digit in float32 C": lambda: hystgen.emit(model, folder / "out", arithmetic="float32"),
-        IN_PYTHON: lambda: model.simulate(drive, "float32"),
+        IN_PYTHON: lambda: session.run(drive),
         "a recording to a named effect": named,
     }
 

@@ -28,6 +28,12 @@ static const hystgen_real_t hystgen_atanh_row[8][5] = {
     {0.29977226f, 0.27453083f, -0.07536596f, 0.02760172f, -0.011743604f},
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
+/* The piece of [1, 2) that m lies in, a whole number of 2^24 to [1, 2). */
+static inline unsigned int hystgen_atanh_piece(uint_least32_t m)
+{
+    return (unsigned int)(m >> 21) & 7u;
+}
+
 HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 {
     hystgen_real_t a = x < 0.0f ? -x : x;
@@ -41,17 +47,18 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 
     /* exact down to d and e */
     const hystgen_real_t u = 1.0f - a;
+    const uint_least32_t two = 33554432u; /* 2^25 */
     const uint_least32_t whole = (uint_least32_t)(u * 16777216.0f);
     uint_least32_t m = whole << 1; /* to be brought to 2^24 .. 2^25 - 1 */
     unsigned int k = 1u;
     for (step = 16u; step > 0u; step >>= 1) {
-        if (m < (uint_least32_t)1u << (25u - step)) {
+        if (m < two >> step) {
             m <<= step;
             k += step;
         }
     }
-    const unsigned int i = (unsigned int)(m >> 21) & 7u;
-    const unsigned int j = (unsigned int)((33554432u - whole) >> 21) & 7u;
+    const unsigned int i = hystgen_atanh_piece(m);
+    const unsigned int j = hystgen_atanh_piece(two - whole);
     const hystgen_real_t d =
         u * (hystgen_real_t)((uint_least32_t)1u << k) - hystgen_atanh_center[i];
     const hystgen_real_t e = a - hystgen_atanh_offset[j - 4u];

@@ -48,6 +48,12 @@ static const hystgen_real_t hystgen_atanh_row[8][11] = {
      -0.008872914618661135, 0.0036639147803697886, -0.0015759958357201482, 0.0006972571680012851,
      -0.00031316844998055933, 0.0001451208468374469, -0.00022989476911220504}};
 
+/* The piece of [1, 2) that m lies in, a whole number of 2^53 to [1, 2). */
+static inline unsigned int hystgen_atanh_piece(uint_least64_t m)
+{
+    return (unsigned int)(m >> 50) & 7u;
+}
+
 HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 {
     hystgen_real_t a = x < 0.0 ? -x : x;
@@ -65,17 +71,18 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
 
     /* exact down to d and e */
     const hystgen_real_t u = 1.0 - a;
+    const uint_least64_t two = (uint_least64_t)1u << 54;
     const uint_least64_t whole = (uint_least64_t)(u * 9007199254740992.0);
     uint_least64_t m = whole << 1; /* to be brought to 2^53 .. 2^54 - 1 */
     unsigned int k = 1u;
     for (step = 32u; step > 0u; step >>= 1) {
-        if (m < (uint_least64_t)1u << (54u - step)) {
+        if (m < two >> step) {
             m <<= step;
             k += step;
         }
     }
-    const unsigned int i = (unsigned int)(m >> 50) & 7u;
-    const unsigned int j = (unsigned int)((((uint_least64_t)1u << 54) - whole) >> 50) & 7u;
+    const unsigned int i = hystgen_atanh_piece(m);
+    const unsigned int j = hystgen_atanh_piece(two - whole);
     const hystgen_real_t d =
         u * (hystgen_real_t)((uint_least64_t)1u << k) - hystgen_atanh_center[i];
     const hystgen_real_t e = a - hystgen_atanh_offset[j - 4u];

@@ -5,5 +5,6 @@
 static inline int64_t hystgen_inverse_left(int64_t on, uint32_t slope, uint32_t way)
 {
     const uint32_t left = (uint32_t)on - slope * way;
-    return (int64_t)(left ^ 0x80000000u) - (int64_t)0x80000000u;
+    const uint32_t sign = 0x80000000u;
+    return (int64_t)(left ^ sign) - (int64_t)sign;
 }

@@ -1,19 +1,24 @@
 #include "hystgen_runtime.h"
 
-#if (-1 >> 1) != -1
-#error "right shifts of negative numbers have to keep the sign"
-#endif
+/* Bits of a word and of half of one, and the lower half. */
+#define HYSTGEN_WORD 32u
+#define HYSTGEN_HALF_WORD 16u
+#define HYSTGEN_LOW_HALF 0xffffu
 
 /* a times b. Cores without a long multiplication take half words, which is what they can do without
  * a call. */
 HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
 {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
-    const uint32_t low = (a & 0xffffu) * (b & 0xffffu);
-    const uint32_t one = (a >> 16) * (b & 0xffffu) + (low >> 16);
-    const uint32_t other = (a & 0xffffu) * (b >> 16) + (one & 0xffffu);
-    return (uint64_t)((a >> 16) * (b >> 16) + (one >> 16) + (other >> 16)) << 32 |
-           (other << 16 | (low & 0xffffu));
+    const uint32_t low = (a & HYSTGEN_LOW_HALF) * (b & HYSTGEN_LOW_HALF);
+    const uint32_t one =
+        (a >> HYSTGEN_HALF_WORD) * (b & HYSTGEN_LOW_HALF) + (low >> HYSTGEN_HALF_WORD);
+    const uint32_t other =
+        (a & HYSTGEN_LOW_HALF) * (b >> HYSTGEN_HALF_WORD) + (one & HYSTGEN_LOW_HALF);
+    return (uint64_t)((a >> HYSTGEN_HALF_WORD) * (b >> HYSTGEN_HALF_WORD) +
+                      (one >> HYSTGEN_HALF_WORD) + (other >> HYSTGEN_HALF_WORD))
+               << HYSTGEN_WORD |
+           (other << HYSTGEN_HALF_WORD | (low & HYSTGEN_LOW_HALF));
 #else
     return (uint64_t)a * b;
 #endif
@@ -23,11 +28,12 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift)
 {
-    const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> 32;
-    const uint64_t quotient = hystgen_wide((uint32_t)((uint64_t)d >> 32), reciprocal) + low;
-    const uint32_t high = (uint32_t)(quotient >> 32);
-    const uint32_t whole =
-        (high & (((uint32_t)1 << shift) - 1u)) << (32u - shift) | (uint32_t)quotient >> shift;
-    return (int64_t)(((uint64_t)(high >> shift) << 32 | whole) +
+    const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> HYSTGEN_WORD;
+    const uint64_t quotient =
+        hystgen_wide((uint32_t)((uint64_t)d >> HYSTGEN_WORD), reciprocal) + low;
+    const uint32_t high = (uint32_t)(quotient >> HYSTGEN_WORD);
+    const uint32_t whole = (high & (((uint32_t)1 << shift) - 1u)) << (HYSTGEN_WORD - shift) |
+                           (uint32_t)quotient >> shift;
+    return (int64_t)(((uint64_t)(high >> shift) << HYSTGEN_WORD | whole) +
                      ((uint32_t)quotient >> (shift - 1u) & 1u));
 }

@@ -12,6 +12,7 @@ from modelfiles import FILES, PLAYS, head
 STEP = "c_runtime/loop_float.c"
 LOOP = "c_runtime/loop.c"
 CODES = "c_runtime/code_saturating.c"
+FINER = "c_runtime/front_finer.c"
 CORNERS = "c_runtime/corners_fixed.c"
 USUAL = "c_runtime/inverse_fixed.c"
 FRONT = "c_runtime/inverse_front_fixed.c"
@@ -165,7 +166,7 @@ KILLED = (
         "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX - 1", "far_low", "q15",
     ),
     Mutant(
-        "halves of codes are rounded up on either side of 0", CURVE, " - (x < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
+        "halves of codes are rounded up on either side of 0", FINER, " - (w < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
     ),
     Mutant(
         "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX",
@@ -234,8 +235,8 @@ EQUIVALENT = (
     # Segments meet at a kink: either of them leads on from there.
     *(
         Mutant(
-            "at a kink the play above does not follow yet", CORNERS, "const bool begun = on >= (by_output",
-            "const bool begun = on > (by_output", name, bits,
+            "at a kink the play above does not follow yet", CORNERS, "                on >= (by_output",
+            "                on > (by_output", name, bits,
         )
         for name, bits in (("plain", "q31"), ("coarse", "q15"))
     ),

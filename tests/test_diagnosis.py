@@ -116,7 +116,7 @@ class TestBlindPlants:
         (case, _), *_ = made(tmp_path, "none", 1)
         (tmp_path / "file").touch()
         (tmp_path / "taken" / "report.html").mkdir(parents=True)
-        monkeypatch.setattr("hystgen.api.diagnose", lambda *_, **__: pytest.fail("searched"))
+        monkeypatch.setattr("hystgen.report.diagnosed.diagnose", lambda *_, **__: pytest.fail("searched"))
         data = sorted(case.glob("r*.csv"))[:2]
         code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
         assert (code, out) == (2, "")

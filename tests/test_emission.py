@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import functools
+import itertools
 import os
 import re
 import subprocess
@@ -16,8 +17,10 @@ from modelfiles import FILES
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.names import MAX_NAME
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.engines import ENGINES, choose
+from hystgen.emission import banner, runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.text import literal
 from hystgen.front.dead_zone.model import DeadZone
@@ -443,6 +446,68 @@ def test_nothing_forbidden_in_the_text(name: str) -> None:
         assert " / " not in re.sub(r"\) / 2|middle\) / 2", "", code).replace("+ 1) / 2", ""), file
         includes = set(re.findall(r"#include <(\w+)\.h>", code))
         assert includes <= {"stdint", "stdbool", "stddef", "float"}, file
+
+
+def renamed(name: str, to: str) -> Model:
+    """A model under another name, with a description of many words."""
+    text = FILES[name].replace(f"name: {name}\n", f"name: {to}\ndescription: {'piezo ' * 40}\n")
+    return Model(parse_parameters(text, f"{name}.yaml"))
+
+
+@pytest.mark.parametrize("name", ["x", "n" * MAX_NAME])
+@pytest.mark.parametrize("kind", ["plain", "listed", "bent", "mixed"])
+def test_no_line_is_longer_than_100_columns(kind: str, name: str, tmp_path: Path) -> None:
+    """Whatever the name: statements are broken anew. What is broken most still compiles, clean."""
+    one = renamed(kind, name)
+    for arithmetic, engine, layout in itertools.product(ARITHMETICS, ENGINES, LAYOUTS):
+        for operator in ("both", "forward", "inverse") if layout == LAYOUTS[0] else ("both",):
+            folder = tmp_path / f"{arithmetic}-{engine}-{layout}-{operator}"
+            hystgen.emit(one, folder, arithmetic=arithmetic, engine=engine, layout=layout, operator=operator)
+            for file in sorted(folder.glob("*.[ch]")):
+                for line in file.read_text().splitlines():
+                    assert len(line) <= 100, f"{folder.name}, {file.suffix}: {line}"
+                if file.suffix == ".c" and len(name) > 1:
+                    command = ["gcc", "-std=c99", "-fsyntax-only", *compilers.C_WARNINGS, file]
+                    done = subprocess.run(command, capture_output=True, text=True, check=False)
+                    assert done.returncode == 0, done.stderr
+
+
+def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
+    one = renamed("plain", "n" * MAX_NAME)
+    hystgen.emit(one, tmp_path, arithmetic="q15", engine="loop", layout="single-header", operator="both")
+    text = next(tmp_path.glob(f"{one.name}.h")).read_text()
+    read = banner.read(text)
+    assert read is not None
+    assert " \\\n" in text[: text.index("Parameters:")]
+    assert read.options == {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}
+    assert not read.edited
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("name", ["plain", "listed", "bent", "two_branches"])
+def test_numbers_of_functions_have_a_name(name: str, arithmetic: str, engine: str) -> None:
+    """None but counts stands twice outside of tables and macros, and no offset of 0 is written out."""
+    files = emitted_files(model(name), operator="both", arithmetic=arithmetic, engine=engine)
+    code = re.sub(r"/\*.*?\*/", "", files[f"{name}.c"], flags=re.DOTALL)
+    code = re.sub(r"^#(?:.*\\\n)*.*$", "", code, flags=re.MULTILINE)
+    code = re.sub(r"static const [^;]*?= \{.*?\};$", "", code, flags=re.DOTALL | re.MULTILINE)
+    assert f"{name}_{'inverse' if engine == 'loop' else 'forward'}_step" in code
+    assert not re.search(r"[+-] 0\.0f?\b|- 0[;)]", code)
+    found = re.findall(r"(?<![\w.])((?:0x[0-9a-f]+|\d+\.?\d*(?:e[+-]?\d+)?))[uLf]*(?!\w)", code)
+    counts = {str(i) for i in range(17)} | {"0.0", "1.0"}
+    assert [number for number in set(found) - counts if found.count(number) > 1] == []
+
+
+def test_templates_hold_no_algorithm() -> None:
+    """The bounds of the layout: short files, few questions."""
+    questions = 0
+    for path in runtime.data_folder("templates").iterdir():
+        text = path.read_text()
+        assert len(text.splitlines()) <= 150, path.name
+        tags = re.findall(r"\{[{%].*?[}%]\}", text, flags=re.DOTALL)
+        questions += sum(len(re.findall(r"\b(?:el)?if\b", tag)) for tag in tags)
+    assert 0 < questions <= 40
 
 
 def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:

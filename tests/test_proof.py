@@ -170,16 +170,15 @@ def test_no_sequence_of_calls_can_fault(name: str, arithmetic: str, engine: str,
 
 # Faults put into the emitted two_branches in q31, and the alarm that has to follow: table entries, limits, a loop, a
 # start; a search that goes too far
-CLAMP = r"(two_branches_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*"
 FAULTS = [
     ("loop", ".c", r"(#define TWO_BRANCHES_FRACTION )\d+u", r"\g<1>40u", "signed overflow"),
     ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
     ("loop", ".c", r"(_front_ascending_scale\[\d+\] = \{\s*)\d+", r"\g<1>32", "shift"),
-    ("loop", ".c", CLAMP, r"\1(two_branches_real_t)v", "signed downcast"),
+    ("loop", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
     ("loop", ".c", r"return \(two_branches_real_t\)\(code > [^;]*", r"return (two_branches_real_t)code", "downcast"),
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
     ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
-    ("corners", ".c", CLAMP, r"\1(two_branches_real_t)v", "signed downcast"),
+    ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
     ("corners", ".c", r"(_segment\[8\] = \{\s*\{[^}]*\},\s*\{)\d+", r"\g<1>9223372036854775807", "signed overflow"),
     ("corners", ".c", r"(middle = \(low \+ left\)) / 2;", r"\1 / 2 + 1u;", "out of bounds"),
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 import subprocess
@@ -12,8 +13,9 @@ import numpy as np
 import pytest
 import units
 
-from hystgen import compiled, fixed, reference
+from hystgen.compensator import reference, step, step_fixed, step_float
 from hystgen.emission import runtime
+from hystgen.plays import fixed, loop, slots
 from hystgen.verification import signals
 from hystgen.verification.comparison import REALS
 from hystgen.verification.compilers import C_WARNINGS, WARNINGS
@@ -167,18 +169,18 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
             record = "commits" if op == "inverse" else "resets"
             _, call, x = next(c for c in signals.suite(numbers, real, op == "inverse", 2000) if c[0] == record)
             values = x.astype(real).astype(numbers.threshold.dtype)
-            expected, bits = compiled.answers(numbers, int(op == "inverse"), call, values)
+            expected, bits = reference.answers(numbers, op == "inverse", call, values)
             self = ffi.new("double[]", 4096)
             found, status = np.zeros(len(x), real), np.zeros(len(x), np.uint8)
-            words = ("init", "reset", "step", "status")
-            init, reset, step, read = (getattr(library, f"hystgen_{op}_{word}") for word in words)
+            own = (getattr(library, f"hystgen_{op}_{word}") for word in ("init", "reset", "step", "status"))
+            init, reset, step, read = own
             init(self)
             for i, (kind, value) in enumerate(zip(call, values.tolist(), strict=True)):
-                if kind == reference.OP_STEP:
+                if kind == slots.OP_STEP:
                     found[i] = step(self, value)
-                elif kind == reference.OP_COMMIT:
+                elif kind == slots.OP_COMMIT:
                     library.hystgen_inverse_commit(self, value)
-                elif kind == reference.OP_RESET:
+                elif kind == slots.OP_RESET:
                     reset(self, value)
                 else:
                     init(self)
@@ -196,7 +198,9 @@ def test_every_file_is_in_a_unit() -> None:
 
 def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
     """What both operators do alike has their prefixes in C alone; Python has no status function, a run reads it."""
-    own = {function.__name__ for function in (*reference.COMPILED, *fixed.COMPILED)}
+    modules = (loop, fixed, step, step_float, step_fixed)
+    trees = (ast.parse(Path(module.__file__).read_text(encoding="utf-8")) for module in modules)
+    own = {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
     texts = [path.read_text() for path in RUNTIME.glob("loop*.c")]
     names = {piece.name.removeprefix("hystgen_") for text in texts for piece in runtime.split_pieces(text)}
     assert len(names) > 20

@@ -1,7 +1,8 @@
 """Lines of emitted C: none longer than WIDTH, however long the model's name is.
 
 The files of `c_runtime/` are formatted for the prefix `hystgen_`; with another name in them statements are broken
-anew. Tables, whose lines are made to fit, stay as they are.
+anew. Tables, whose lines are made to fit, stay as they are. clang-format formats `c_runtime/` but not what is emitted:
+its lines depend on its version, and the same parameters have to give the same bytes anywhere.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def _ends(lines: list[str], at: int) -> bool:
     """Whether a statement, or the head of a block, ends in this line."""
     code = re.sub(r"\s*/\*.*$", "", lines[at])
     following = lines[at + 1].strip() if at + 1 < len(lines) else "{"
-    return not code.strip() or code.endswith((";", "{", "}", ",;")) or following in ("{", "")
+    return not code.strip() or code.endswith((";", "{", "}")) or following in ("{", "")
 
 
 def _statement(lines: list[str], indent: str) -> Iterator[str]:
@@ -114,7 +115,10 @@ def _aligned(lines: list[str]) -> list[str]:
     for line in lines:
         column = len(line) - len(line.lstrip())
         if opened:
-            column = opened[-1] + column - first.setdefault(opened[-1], column)
+            base = first.setdefault(opened[-1], column)
+            choice = made[-1].rfind(" ? ") + 1
+            under = line.lstrip().startswith(": ") and column > base and choice  # the ? of the line before
+            column = under or opened[-1] + column - base
         made.append(" " * column + line.lstrip())
         for at, character in enumerate(re.sub(r"/\*.*", "", made[-1])):
             if character == "(":

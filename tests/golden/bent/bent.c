@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 e3b08553d8e84f2276ea4eaa1294c2eca02fb87077a44da4dba059e2a5e48138, without this line
+ * Text: sha256 74cf098374e114c6b58bd74b9435d7128eec5a7dcb0ba277f6265e166ccf3e41, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -224,14 +224,14 @@ static bent_real_t bent_clamp_drive(bent_real_t v)
 {
     return (bent_real_t)(v < BENT_DRIVE_MIN   ? BENT_DRIVE_MIN
                          : v > BENT_DRIVE_MAX ? BENT_DRIVE_MAX
-                                                 : v);
+                                              : v);
 }
 
 static bent_real_t bent_inverse_clamp(bent_real_t u)
 {
     return (bent_real_t)(u < BENT_OUTPUT_MIN   ? BENT_OUTPUT_MIN
                          : u > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX
-                                                  : u);
+                                               : u);
 }
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 f95bdcca773d828279146a7d224f87f54c627274a1b4c8f3f831292c55953f46, without this line
+ * Text: sha256 daba7cc92c24657f3510d43ff9fd806e87dc0175d7558028014ab227fc15bc42, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -56,16 +56,27 @@ typedef struct {
     int32_t last;
 } curved_ends_t;
 
+/* Bits of a word and of half of one, and the lower half. */
+#define CURVED_WORD 32u
+
+#define CURVED_HALF_WORD 16u
+
+#define CURVED_LOW_HALF 0xffffu
+
 /* a times b. Cores without a long multiplication take half words, which is what they can do without
  * a call. */
 static uint64_t curved_wide(uint32_t a, uint32_t b)
 {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
-    const uint32_t low = (a & 0xffffu) * (b & 0xffffu);
-    const uint32_t one = (a >> 16) * (b & 0xffffu) + (low >> 16);
-    const uint32_t other = (a & 0xffffu) * (b >> 16) + (one & 0xffffu);
-    return (uint64_t)((a >> 16) * (b >> 16) + (one >> 16) + (other >> 16)) << 32 |
-           (other << 16 | (low & 0xffffu));
+    const uint32_t low = (a & CURVED_LOW_HALF) * (b & CURVED_LOW_HALF);
+    const uint32_t one =
+        (a >> CURVED_HALF_WORD) * (b & CURVED_LOW_HALF) + (low >> CURVED_HALF_WORD);
+    const uint32_t other =
+        (a & CURVED_LOW_HALF) * (b >> CURVED_HALF_WORD) + (one & CURVED_LOW_HALF);
+    return (uint64_t)((a >> CURVED_HALF_WORD) * (b >> CURVED_HALF_WORD) +
+                      (one >> CURVED_HALF_WORD) + (other >> CURVED_HALF_WORD))
+               << CURVED_WORD |
+           (other << CURVED_HALF_WORD | (low & CURVED_LOW_HALF));
 #else
     return (uint64_t)a * b;
 #endif
@@ -75,12 +86,12 @@ static uint64_t curved_wide(uint32_t a, uint32_t b)
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
 static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift)
 {
-    const uint64_t low = curved_wide((uint32_t)d, reciprocal) >> 32;
-    const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> 32), reciprocal) + low;
-    const uint32_t high = (uint32_t)(quotient >> 32);
-    const uint32_t whole =
-        (high & (((uint32_t)1 << shift) - 1u)) << (32u - shift) | (uint32_t)quotient >> shift;
-    return (int64_t)(((uint64_t)(high >> shift) << 32 | whole) +
+    const uint64_t low = curved_wide((uint32_t)d, reciprocal) >> CURVED_WORD;
+    const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> CURVED_WORD), reciprocal) + low;
+    const uint32_t high = (uint32_t)(quotient >> CURVED_WORD);
+    const uint32_t whole = (high & (((uint32_t)1 << shift) - 1u)) << (CURVED_WORD - shift) |
+                           (uint32_t)quotient >> shift;
+    return (int64_t)(((uint64_t)(high >> shift) << CURVED_WORD | whole) +
                      ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
 
@@ -457,14 +468,14 @@ static curved_real_t curved_clamp_drive(curved_reach_t v)
 {
     return (curved_real_t)(v < CURVED_DRIVE_MIN   ? CURVED_DRIVE_MIN
                            : v > CURVED_DRIVE_MAX ? CURVED_DRIVE_MAX
-                                                   : v);
+                                                  : v);
 }
 
 static curved_real_t curved_inverse_clamp(curved_reach_t u)
 {
     return (curved_real_t)(u < CURVED_OUTPUT_MIN   ? CURVED_OUTPUT_MIN
                            : u > CURVED_OUTPUT_MAX ? CURVED_OUTPUT_MAX
-                                                    : u);
+                                                   : u);
 }
 
 /* Output code of a sum. */
@@ -474,7 +485,7 @@ static curved_real_t curved_code(curved_sum_t sum, unsigned int *status)
     (void)status;
     return (curved_real_t)(code > CURVED_CODE_MAX    ? CURVED_CODE_MAX
                            : code < -CURVED_CODE_MAX ? -CURVED_CODE_MAX
-                                                      : code);
+                                                     : code);
 }
 
 /* Input of the plays: w = G[v]. */

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 cc8e46b887463f74b63a78f80de01e54ddcf0da891d2f602bbdfafb27ee40545, without this line
+ * Text: sha256 ad3e88a8207ff946893272b6bd63f0accc1f0641782084b6762af6cc65ee730f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -316,7 +316,7 @@ static plain_real_t plain_clamp_drive(plain_real_t v)
 {
     return (plain_real_t)(v < PLAIN_DRIVE_MIN   ? PLAIN_DRIVE_MIN
                           : v > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX
-                                                  : v);
+                                                : v);
 }
 
 /* Any other sample than a usual one. */

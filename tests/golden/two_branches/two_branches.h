@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 073fe058f7efeb4f522c11b2b7d28ccfa00c2674be0e52172b8cbc7eec8bc4f1, without this line
+ * Text: sha256 b57d3d2ad5b50ccfd00246fe52e47909c565c61778a064b8b0b0553f1b3c36b3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -322,6 +322,12 @@ static const two_branches_real_t two_branches_atanh_row[8][5] = {
     {0.29977226f, 0.27453083f, -0.07536596f, 0.02760172f, -0.011743604f},
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
+/* The piece of [1, 2) that m lies in, a whole number of 2^24 to [1, 2). */
+static inline unsigned int two_branches_atanh_piece(uint_least32_t m)
+{
+    return (unsigned int)(m >> 21) & 7u;
+}
+
 static two_branches_real_t two_branches_atanh(two_branches_real_t x)
 {
     two_branches_real_t a = x < 0.0f ? -x : x;
@@ -335,17 +341,18 @@ static two_branches_real_t two_branches_atanh(two_branches_real_t x)
 
     /* exact down to d and e */
     const two_branches_real_t u = 1.0f - a;
+    const uint_least32_t two = 33554432u; /* 2^25 */
     const uint_least32_t whole = (uint_least32_t)(u * 16777216.0f);
     uint_least32_t m = whole << 1; /* to be brought to 2^24 .. 2^25 - 1 */
     unsigned int k = 1u;
     for (step = 16u; step > 0u; step >>= 1) {
-        if (m < (uint_least32_t)1u << (25u - step)) {
+        if (m < two >> step) {
             m <<= step;
             k += step;
         }
     }
-    const unsigned int i = (unsigned int)(m >> 21) & 7u;
-    const unsigned int j = (unsigned int)((33554432u - whole) >> 21) & 7u;
+    const unsigned int i = two_branches_atanh_piece(m);
+    const unsigned int j = two_branches_atanh_piece(two - whole);
     const two_branches_real_t d =
         u * (two_branches_real_t)((uint_least32_t)1u << k) - two_branches_atanh_center[i];
     const two_branches_real_t e = a - two_branches_atanh_offset[j - 4u];
@@ -709,7 +716,7 @@ static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v)
 {
     return (two_branches_real_t)(v < TWO_BRANCHES_DRIVE_MIN   ? TWO_BRANCHES_DRIVE_MIN
                                  : v > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX
-                                                         : v);
+                                                              : v);
 }
 
 /* Whether going to v is a move of the branch that v was computed on. */
