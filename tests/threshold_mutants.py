@@ -176,6 +176,8 @@ def main(arguments: Sequence[str]) -> int:
     if wrong:
         parser.error(f"no such number: {', '.join(sorted(wrong))}")
     os.chdir(ROOT)
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):  # imported once for all processes
+        pytest.main(["--collect-only", "-q", "-p", "no:cacheprovider", *(given.tests or FILES)])
     fast = table(given.tests or FILES, given.seconds)
     print(f"{len(fast)} fast tests, {sum(seconds for seconds, _ in fast.values()):.0f} s")
     inside, results = read_inside(), {}
