@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings.kinds import Finding, Structure
@@ -58,10 +59,9 @@ class World:
         self.left, self.all, self.memory = left, names, memory
 
     def colour(self, random: np.random.Generator, samples: int = 2000) -> Array:
-        white, noise = random.normal(0.0, NOISE * np.sqrt(1.0 - self.memory**2), samples), np.zeros(samples)
-        for k in range(1, samples):
-            noise[k] = self.memory * noise[k - 1] + white[k]
-        return noise
+        white = random.normal(0.0, NOISE * np.sqrt(1.0 - self.memory**2), samples)
+        white[0] = 0.0
+        return np.asarray(lfilter([1.0], [1.0, -self.memory], white))
 
     def tried(self, now: Hypothesis, name: str) -> Any:
         extended = Hypothesis(self, now.names | {name})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import html
 import json
@@ -386,7 +387,7 @@ def test_a_strong_curve_of_the_sensor_is_found_whatever_the_offset(tmp_path: Pat
         records.append(record(v, noisy(y, 0.02, number), f"record {number}"))
     content = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2:], history=[0.0]).content
     assert [effect["name"] for effect in content["effects"]] == ["sensor_nonlinearity"]
-    # the believed thresholds are the right ones, so that nothing else is left
+    # the nominal thresholds are the right ones, so that nothing else is left
     assert content["gap"]["refitted"]["holdout"] > 30.0 * 0.02
     assert content["gap"]["after"]["holdout"] < 1.15 * 0.02
 
@@ -728,7 +729,7 @@ def five_records(output: Callable[[Array, Array], Array]) -> list[Record]:
     return made
 
 
-class TestBelievedEffects:
+class TestNominalEffects:
     """A model that has effects already: their numbers are refitted, and wrong ones are no missing effect."""
 
     def records(self, before: Callable[[Array], Array], behind: Callable[[Array], Array]) -> list[Record]:
@@ -736,7 +737,7 @@ class TestBelievedEffects:
         return five_records(lambda _, v: behind(brute_output(before(v), (0.0, 10.0), (1.0, 0.5), 0.0)))
 
     def diagnosed(self, tmp_path: Path, records: list[Record], effect: dict[str, Any], **more: Any) -> Diagnosis:
-        path = tmp_path / "believed.yaml"
+        path = tmp_path / "nominal.yaml"
         path.write_text(_model(tmp_path).read_text().replace("}}", f"}}, effects: {json.dumps([effect])}}}"))
         return hystgen.diagnose(path, records[:3], holdout=records[3:], history=[0.0], **more)
 
@@ -790,7 +791,7 @@ class TestBelievedEffects:
 
     def test_the_start_memory_stays(self, tmp_path: Path) -> None:
         records = self.records(lambda v: v, lambda y: y)
-        path = tmp_path / "believed.yaml"
+        path = tmp_path / "nominal.yaml"
         path.write_text(_model(tmp_path).read_text().replace("}}", ", initial_state: 4.0}}"))
         found = hystgen.diagnose(path, records[:3], holdout=records[3:], history=[0.0])
         extended, given = hystgen.Model(found.parameters), hystgen.load(path)
@@ -1003,3 +1004,35 @@ def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPat
     assert step(0.35, 0.4167) == 0.4167
     removes = False  # it owes what it explains to what it leaves free
     assert step(0.287, 0.4167) == 0.4167
+
+
+ROOMS = (
+    ("search.acceptance", "findings.kinds", "data.items"),
+    ("data",),
+    ("findings.result",),
+    ("search",),
+    ("findings",),
+    ("run",),
+)
+"""The rooms of a diagnosis in the order in which they may import each other: only earlier ones and their own."""
+
+
+def _room(module: str) -> int:
+    fitting = [(len(name), k) for k, names in enumerate(ROOMS) for name in names if f"{module}.".startswith(f"{name}.")]
+    return max(fitting)[1]
+
+
+def test_rooms_import_earlier_rooms_and_no_report() -> None:
+    folder = Path(hystgen.__file__).parent / "diagnosis"
+    for path in [*folder.glob("*/*.py"), folder / "run.py"]:
+        module = ".".join(path.relative_to(folder).with_suffix("").parts)
+        if path.name == "__init__.py":
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            assert not node.module.startswith("hystgen.report"), path
+            _, _, within = node.module.partition("hystgen.diagnosis.")
+            for name in node.names if within else ():
+                target = f"{within}.{name.name}" if "." not in within and within != "run" else within
+                assert _room(target) <= _room(module), (path, target)

@@ -406,13 +406,13 @@ class TestWholeRecords:
         self, weights: tuple[float, ...], gain: float, which: set[int]
     ) -> None:
         """In other units a prediction has hardly a loop, and of a wide loop it has another shape."""
-        believed = gain * np.array(weights)
+        nominal_weights = gain * np.array(weights)
         given = []
         for k, record in enumerate(records()):
-            out = brute_output(np.concatenate([HISTORY, record.v]), THRESHOLDS, tuple(believed.tolist()), 0.0)
+            out = brute_output(np.concatenate([HISTORY, record.v]), THRESHOLDS, tuple(nominal_weights.tolist()), 0.0)
             given.append(replace(record, y=out[len(HISTORY) :] + gain * noise(len(record.v), 30 + k)))
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
-        kept, told = check(wrong, believed)
+        kept, told = check(wrong, nominal_weights)
         assert [each.record for each in told] == [f"r{k}.csv" for k in sorted(which)]
         assert {each.kind for each in told} == {"swapped_channels"}
         assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))

@@ -405,7 +405,7 @@ class TestTanh:
                 flat = any(shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) > 3.0 for b in range(branches))
                 assert (np.min(slack[:branches]) < 0.0) == flat
 
-    def test_a_believed_front_is_met_or_kept(self) -> None:
+    def test_a_nominal_front_is_met_or_kept(self) -> None:
         """Where no search may begin at it, it stays as it is."""
         rng = np.random.default_rng(4)
         searched = 0
@@ -442,7 +442,7 @@ class TestTanh:
 class TestInverse:
     """Every model that `diagnose` writes can be inverted, or it is said why not."""
 
-    def believed(self, folder: Path) -> Path:
+    def nominal_model(self, folder: Path) -> Path:
         hystgen.identify(record(DRIVES["lines"], output(DRIVES["lines"]))).write(folder / "stage.yaml")
         return folder / "stage.yaml"
 
@@ -454,7 +454,7 @@ class TestInverse:
             whole = brute_output(v, (0.0, 2.0, 15.0, 30.0), (0.0, 0.12, 0.05, 0.04), 0.0)
             paths.append(write_csv(tmp_path / f"r{k}.csv", v, whole + rng.normal(0.0, 0.4, len(v))))
         out = tmp_path / "out"
-        words = [self.believed(tmp_path), *paths[:2], "--holdout", paths[2], "-o", out, "--history=0"]
+        words = [self.nominal_model(tmp_path), *paths[:2], "--holdout", paths[2], "-o", out, "--history=0"]
         code, _, err = run("diagnose", *words)
         assert code == 0
         content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
@@ -478,7 +478,7 @@ class TestInverse:
             y = noisy(brute_output(v, (0.0, 8.0, 20.0), (0.0, 0.12, 0.08), 0.0), 0.005, k)
             paths.append(write_csv(tmp_path / f"r{k}.csv", v, y))
         out = tmp_path / "out"
-        words = [self.believed(tmp_path), *paths[:2], "--holdout", paths[2], "-o", out, "--history=0"]
+        words = [self.nominal_model(tmp_path), *paths[:2], "--holdout", paths[2], "-o", out, "--history=0"]
         code, _, err = run("diagnose", *words)
         assert code == 0
         content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
@@ -497,7 +497,7 @@ class TestInverse:
             v = wander(20 + k)
             y = brute_output(v, (0.0, 2.0, 15.0, 30.0), (0.0, 0.12, 0.05, 0.04), 0.0) + rng.normal(0.0, 0.4, len(v))
             records.append(record(v, y, f"r{k}"))
-        found = hystgen.diagnose(self.believed(tmp_path), records[:2], holdout=records[2:], history=[0.0])
+        found = hystgen.diagnose(self.nominal_model(tmp_path), records[:2], holdout=records[2:], history=[0.0])
         part = found.parameters.model.pi
         assert found.verdict == "nothing_missing"
         errors = []

@@ -21,6 +21,7 @@ import sys
 import time
 import types
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -151,13 +152,16 @@ def table(files: Sequence[str], seconds: float) -> dict[str, tuple[float, list[s
 
 
 def noticed(name: str, factor: float, tests: Sequence[str]) -> bool:
-    """Whether one of the tests fails with the number changed."""
+    """Whether one of the tests fails with the number changed; one file after the other, in the order of the tests."""
+    files: dict[str, list[str]] = {}
+    for test in tests:
+        files.setdefault(test.partition("::")[0], []).append(test)
 
-    def run() -> int:
+    def run(chosen: Sequence[str]) -> int:
         setattr(acceptance, name, changed(getattr(acceptance, name), factor))
-        return int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", *tests]))
+        return int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", *chosen]))
 
-    return bool(tests) and apart(run) == pytest.ExitCode.TESTS_FAILED
+    return any(apart(partial(run, chosen)) == pytest.ExitCode.TESTS_FAILED for chosen in files.values())
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -172,12 +176,16 @@ def main(arguments: Sequence[str]) -> int:
     if wrong:
         parser.error(f"no such number: {', '.join(sorted(wrong))}")
     os.chdir(ROOT)
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):  # imported once for all processes
+        pytest.main(["--collect-only", "-q", "-p", "no:cacheprovider", *(given.tests or FILES)])
     fast = table(given.tests or FILES, given.seconds)
     print(f"{len(fast)} fast tests, {sum(seconds for seconds, _ in fast.values()):.0f} s")
     inside, results = read_inside(), {}
+    quickest = sorted(fast, key=lambda test: fast[test][0])
+    if not given.tests:
+        quickest.sort(key=lambda test: FILES.index(test.partition("::")[0]))
     for name in given.only or names():
-        readers = [test for test, (_, read) in sorted(fast.items(), key=lambda pair: pair[1][0])
-                   if name in read or name in inside]  # fmt: skip
+        readers = [test for test in quickest if name in fast[test][1] or name in inside]
         found = {str(factor): noticed(name, factor, readers) for factor in FACTORS
                  if changed(getattr(acceptance, name), factor) != getattr(acceptance, name)}  # fmt: skip
         results[name] = {"tests": len(readers), **found}

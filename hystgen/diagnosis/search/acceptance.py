@@ -8,6 +8,7 @@ says what the number is derived from or compared with, and `Changed by` names th
 - tune: the same commands with `--block tune`, whose cases may be looked at;
 - disturbances, selection, diagnosis, thinning, faults: `pytest tests/test_NAME.py`.
 
+`tests/test_acceptance.py` has a case just below and one just above most of them.
 `python -m tests.threshold_mutants` doubles and halves every number and lists the tests that notice. Other modules read
 the numbers as attributes of this one, so that a number can be changed in one place.
 """
@@ -68,7 +69,8 @@ difference that counts between two effects. Changed by: blind none (false names)
 
 FURTHER_REMOVES = 1.0
 """[the same] The least that a further effect removes: leftovers of a right name in a wrong shape were 0.7 to 0.98 in 4
-of 60 single cases, real second effects at least 1.2 in 120 cases. Set by: report block, single and pair (633f8e9)."""
+of 60 single cases, real second effects at least 1.2 in 120 cases. Set by: fresh single and pair cases of the report
+block (commit 633f8e9, seeds not recorded)."""
 
 NEEDLESS = 0.3
 """[times the noise] An earlier effect whose loss adds less than this is dropped: half of `FIRST_REMOVES`, so that an
@@ -115,8 +117,8 @@ last steps of a search change. Changed by: selection."""
 
 MOST_OF_GAP = 0.5
 """[share of the gap above the noise] Records of one loop support a name only where at most this is left, and leave open
-all names that leave at most this: two functions, up and down, show little more than whose shape is handier. Set by:
-report block, 180 cases of kind poor, 7 of which had a false second name without it (86e5f08)."""
+all names that leave at most this: two functions, up and down, show little more than whose shape is handier. Set by: 180
+fresh cases of kind poor, 7 of which had a false second name without it (commit 86e5f08, seeds not recorded)."""
 
 MOST_EFFECTS = 5
 """[effects] Most effects that are added: no case of any block has more than two. Changed by: run time of blind."""
@@ -143,7 +145,7 @@ SEARCHED = 12_000
 
 PLAYS = 32
 """[plays] Thresholds of a fit: with half as many the steps between them leave up to 1.4 times the noise in effect-free
-records, with more no less. Set by: tune none (9f9a31e, seeds not recorded)."""
+records, with more no less. Set by: tune none (commit 9f9a31e, seeds not recorded)."""
 
 FIRST_STEPS = 2
 """[steps] Of a search from each start while shapes are screened. Changed by: blind single."""
@@ -153,14 +155,15 @@ SCREENING_STEPS = 2
 
 FALLING = 0.8
 """[share of the error] A search whose error falls below this within `SCREENING_STEPS` continues: the minimum of a light
-damping is too narrow for the first steps. Set by: tune single with resonance (47d9267, seeds not recorded)."""
+damping is too narrow for the first steps. Set by: tune single with resonance (commit 47d9267, seeds not recorded)."""
 
 LONGER = 4
 """[times] `SCREENING_STEPS` are repeated at most this often. Set by: as before."""
 
 TOO_FAR = 5.0
 """[times the error of the best start] A start with more is not searched from: the best end was reached from up to 3.5
-(a limit of the output does nothing beyond the measured range). Set by: tune single (0f80f02, seeds not recorded)."""
+(a limit of the output does nothing beyond the measured range). Set by: tune single (commit 0f80f02, seeds not
+recorded)."""
 
 IDLE = 0.01
 """[share of the error] A start that changes the error by less does nothing yet, and others go first: behind a large
@@ -391,7 +394,7 @@ SPECTRUM_SAMPLES = 256
 
 SPECTRUM_PARTS = (8, 64)
 """[parts of a record] Whose mean spectra show ringing that fades: of 0.4 to 3 % damping in steps of five seconds. Set
-by: disturbances (8380866)."""
+by: disturbances (commit 8380866)."""
 
 SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
 """[bins] On either side of a peak, in the spectrum of a record and in those of its parts. Changed by: disturbances."""
