@@ -11,7 +11,7 @@ from hystgen.plays.corners.corners_fixed import FAR, along, move_to_input, move_
 from hystgen.plays.corners.memory import (
     BEFORE,
     BITS,
-    DEPTH,
+    HERE,
     INPUT,
     NEXT,
     ON,
@@ -20,14 +20,11 @@ from hystgen.plays.corners.memory import (
     REPEAT,
     RISING,
     STATUS,
-    UNDO_DEPTH,
-    UNDO_INPUT,
-    UNDO_K,
-    UNDO_OUTPUT,
-    UNDO_RISING,
+    UNDO,
     FixedMemory,
     K,
     Reals,
+    copy_place,
 )
 from hystgen.plays.fixed import nearest, over_slope
 from hystgen.plays.slots import (
@@ -53,26 +50,6 @@ def inverse_clamp(t: FixedTables, u: Any) -> Any:
     if u > t.limits[OUTPUT_MAX]:
         return t.limits[OUTPUT_MAX]
     return u
-
-
-@jit
-def set_undo(m: FixedMemory) -> None:
-    """Remember where the plays are."""
-    m.real[UNDO_INPUT] = m.real[INPUT]
-    m.real[UNDO_OUTPUT] = m.real[OUTPUT]
-    m.counts[UNDO_K] = m.counts[K]
-    m.counts[UNDO_DEPTH] = m.counts[DEPTH]
-    m.counts[UNDO_RISING] = m.counts[RISING]
-
-
-@jit
-def put_undo(m: FixedMemory) -> None:
-    """Put the plays where they were before the last step."""
-    m.real[INPUT] = m.real[UNDO_INPUT]
-    m.real[OUTPUT] = m.real[UNDO_OUTPUT]
-    m.counts[K] = m.counts[UNDO_K]
-    m.counts[DEPTH] = m.counts[UNDO_DEPTH]
-    m.counts[RISING] = m.counts[UNDO_RISING]
 
 
 @jit(inline=True)
@@ -105,7 +82,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
 @jit
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """Any other sample than a usual one."""
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
@@ -148,8 +125,8 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     if m.counts[ON]:
         m.real[OUTPUT] -= t.slope[m.counts[K] + 1] * (m.real[INPUT] - m.real[BEFORE])
         m.real[INPUT] = m.real[BEFORE]
-        set_undo(m)
-    put_undo(m)
+        copy_place(m, UNDO, HERE)
+    copy_place(m, HERE, UNDO)
     inverse_stay(m)
     m.counts[REPEAT] = 0
     move_to_input(t, m, v << t.limits[FINE])
@@ -159,7 +136,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     """What init and reset have in common."""
     start(t, m, play)
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     inverse_stay(m)
     m.real[BEFORE] = 0
     m.real[REFERENCE] = 0
@@ -185,5 +162,5 @@ def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     inverse_stay(m)

@@ -6,15 +6,16 @@ from collections.abc import Callable
 from typing import Any
 
 from hystgen.basics.jit import Jit, jit
-from hystgen.compensator.corners.inverse import clamp_drive, put_undo, set_undo
+from hystgen.compensator.corners.inverse import clamp_drive
 from hystgen.compensator.layout import Tables
 from hystgen.front.compensator import front_forward, front_inverse
-from hystgen.plays.corners.corners_float import move_to_output, plays_step, start
+from hystgen.plays.corners.corners_float import forget_line, move_to_output, plays_step, start
 from hystgen.plays.corners.memory import (
     ASCENDING,
     BITS,
     COMMITTED,
     DRIVE,
+    HERE,
     INPUT,
     LEVEL,
     OUTPUT,
@@ -23,10 +24,12 @@ from hystgen.plays.corners.memory import (
     RETURNED,
     STATUS,
     STEPPED,
+    UNDO,
     UNDO_ASCENDING,
     UNDO_DRIVE,
     Memory,
     Start,
+    copy_place,
 )
 from hystgen.plays.slots import (
     DOMAIN,
@@ -45,7 +48,7 @@ from hystgen.plays.slots import (
 @jit
 def inverse_keep(m: Memory) -> None:
     """The next step begins here."""
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
 
@@ -63,7 +66,8 @@ def inverse_arrive(m: Memory, v: Any) -> None:
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
     """The actuator has gone to v in place of where the last step led."""
-    put_undo(t.inverse, m)
+    copy_place(m, HERE, UNDO)
+    forget_line(t.inverse, m)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
     m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
     inverse_arrive(m, v)

@@ -7,7 +7,7 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator.corners.forward_fixed import code
 from hystgen.compensator.corners.inverse import clamp_drive
-from hystgen.compensator.corners.inverse_fixed import inverse_clamp, put_undo, set_undo
+from hystgen.compensator.corners.inverse_fixed import inverse_clamp
 from hystgen.compensator.corners.inverse_front import choosing
 from hystgen.compensator.layout import FixedTables
 from hystgen.front.curve import front_forward, front_inverse
@@ -16,15 +16,18 @@ from hystgen.plays.corners.memory import (
     ASCENDING,
     BITS,
     DRIVE,
+    HERE,
     LEVEL,
     NEXT,
     REFERENCE,
     REPEAT,
     STATUS,
+    UNDO,
     UNDO_ASCENDING,
     UNDO_DRIVE,
     FixedMemory,
     Reals,
+    copy_place,
 )
 from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
 
@@ -34,7 +37,7 @@ inverse_choose = choosing(front_inverse)
 @jit
 def inverse_keep(m: FixedMemory) -> None:
     """The next step begins here."""
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
 
@@ -76,7 +79,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     v = clamp_drive(t, applied)
     if v != applied:
         m.counts[STATUS] |= INPUT_CLAMPED
-    put_undo(m)
+    copy_place(m, HERE, UNDO)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
     m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
     m.counts[REPEAT] = 0
