@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import units
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import reference, step, step_fixed, step_float
 from hystgen.emission import runtime
 from hystgen.plays import fixed, loop, slots
 from hystgen.verification import signals
-from hystgen.verification.comparison import REALS
 from hystgen.verification.compilers import C_WARNINGS, WARNINGS
 
 RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
@@ -137,9 +137,9 @@ def test_engines_are_the_textbook_model_and_its_inverse(library: tuple[cffi.FFI,
 
     y = brute_output(v, r, p)
     scale = np.max(np.abs(y))
-    for loop in (0, 1):
-        np.testing.assert_allclose(run(loop, 0, v), y, rtol=0, atol=1e-13 * scale)
-        drive = run(loop, 1, y)
+    for engine in (0, 1):
+        np.testing.assert_allclose(run(engine, 0, v), y, rtol=0, atol=1e-13 * scale)
+        drive = run(engine, 1, y)
         np.testing.assert_allclose(brute_output(drive, r, p), y, rtol=0, atol=1e-13 * scale)
 
 
@@ -149,7 +149,7 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
     name, arithmetic, engine = unit
     source = units.write(tmp_path, *unit)
     flags = ["-std=c99", "-O2", "-fPIC", "-shared", *C_WARNINGS, *units.FLAGS, *units.DEFINES[arithmetic]]
-    one, real = units.model(name), REALS[arithmetic]
+    one, real = units.model(name), ARITHMETICS[arithmetic].number
     numbers = one.tables(arithmetic, engine)
     number = {"f4": "float", "f8": "double", "i4": "int32_t", "i2": "int16_t"}[real.str[1:]]
     for compiler in ("gcc", "clang"):
