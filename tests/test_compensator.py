@@ -91,7 +91,7 @@ def test_what_is_promised_exactly_comes_out_at_every_sample(name: str, front: st
     t = times(uneven)
     _, y = both(EXACT[name], FRONTS[front], t, smooth(t))
     wrong = np.abs(y - smooth(t)) > 1e-12 * 9.0
-    assert np.mean(wrong) <= 0.03 * (front == "two branches" and name in BLURRED)
+    assert np.mean(wrong) <= 0.05 * (front == "two branches" and name in BLURRED)
 
 
 @pytest.mark.parametrize("name", ["creep", "creep, logarithmic", "relaxation", "loop centre", "tanh"])
