@@ -144,7 +144,8 @@ def test_emit_takes_the_files_defaults_and_the_command_line_goes_first() -> None
     assert "stage_forward_step" in text
     assert "stage_inverse_step" not in text
     assert "typedef double stage_real_t" in text
-    assert f"stage_real_t play[{len(R)}]" in text
+    assert f"#define STAGE_N_PLAYS {len(R) - 1}\n" in text
+    assert "stage_real_t play[STAGE_N_PLAYS + 1];" in text
     hyst("emit", "stage.yaml", "-o", "b", "--operator", "both", "--arithmetic", "float32", "--engine", "corners")
     text = Path("b/stage.h").read_text()
     assert "stage_forward_step" in text
