@@ -176,8 +176,8 @@ class TestSeveralProcesses:
     @pytest.mark.parametrize(("forks", "fits"), [(1, 0), (2, 0), (2, 10)])
     def test_an_interrupt_leaves_nothing(self, case: Path, forks: int, fits: int) -> None:
         program = (
-            "import os, sys; from hystgen import cli; from hystgen.basics import parallel; from hystgen.diagnosis import trials; "
-            "from hystgen.basics.progress import Progress; tick = Progress.tick; "
+            "import os, sys; from hystgen import cli; from hystgen.basics import parallel; "
+            "from hystgen.diagnosis import trials; from hystgen.basics.progress import Progress; tick = Progress.tick; "
             "Progress.tick = lambda bar, n: (print('fitted', flush=True), tick(bar, n)); "
             "trials.LARGE = 0; parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
