@@ -22,7 +22,7 @@ def there(work: str) -> str:
     """A program that runs `work(k)` over eight numbers in two processes, as a command of the package would."""
     return textwrap.dedent("""
         import os, sys, time
-        from hystgen import parallel
+        from hystgen.basics import parallel
         {work}
         parallel.each(work, range(8), 2)
         """).format(work=textwrap.dedent(work))

@@ -24,7 +24,7 @@ def _fresh(monkeypatch: pytest.MonkeyPatch) -> None:
 def holder(around: Path) -> subprocess.Popen[str]:
     """Another process with a staging folder in `around`, which says when it has it."""
     code = (
-        "import sys, time; from pathlib import Path; from hystgen import writing\n"
+        "import sys, time; from pathlib import Path; from hystgen.basics import writing\n"
         "with writing.staging(Path(sys.argv[1])) as folder:\n"
         "    (folder / 'half').write_text('x'); print(folder, flush=True); time.sleep(60)\n"
     )
@@ -91,7 +91,7 @@ def test_what_others_named_alike_is_left_alone(tmp_path: Path) -> None:
 def test_many_processes_at_once_in_one_folder(tmp_path: Path) -> None:
     """Each makes folders, looks for stale ones and is killed at some time: nobody loses a folder that it holds."""
     code = (
-        "import sys; from pathlib import Path; from hystgen import writing\n"
+        "import sys; from pathlib import Path; from hystgen.basics import writing\n"
         "for k in range(200):\n"
         "    writing._swept.clear()\n"
         "    writing.write_atomically(Path(sys.argv[1]) / f'{sys.argv[2]}.txt', str(k))\n"
