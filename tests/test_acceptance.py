@@ -804,6 +804,12 @@ class TestLines:
         errors = [3.0 * tone(130.0, 2000) * (1.0 if k < steady else fading) + hiss(2000, k) for k in range(10)]
         assert (lines.steady(items, errors) is not None) is seen
 
+    @pytest.mark.parametrize(("size", "seen"), [(0.46, True), (0.38, False)])
+    def test_a_line_that_fades(self, size: float, seen: bool) -> None:
+        """To this share of its amplitude: what one half predicts of the other is 0.58 or 0.39 of what that has."""
+        error = tone(130.0, 4000) * np.where(np.arange(4000) < 2000, 1.0, size) + 0.05 * hiss(4000)
+        assert (lines.steady([ramp(4000)], [error]) is not None) is seen
+
     def test_four_lines(self) -> None:
         error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(6)) + 0.1 * hiss(4000)
         assert len(periodic.lines([ramp(4000)], [error])[0]) == 4
