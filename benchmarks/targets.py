@@ -45,6 +45,7 @@ HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 SEARCHED = 200_000  # samples of a round of the search for the worst case
+LONG = 100  # samples of a trial from which on it is searched apart
 KEPT = 30  # trials, the dearest ones, whose neighbours the next round is about
 RANGE = 10.0  # half of it
 MEANS = {"fine": lambda: multisine(20000), "coarse": lambda: multisine(2000), "walk": lambda: walk(5000)}
@@ -227,9 +228,9 @@ def trials(case: Case) -> Iterator[Reals]:
     """Every corner list, then a jump, since the search for where it leads is the work of a sample."""
     # first blocks of uneven sizes, which no rule makes: turning points at random, small among large, a few and many
     rng = np.random.default_rng(11)
-    for size in [*rng.integers(4, 12, 2000), *[100] * 600]:
+    for size in [*rng.integers(4, 12, 2000), *[LONG] * 600]:
         turns = rng.uniform(-RANGE, RANGE, size) * rng.choice([1.0, 0.5, 0.1], size)
-        if size < 100:
+        if size < LONG:
             yield np.concatenate([[RANGE, -RANGE], turns])  # after full swings
         yield turns  # and from the start
     for points in corner_lists(case.n):
@@ -268,17 +269,25 @@ def longer(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
 
 
 def neighbours(case: Case, trial: Reals, hair: float) -> Iterator[Reals]:
-    """A trial with its last jump, or a point shortly before, led elsewhere; what is longer; and what has other numbers,
-    on which the cost of floating point in software depends."""
+    """The end of a trial, which may be all that matters; a trial with other numbers, on which the cost of software
+    floating point depends; with its last jump, or a point shortly before, led elsewhere; and what is longer."""
+    for length in (4, 8, 16, 32, 64):
+        if length < len(trial):
+            yield trial[-length:]
+    rng = np.random.default_rng(13)
+    for size in np.geomspace(1.0, 1e-4, 90) * model(case.n).cascade.pi.thresholds[1]:
+        yield trial + rng.uniform(-size, size, len(trial))
     for place in range(-1, -min(5, len(trial)), -1):
         for jump in landings(case, trial[:place], 65):
             other = trial.copy()
             other[place] = jump
             yield other
-    rng = np.random.default_rng(13)
-    for size in np.repeat([1.0, 0.3, 0.1], 30) * model(case.n).cascade.pi.thresholds[1]:
-        yield trial + rng.uniform(-size, size, len(trial))
     yield from longer(case, trial, hair)
+
+
+def alternating(found: Sequence[Iterable[Reals]]) -> Iterator[Reals]:
+    """The first of each, then the second of each, and so on."""
+    return (x for row in itertools.zip_longest(*found) for x in row if x is not None)
 
 
 def within(most: int, found: Iterable[Reals]) -> list[Reals]:
@@ -529,11 +538,16 @@ class Bench:
             hair = lsbs(case)[0] if real.kind == "i" else RANGE * float(np.finfo(real).eps)
             most, rounds = self._most(case), 6
             if case.arithmetic == "float64":  # which is slow to run, and takes the same ways
-                best, rounds = self._worst_trials(replace(case, arithmetic="float32")), 1
+                classes, rounds = [self._worst_trials(replace(case, arithmetic="float32"))], 1
             else:
-                _, best = self._dearest(case, within(SEARCHED // (1 + (most < SEARCHED)), trials(case)), 20)
-                best += within(most, (x for trial in best for x in longer(case, trial, hair)))
-            self._worst[case] = self._better(case, best, rounds, most, hair, plain)
+                found = within(SEARCHED // (1 + (most < SEARCHED)), trials(case))
+                classes = [[x for x in found if (len(x) < LONG) == short] for short in (True, False)]
+            self._worst[case] = []
+            for found in classes:  # each by itself: the dearest long ones would leave the short ones no room
+                if rounds > 1:
+                    _, found = self._dearest(case, found, 20)
+                    found += within(most, alternating([longer(case, trial, hair) for trial in found]))
+                self._worst[case] += self._better(case, found, rounds, most, hair, plain)
         return self._worst[case]
 
     def _worst_interrupted(self, case: Case, behind: bool) -> list[Reals]:
@@ -561,7 +575,7 @@ class Bench:
     @staticmethod
     def _most(case: Case) -> int:
         """Samples of a round of the search: fewer where floating point is computed in software."""
-        return SEARCHED // (8 if case.in_software else 1)
+        return SEARCHED // (2 if case.in_software else 1)
 
     def _better(
         self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False
@@ -571,7 +585,7 @@ class Bench:
         for _ in range(rounds):
             if dear == before:
                 break
-            before, near = dear, (x for trial in best for x in neighbours(case, trial, hair))
+            before, near = dear, alternating([neighbours(case, trial, hair) for trial in best])
             dear, best = self._dearest(case, [*best, *within(most, near)], KEPT, form, behind)
         return best
 
@@ -586,7 +600,7 @@ class Bench:
         counts[behind_commit(call, x) != behind] = 0
         dear = [int(part.max()) for part in np.split(counts, ends[:-1])]
         kept: dict[bytes, Reals] = {}
-        for i in np.argsort(dear, kind="stable")[::-1]:
+        for i in np.lexsort(([len(trial) for trial in found], -np.array(dear))):  # of equally dear ones the shorter
             kept.setdefault(found[i][:-1].tobytes(), found[i])
         return max(dear), list(kept.values())[:number]
 

@@ -164,6 +164,9 @@ KILLED = (
         "code < -{{ code_max }} ? -{{ code_max }} - 1 : code", "far_low", "q15",
     ),
     Mutant(
+        "halves of codes are rounded up on either side of 0", CODES, " - (w < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
+    ),
+    Mutant(
         "no saturation below", CODES, "code < -{{ code_max }} ? -{{ code_max }} : code", "code", "far_low", "q15",
     ),
     Mutant(
@@ -198,6 +201,30 @@ KILLED = (
 
 # No record can find these, for the reasons given; a difference would show that a reason is wrong.
 EQUIVALENT = (
+    # The limit is a drive code itself: nothing before it is rounded to one beyond.
+    *(
+        Mutant(
+            "the limit's edge without shy", USUAL, "((next < last ? next : last) >> HYSTGEN_FRACTION) - HYSTGEN_SHY;",
+            "next < last ? (next >> HYSTGEN_FRACTION) - HYSTGEN_SHY : last >> HYSTGEN_FRACTION;", name, bits,
+        )
+        for name, bits in (("coarse", "q15"), ("edge", "q15"), ("above", "q31"))
+    ),
+    # A corner that is not passed lies beyond the place: where its own play begins to follow is not reached either.
+    *(
+        Mutant(
+            "the last play of an open corner is searched for too", CORNERS, "unsigned int last = top->top - 1u;",
+            "unsigned int last = top->top;", name, bits,
+        )
+        for name, bits in (("plain", "q31"), ("listed", "q15"))
+    ),
+    # Segments meet at a kink: either of them leads on from there.
+    *(
+        Mutant(
+            "at a kink the play above does not follow yet", CORNERS, "const bool begun = on >= (by_output",
+            "const bool begun = on > (by_output", name, bits,
+        )
+        for name, bits in (("plain", "q31"), ("coarse", "q15"))
+    ),
     # Where the same plays are known to follow, a search finds that they do.
     *(
         Mutant(

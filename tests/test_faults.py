@@ -370,6 +370,18 @@ class TestConverterAtItsEnd:
         assert fit.parameters.model.pi.weights[:2] == pytest.approx(WEIGHTS[:2], abs=0.003)
         assert fit.parameters.input_range[1] == np.max(v[y < level])
 
+    @pytest.mark.parametrize(("low", "high"), [(6.0, 12.0), (6.0, 8.0), (12.0, 18.0)])
+    def test_both_ends(self, low: float, high: float) -> None:
+        """Samples at one end do not hide those at the other, however many they are."""
+        v = DRIVES["fading"]
+        y = output(v)
+        fit = hystgen.identify(record(v, np.clip(y, low, high)), thresholds=THRESHOLDS, history=[0.0])
+        (used,) = fit.used
+        assert used.stretches.tolist() == np.flatnonzero((y <= low) | (y >= high)).tolist()
+        for count, end in ((np.count_nonzero(y >= high), "largest"), (np.count_nonzero(y <= low), "least")):
+            assert any(f"{count} samples of y at the converter's end, the {end}" in text for text in fit.warnings)
+        assert fit.rows[0].rms < 0.01 * (high - low)
+
     def test_backlash_is_none(self) -> None:
         """There too the output stands at its largest value while the drive moves."""
         v = DRIVES["fading"]

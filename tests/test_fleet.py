@@ -442,10 +442,11 @@ def test_a_scheduler_that_is_not_there(
     few: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(workers, "PATIENCE", 0.5)
-    for address in ("tcp://127.0.0.1:1", "nonsense"):
+    for address in ("tcp://127.0.0.1:1", "nonsense", "tls://127.0.0.1:1", "http://127.0.0.1:1"):
         code, out, err = run("identify", "--batch", few, "-o", tmp_path / "params", "--scheduler", address)
         assert (code, out) == (2, "")
         assert err.startswith(f"error: no Dask scheduler answers at {address}: ")
+        assert len(err.splitlines()) == 1
     assert not (tmp_path / "params").exists()
 
 

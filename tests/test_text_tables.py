@@ -57,6 +57,22 @@ def aligned() -> list[str]:
     return [f"{t:12.5f} {v:12.5f} {y:12.5f}" for t, v, y in zip(T, V, Y, strict=True)]
 
 
+@pytest.mark.parametrize(
+    ("join", "units", "decimal_commas"), [(",", True, False), (";", False, True), ("\t", True, True)]
+)
+def test_a_header_longer_than_what_is_looked_at(tmp_path: Path, join: str, units: bool, decimal_commas: bool) -> None:
+    """Of 15000 columns the header alone has more than 64 Ki characters; what follows shows units and decimals."""
+    more = 15_000
+    head = ["t", "v", "y", *(f"c{k}" for k in range(more))]
+    rows = [row + (join + "1.5") * more for row in table(join)]
+    lines = [join.join(head), *([join.join(["s", "V", "um", *["mV"] * more])] if units else [])]
+    path = put(tmp_path / "wide.txt", *lines, *(comma(rows) if decimal_commas else rows))
+    assert len(lines[0]) > 1 << 16
+    record = read_record(path)
+    check(record)
+    assert len(record.extra) == more
+
+
 def isoformat(minute: int = 59, rest: str = "") -> list[str]:
     """Times that pass a full minute, hour or day on their way."""
     start = np.datetime64(f"2024-03-05T23:{minute}:59.985")

@@ -158,6 +158,14 @@ def test_a_link_that_leads_nowhere_is_named(tmp_path: Path, monkeypatch: pytest.
         with pytest.raises(OSError, match="leads back to itself; choose another output") as refused:
             write()
         assert refused.value.filename == "loop"
+    with pytest.raises(OSError, match="leads back to itself"):  # before there is anything to write, too
+        files.check(Path("loop"), ["a"])
+    Path("file").touch()
+    Path("through").symlink_to("file/folder")
+    with pytest.raises(NotADirectoryError):
+        files.check(Path("through"), ["a"])
+    Path("file").unlink()
+    Path("through").unlink()
     assert sorted(os.listdir()) == ["loop", "lost"]
 
 

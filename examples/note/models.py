@@ -145,7 +145,7 @@ def _starts(folder: Path) -> None:
     # the input has run through 2 r_6 = 5.4 once it has come down from 4 to -1.4
     swept = int(np.argmax(np.maximum.accumulate(v) - v >= 2.0 * note.EXAMPLE_1.thresholds[-1]))
     for other in outputs[1:]:
-        note.close("the start is forgotten after a sweep of 2 r_6", other[swept:], outputs[0][swept:], 1e-14)
+        note.close("the start is forgotten after a sweep of 2 r_6", other[swept:], outputs[0][swept:], 0.0)
         if not abs(other[0] - outputs[0][0]) > 0.1:
             raise note.MismatchError("different starts give the same output")
     note.describe(play, "a", "Play of $r_5 = 2.25$, first period", "time (s)", f"play ({note.INPUT})", legend=True)

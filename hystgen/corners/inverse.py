@@ -18,8 +18,8 @@ from hystgen.corners.memory import (
     BEGIN,
     CAP,
     COMMITTED,
-    DEPTH,
     GAIN,
+    HERE,
     INPUT,
     LIMITED,
     NEXT,
@@ -29,15 +29,12 @@ from hystgen.corners.memory import (
     START,
     STATUS,
     STEPPED,
-    UNDO_DEPTH,
+    UNDO,
     UNDO_INPUT,
-    UNDO_K,
     UNDO_OUTPUT,
-    UNDO_RISING,
-    Curve,
-    K,
     Memory,
     Start,
+    copy_place,
 )
 from hystgen.reference import (
     DRIVE_MAX,
@@ -64,30 +61,11 @@ def clamp_drive(t: PlayTables, v: Any) -> Any:
     return v
 
 
-def put_undo(t: Curve, m: Memory) -> None:
-    """Put the plays where they were before the last step."""
-    m.real[INPUT] = m.real[UNDO_INPUT]
-    m.real[OUTPUT] = m.real[UNDO_OUTPUT]
-    m.counts[K] = m.counts[UNDO_K]
-    m.counts[DEPTH] = m.counts[UNDO_DEPTH]
-    m.counts[RISING] = m.counts[UNDO_RISING]
-    forget_line(t, m)
-
-
-def set_undo(m: Memory) -> None:
-    """Remember where the plays are."""
-    m.real[UNDO_INPUT] = m.real[INPUT]
-    m.real[UNDO_OUTPUT] = m.real[OUTPUT]
-    m.counts[UNDO_K] = m.counts[K]
-    m.counts[UNDO_DEPTH] = m.counts[DEPTH]
-    m.counts[UNDO_RISING] = m.counts[RISING]
-
-
 def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
     """Any other sample than a usual one."""
     x = u - t.limits[OFFSET]
     bits = 0
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     if not (t.limits[OUTPUT_MIN] <= u <= t.limits[OUTPUT_MAX]):
         bits = INPUT_CLAMPED if -t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX] else HELD
         x = (t.limits[OUTPUT_MIN] if u < t.limits[OUTPUT_MIN] else t.limits[OUTPUT_MAX]) - t.limits[OFFSET]
@@ -118,7 +96,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
             m.real[OUTPUT] = m.real[START] + (x - m.real[BEGIN]) * m.real[GAIN]
             return m.real[OUTPUT]
         if x < m.real[CAP] if rising else x > m.real[CAP]:
-            set_undo(m)
+            copy_place(m, UNDO, HERE)
             m.real[BEFORE] = x
             if move_in_block(t.inverse, m, x):
                 return m.real[OUTPUT]
@@ -137,10 +115,11 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
         m.real[RETURNED] = m.real[OUTPUT]
     m.counts[COMMITTED] = 1
     if m.real[BEFORE] != m.real[INPUT]:
-        set_undo(m)
+        copy_place(m, UNDO, HERE)
         m.real[UNDO_INPUT] = m.real[BEFORE]
         m.real[UNDO_OUTPUT] = m.real[START] + (m.real[BEFORE] - m.real[BEGIN]) * m.real[GAIN]
-    put_undo(t.inverse, m)
+    copy_place(m, HERE, UNDO)
+    forget_line(t.inverse, m)
     move_to_output(t.inverse, m, v)
     m.real[BEFORE] = m.real[INPUT]
 
@@ -149,7 +128,7 @@ def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
     """What init and reset have in common."""
     start(t.inverse, m, which)
     move_to_output(t.inverse, m, clamp_drive(t, m.real[OUTPUT]))
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.real[BEFORE] = m.real[INPUT]
     m.counts[STEPPED] = 0
     m.counts[COMMITTED] = 0
@@ -170,12 +149,12 @@ def inverse_reset(t: Tables, m: Memory, u: Any) -> None:
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_output(t.inverse, m, v)
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.real[BEFORE] = m.real[INPUT]
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, put_undo, set_undo, inverse_search, inverse_step, inverse_commit,
+    clamp_drive, copy_place, inverse_search, inverse_step, inverse_commit,
     inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
 INLINED: set[Callable[..., Any]] = {inverse_step}

@@ -10,7 +10,7 @@ from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.memory import (
     BEFORE,
     BITS,
-    DEPTH,
+    HERE,
     INPUT,
     NEXT,
     ON,
@@ -19,14 +19,11 @@ from hystgen.corners.memory import (
     REPEAT,
     RISING,
     STATUS,
-    UNDO_DEPTH,
-    UNDO_INPUT,
-    UNDO_K,
-    UNDO_OUTPUT,
-    UNDO_RISING,
+    UNDO,
     FixedMemory,
     K,
     Reals,
+    copy_place,
 )
 from hystgen.fixed import FINE, FRACTION, SHY, FixedTables, nearest, over_slope
 from hystgen.reference import DRIVE_MAX, DRIVE_MIN, INPUT_CLAMPED, OUTPUT_CLAMPED, OUTPUT_MAX, OUTPUT_MIN
@@ -41,24 +38,6 @@ def inverse_clamp(t: FixedTables, u: Any) -> Any:
     if u > t.limits[OUTPUT_MAX]:
         return t.limits[OUTPUT_MAX]
     return u
-
-
-def set_undo(m: FixedMemory) -> None:
-    """Remember where the plays are."""
-    m.real[UNDO_INPUT] = m.real[INPUT]
-    m.real[UNDO_OUTPUT] = m.real[OUTPUT]
-    m.counts[UNDO_K] = m.counts[K]
-    m.counts[UNDO_DEPTH] = m.counts[DEPTH]
-    m.counts[UNDO_RISING] = m.counts[RISING]
-
-
-def put_undo(m: FixedMemory) -> None:
-    """Put the plays where they were before the last step."""
-    m.real[INPUT] = m.real[UNDO_INPUT]
-    m.real[OUTPUT] = m.real[UNDO_OUTPUT]
-    m.counts[K] = m.counts[UNDO_K]
-    m.counts[DEPTH] = m.counts[UNDO_DEPTH]
-    m.counts[RISING] = m.counts[UNDO_RISING]
 
 
 def inverse_sees(m: FixedMemory, u: Any) -> Any:
@@ -87,7 +66,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
 
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """Any other sample than a usual one."""
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
@@ -128,8 +107,8 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     if m.counts[ON]:
         m.real[OUTPUT] -= t.slope[m.counts[K] + 1] * (m.real[INPUT] - m.real[BEFORE])
         m.real[INPUT] = m.real[BEFORE]
-        set_undo(m)
-    put_undo(m)
+        copy_place(m, UNDO, HERE)
+    copy_place(m, HERE, UNDO)
     inverse_stay(m)
     m.counts[REPEAT] = 0
     move_to_input(t, m, v << t.limits[FINE])
@@ -138,7 +117,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
     """What init and reset have in common."""
     start(t, m, play)
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     inverse_stay(m)
     m.real[BEFORE] = 0
     m.real[REFERENCE] = 0
@@ -161,12 +140,12 @@ def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     inverse_stay(m)
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, inverse_clamp, set_undo, put_undo, inverse_sees, inverse_stay, inverse_look_ahead, inverse_search,
+    clamp_drive, inverse_clamp, copy_place, inverse_sees, inverse_stay, inverse_look_ahead, inverse_search,
     inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
 INLINED: set[Callable[..., Any]] = {inverse_sees}

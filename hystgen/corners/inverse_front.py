@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from hystgen.corners.corners_float import move_to_output, plays_step, start
-from hystgen.corners.inverse import clamp_drive, put_undo, set_undo
+from hystgen.corners.corners_float import forget_line, move_to_output, plays_step, start
+from hystgen.corners.inverse import clamp_drive
 from hystgen.corners.memory import (
     ASCENDING,
     BITS,
     COMMITTED,
     DRIVE,
+    HERE,
     INPUT,
     LEVEL,
     OUTPUT,
@@ -20,10 +21,12 @@ from hystgen.corners.memory import (
     RETURNED,
     STATUS,
     STEPPED,
+    UNDO,
     UNDO_ASCENDING,
     UNDO_DRIVE,
     Memory,
     Start,
+    copy_place,
 )
 from hystgen.reference import (
     DOMAIN,
@@ -44,7 +47,7 @@ from hystgen.reference import (
 
 def inverse_keep(m: Memory) -> None:
     """The next step begins here."""
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
 
@@ -60,7 +63,8 @@ def inverse_arrive(m: Memory, v: Any) -> None:
 
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
     """The actuator has gone to v in place of where the last step led."""
-    put_undo(t.inverse, m)
+    copy_place(m, HERE, UNDO)
+    forget_line(t.inverse, m)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
     m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
     inverse_arrive(m, v)
@@ -190,7 +194,7 @@ def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, put_undo, set_undo, inverse_keep, inverse_arrive, inverse_replace, inverse_hold, inverse_fits,
+    clamp_drive, copy_place, inverse_keep, inverse_arrive, inverse_replace, inverse_hold, inverse_fits,
     inverse_choose, inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
 INLINED: set[Callable[..., Any]] = set()

@@ -8,21 +8,24 @@ from typing import Any
 from hystgen.corners.corners_fixed import FAR, move_to_input, move_to_solution, solve, start
 from hystgen.corners.forward_fixed import code
 from hystgen.corners.inverse import clamp_drive
-from hystgen.corners.inverse_fixed import inverse_clamp, put_undo, set_undo
+from hystgen.corners.inverse_fixed import inverse_clamp
 from hystgen.corners.inverse_front import inverse_choose, inverse_fits
 from hystgen.corners.memory import (
     ASCENDING,
     BITS,
     DRIVE,
+    HERE,
     LEVEL,
     NEXT,
     REFERENCE,
     REPEAT,
     STATUS,
+    UNDO,
     UNDO_ASCENDING,
     UNDO_DRIVE,
     FixedMemory,
     Reals,
+    copy_place,
 )
 from hystgen.fixed import FRACTION, FixedTables, front_forward
 from hystgen.reference import DOMAIN, INPUT_CLAMPED, OUTPUT_CLAMPED
@@ -30,7 +33,7 @@ from hystgen.reference import DOMAIN, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 def inverse_keep(m: FixedMemory) -> None:
     """The next step begins here."""
-    set_undo(m)
+    copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
 
@@ -69,7 +72,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     v = clamp_drive(t, applied)
     if v != applied:
         m.counts[STATUS] |= INPUT_CLAMPED
-    put_undo(m)
+    copy_place(m, HERE, UNDO)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
     m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
     m.counts[REPEAT] = 0
@@ -110,7 +113,7 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
 
 
 COMPILED: list[Callable[..., Any]] = [
-    clamp_drive, inverse_clamp, set_undo, put_undo, inverse_keep, inverse_arrive, inverse_fits, inverse_choose,
+    clamp_drive, inverse_clamp, copy_place, inverse_keep, inverse_arrive, inverse_fits, inverse_choose,
     inverse_step, inverse_commit, inverse_begin, inverse_init, inverse_reset, inverse_visit,
 ]  # fmt: skip
 INLINED: set[Callable[..., Any]] = set()

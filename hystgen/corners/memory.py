@@ -16,6 +16,8 @@ Counts = NDArray[np.int64]
 # and in `Memory.counts`
 (K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
  ASCENDING, UNDO_ASCENDING, ON) = range(15)  # fmt: skip  (ON: in fixed point)
+# `here` and `undo` of the operators in C: where the first numbers of each are, in `Memory.real` and `Memory.counts`
+HERE, UNDO = (INPUT, K), (UNDO_INPUT, UNDO_K)
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
 # places in `Curve.constant`
 MOST, ZERO, HALF, ONE = range(4)
@@ -65,6 +67,14 @@ def new_memory(plays: int, dtype: Any) -> Memory:
         top=np.zeros(plays + 1, np.int64),
         rose=np.zeros(plays + 1, np.int64),
     )
+
+
+def copy_place(m: Any, to: tuple[int, int], source: tuple[int, int]) -> None:
+    """Field by field, HERE or UNDO: input and output; k, depth and rising."""
+    for i in range(2):
+        m.real[to[0] + i] = m.real[source[0] + i]
+    for i in range(3):
+        m.counts[to[1] + i] = m.counts[source[1] + i]
 
 
 class FixedMemory(NamedTuple):

@@ -110,9 +110,10 @@ def start(
     risen = next((k - 1 for k in plays if risen_to(k, 1) > seen[1]), len(held) - 1)
     top = next((k for k in plays if k > risen and risen_to(k, -1) < seen[0]), len(held))
     # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one C w + Q, what the others hold
-    # aside: the lines behind two turning points of the same output, with inputs to either side of the center's
+    # aside: the lines behind two turning points of the same output, with inputs to either side of the center's. If no
+    # play is held for good, any center does: one for every start memory, so that a start is forgotten to the last bit
     k = top - 1
-    w = held[min(top, len(held) - 1)]
+    w = held[top] if top < len(held) else Fraction(min(max(0.0, seen[0]), seen[1]))
     y = s.c[k] * w + _aside(s, held)[k]
     to, output = (y, w) if inverse else (w, y)
     apart = s.q[k] if inverse else (-s.q[k] / s.c[k] if s.c[k] else Fraction(0))

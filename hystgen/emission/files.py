@@ -12,7 +12,7 @@ from hystgen import writing
 
 def check(folder: Path, names: Iterable[str]) -> None:
     """Raise the OSError that writing these files into `folder` would end in, as far as can be told before."""
-    around = folder
+    around = writing.destination(folder) if folder.is_symlink() else folder
     while not around.exists() and around != around.parent:
         around = around.parent
     if not around.is_dir():

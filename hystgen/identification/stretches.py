@@ -136,11 +136,12 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     found = []
     step = np.abs(np.diff(y))
     grain = float(np.min(step[step > 0.0], initial=np.inf))
-    for name, end, sign in (("largest", float(np.max(y[known])), 1.0), ("least", float(np.min(y[known])), -1.0)):
-        others = known & (y != end)
-        if not others.any():
-            continue
-        slope = sensitivity(y[others], v[others])
+    low, high = float(np.min(y[known])), float(np.max(y[known]))
+    between = known & (y > low) & (y < high)
+    if not between.any():
+        return []
+    slope = sensitivity(y[between], v[between])  # samples at either end would flatten it
+    for name, end, sign in (("largest", high, 1.0), ("least", low, -1.0)):
         least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
         runs = runs_of(y == end)
         if not any(b - a >= RAIL and float(np.max(sign * (v[a:b] - v[a]))) > least for a, b in runs):

@@ -234,7 +234,7 @@ def cluster(address: str) -> Iterator[Any]:
         try:
             get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
             client = Client(address, timeout=PATIENCE, set_as_default=False)
-        except (OSError, ValueError) as failure:
+        except Exception as failure:  # of as many kinds as there are protocols
             reason = (str(failure).splitlines() or [type(failure).__name__])[0]
             raise SchedulerError(f"no Dask scheduler answers at {address}: {reason}") from None
         with client:

@@ -30,6 +30,9 @@ from hystgen.words import counted
 SAMPLE = 1 << 16
 """Characters at the start of a file, in whole lines, that show its layout."""
 
+SAMPLE_LINES = 8
+"""Fewest lines that show it, however long they are: a header, units and a few rows."""
+
 INSTRUMENTS: tuple[Callable[[Reading, Sequence[str]], Layout | None], ...] = (
     lvm.layout, pi_gcs.layout, tektronix.layout,
 )  # fmt: skip
@@ -43,7 +46,7 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     """Read a text file with one row a line."""
     blocks = texts(reading, stream)
     sample = ""
-    while len(sample) < SAMPLE and (text := next(blocks, "")):
+    while (len(sample) < SAMPLE or sample.count("\n") < SAMPLE_LINES) and (text := next(blocks, "")):
         sample += text
     if not sample.strip():
         raise reading.refuse("is empty; record again or give another file")
@@ -65,7 +68,8 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
 
 def _layout(reading: Reading, sample: str) -> Layout:
     """The layout that the first lines show, and what is said of it."""
-    start = sample[: sample.find("\n", SAMPLE) + 1] if len(sample) > SAMPLE else ""
+    fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
+    start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
     known = (each(reading, lines) for each in INSTRUMENTS)
     found = next((each for each in known if each is not None), None) or layout.find(reading, lines)

@@ -308,6 +308,6 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
     """Whether a line may hold names, some of which are numbers, as those of channels."""
-    text = [cell for cell in cells if view.dialect.weight(cell) < 0]
+    text = {cell for cell in cells if view.dialect.weight(cell) < 0}
     numbers = all(cell in text or cell.isdecimal() for cell in cells if cell)
     return numbers and cells[0] in text and not _are_units(cells)
