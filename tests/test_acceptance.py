@@ -25,6 +25,7 @@ from hystgen.diagnosis.data import (
     channels,
     disturbances,
     drives,
+    held_out,
     lines,
     periodic,
     ripple,
@@ -336,6 +337,26 @@ def test_plays_of_a_fit() -> None:
     """Fine enough that their steps leave less than the noise, and no finer."""
     records = [Record(f"r{k}", sine(4000, k).run.t, sine(4000, k).run.v, sine(4000, k).y) for k in range(2)]
     assert 25 <= len(prepare(records[:1], records[1:], (0.0,), 0.0).thresholds) <= 40
+
+
+class TestHeldOut:
+    @pytest.mark.parametrize(("samples", "enough"), [(120, True), (80, False)])
+    def test_enough_to_compare(self, samples: int, enough: bool) -> None:
+        assert held_out.enough([SimpleNamespace(used=samples)]) is enough  # type: ignore[list-item]
+
+    def test_the_end_of_a_record(self) -> None:
+        """A little less than a third of it."""
+        (beginning,), (end,) = held_out.parted([sine(1000)])
+        assert 200 < np.count_nonzero(end.known) < 334
+        assert np.count_nonzero(beginning.known) + np.count_nonzero(end.known) == 1000
+
+    @pytest.mark.parametrize(("rate", "aside"), [(0.7, [1, 4]), (0.35, [2, 5])])
+    def test_a_fast_record(self, rate: float, aside: list[int]) -> None:
+        """Beside the fastest one, the first; every third one is held out, or others if one of two fast ones is then."""
+        v = np.linspace(0.0, 100.0, 101)
+        rates = [1.0, rate, 0.1, 0.1, 0.1, 0.1]
+        given = [Record(f"r{k}", np.arange(101) / rate, v, v) for k, rate in enumerate(rates)]
+        assert held_out.set_aside(given) == aside
 
 
 class TestNominal:
