@@ -25,6 +25,7 @@ from hystgen.diagnosis.data import (
     channels,
     disturbances,
     drives,
+    held_out,
     lines,
     periodic,
     ripple,
@@ -41,6 +42,7 @@ from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
 from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
 from hystgen.diagnosis.search.actuator import Actuator
 from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.options import Option
 from hystgen.diagnosis.search.structure import Structure
 from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
@@ -318,10 +320,43 @@ def test_samples_of_a_search() -> None:
     assert 6_000 < np.count_nonzero(records.quick[0].known) <= 12_000
 
 
+def test_frequencies_from_which_a_resonance_is_sought(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three of five at which the error rings."""
+    items = [ramp(4000, name=f"r{k}") for k in range(2)]
+    rings = sum(tone(50.0 + 60.0 * k, 4000, 1.0 + k) for k in range(5))
+    items = [replace(item, y=item.y + rings + 0.1 * hiss(4000)) for item in items]
+    refitted = Fitted(Structure(np.array([0.0, 10.0]), Kept()), np.empty(0), np.array([0.1, 0.0]), 1.0)
+    records = screening.Records.of(items[:1], items[1:], refitted, 0.1)
+    seen: list[Any] = []
+    monkeypatch.setattr(screening, "options", lambda _, known, *__: seen.append(known) or [])  # type: ignore[func-returns-value]
+    assert records.extensions(refitted) == []
+    assert seen[0].ringing == pytest.approx([290.0, 230.0, 170.0], abs=0.5)
+
+
 def test_plays_of_a_fit() -> None:
     """Fine enough that their steps leave less than the noise, and no finer."""
     records = [Record(f"r{k}", sine(4000, k).run.t, sine(4000, k).run.v, sine(4000, k).y) for k in range(2)]
     assert 25 <= len(prepare(records[:1], records[1:], (0.0,), 0.0).thresholds) <= 40
+
+
+class TestHeldOut:
+    @pytest.mark.parametrize(("samples", "enough"), [(120, True), (80, False)])
+    def test_enough_to_compare(self, samples: int, enough: bool) -> None:
+        assert held_out.enough([SimpleNamespace(used=samples)]) is enough  # type: ignore[list-item]
+
+    def test_the_end_of_a_record(self) -> None:
+        """A little less than a third of it."""
+        (beginning,), (end,) = held_out.parted([sine(1000)])
+        assert 200 < np.count_nonzero(end.known) < 334
+        assert np.count_nonzero(beginning.known) + np.count_nonzero(end.known) == 1000
+
+    @pytest.mark.parametrize(("rate", "aside"), [(0.7, [1, 4]), (0.35, [2, 5])])
+    def test_a_fast_record(self, rate: float, aside: list[int]) -> None:
+        """Beside the fastest one, the first; every third one is held out, or others if one of two fast ones is then."""
+        v = np.linspace(0.0, 100.0, 101)
+        rates = [1.0, rate, 0.1, 0.1, 0.1, 0.1]
+        given = [Record(f"r{k}", np.arange(101) / rate, v, v) for k, rate in enumerate(rates)]
+        assert held_out.set_aside(given) == aside
 
 
 class TestNominal:
@@ -790,6 +825,12 @@ class TestLines:
         errors = [3.0 * tone(130.0, 2000) * (1.0 if k < steady else fading) + hiss(2000, k) for k in range(10)]
         assert (lines.steady(items, errors) is not None) is seen
 
+    @pytest.mark.parametrize(("size", "seen"), [(0.46, True), (0.38, False)])
+    def test_a_line_that_fades(self, size: float, seen: bool) -> None:
+        """To this share of its amplitude: what one half predicts of the other is 0.58 or 0.39 of what that has."""
+        error = tone(130.0, 4000) * np.where(np.arange(4000) < 2000, 1.0, size) + 0.05 * hiss(4000)
+        assert (lines.steady([ramp(4000)], [error]) is not None) is seen
+
     def test_four_lines(self) -> None:
         error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(6)) + 0.1 * hiss(4000)
         assert len(periodic.lines([ramp(4000)], [error])[0]) == 4
@@ -860,6 +901,17 @@ class TestRipple:
         made = [rippled(there_and_back(0.0, float(number), 6000), 1.0, k) for k in range(2)]
         assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
 
+    @pytest.mark.parametrize(("others", "seen"), [(2, True), (3, False)])
+    def test_pitches_that_are_examined(self, others: int, seen: bool) -> None:
+        """Stronger ones go before it, which are there on the way up alone."""
+        made = []
+        for k in range(3):
+            item, error = rippled(there_and_back(0.0, 40.0, 2000), 1.0, k)
+            up = np.arange(len(error)) < 2000
+            more = sum(2.5 * np.sin(2.0 * np.pi * (item.y - error) / pitch) for pitch in (1.3, 1.7, 2.2)[:others]) * up
+            made.append((replace(item, y=item.y + more), error + more))
+        assert (pitches(made) == [pytest.approx(1.0, rel=0.01)]) is seen
+
     @pytest.mark.parametrize(("beside", "step"), [(0.014, True), (0.03, False)])
     def test_a_pitch_of_the_converter(self, beside: float, step: bool) -> None:
         made = [rippled(there_and_back(0.0, 40.0, 2000), 1.0, k, 1.0 + beside) for k in range(3)]
@@ -883,8 +935,12 @@ def slipping(ratios: Sequence[float], moves: float = 1.0, jump: float = 9.0, noi
         change = 7.0 * moves * (ratio - 1.0)
         rest = (change - jump) / 6.0 if ratio > 1.0 else change / 7.0
         e += list(e[-1] + np.cumsum([jump if ratio > 1.0 else rest, *([rest] * 6)]))
-    error = np.array(e)
-    predicted = moves * np.arange(len(error))
+    return slips(np.full(len(e) - 1, moves), np.diff(e), noise)
+
+
+def slips(moves: Array, change: Array, noise: float) -> bool:
+    """Whether stick-slip is seen where the prediction moves so from sample to sample, and the error changes so."""
+    predicted, error = (np.concatenate([[0.0], np.cumsum(x)]) for x in (moves, change))
     item = Item("r", Run(np.arange(len(error)) * 1e-3, predicted), predicted + error, None, 10.0)
     return bool(stick_slip.stick_slip([item], [error], noise))
 
@@ -924,7 +980,21 @@ class TestStickSlip:
     def test_how_many_jumps(self, pairs: int, stretches: int, seen: bool) -> None:
         assert slipping(pattern(pairs, stretches)) is seen
 
-    @pytest.mark.parametrize(("length", "seen"), [(1, True), (3, False)])
+    def test_stretches_that_hardly_move_do_not_count(self) -> None:
+        """They are 2.8 times the noise, of which nothing can be said; the others are as predicted."""
+        moves = np.repeat([1.0, 0.4], [7 * 70, 7 * 60])
+        slow = np.tile([*[-0.4] * 7, 9.0, *[-6.2 / 6.0] * 6], 30)
+        assert not slips(moves, np.concatenate([np.zeros(7 * 70), slow]), 1.0)
+
+    @pytest.mark.parametrize(("slow", "seen"), [(0.35, True), (0.18, False)])
+    def test_samples_that_hardly_move_do_not_count(self, slow: float, seen: bool) -> None:
+        """Against a quarter of the fast ones, of which there are too few."""
+        fast = np.arange(160) % 7 < 2
+        change = np.zeros(160)
+        change[~fast] = np.resize([-slow, slow, 0.0], np.count_nonzero(~fast))
+        assert slips(np.where(fast, 1.0, slow), change, 0.02) is seen
+
+    @pytest.mark.parametrize(("length", "seen"), [(1, True), (2, True), (3, False)])
     def test_what_goes_on(self, length: int, seen: bool) -> None:
         """Stretches that stand, and those that leap, in a row."""
         row = [0.0] * length + [2.0] * length + [1.0] * 4
@@ -1054,17 +1124,18 @@ def test_held_out_records_that_are_alone() -> None:
 
 
 class TestStarts:
-    fronts = options._fronts(Structure(np.array([0.0]), Kept()), Structure(np.array([0.0]), Kept()), (0.0, 100.0))
+    def front(self, label: str) -> Option:
+        bare = Structure(np.array([0.0]), Kept())
+        (found,) = [each for each in options._fronts(bare, bare, (0.0, 100.0)) if each.label == label]
+        return found
 
     def starts(self, label: str) -> list[Array]:
-        (found,) = [each for each in self.fronts if each.label == label]
-        return [np.asarray(start) for start in found.starts]
+        return [np.asarray(start) for start in self.front(label).starts]
 
     def slopes(self, label: str, start: Array) -> Array:
         """Of the front at 200 drives, over their mean."""
-        (found,) = [each for each in self.fronts if each.label == label]
         w = np.linspace(0.0, 100.0, 201)
-        for stage in found.structure.front.stages(start):
+        for stage in self.front(label).structure.front.stages(start):
             w = stage.forward(w)
         return np.asarray(np.diff(w) / np.mean(np.diff(w)))
 
@@ -1075,8 +1146,7 @@ class TestStarts:
 
     @pytest.mark.parametrize(("label", "wide"), [("front of dead zones", 0.25), ("front of more dead zones", 0.125)])
     def test_breaks_divide_the_range(self, label: str, wide: float) -> None:
-        (found,) = [each for each in self.fronts if each.label == label]
-        breaks = np.array([0.0, *found.structure.front.breaks, 100.0])  # type: ignore[attr-defined]
+        breaks = np.array([0.0, *self.front(label).structure.front.breaks, 100.0])  # type: ignore[attr-defined]
         assert 0.5 * wide < np.max(np.diff(np.unique(breaks))) / 100.0 <= wide
 
     def test_envelopes_bend_either_way(self) -> None:

@@ -1,6 +1,6 @@
 """The numbers of `hystgen.diagnosis.search.acceptance`, doubled and halved: which fast tests of the diagnosis notice?
 
-    python -m tests.threshold_mutants [--only NAME]... [--tests FILE]... [--seconds 1] [--json FILE]
+    python -m tests.threshold_mutants [--only NAME]... [--tests FILE]... [--seconds 3] [--json FILE]
 
 All fast tests are run once to learn which numbers each of them reads and how long it takes; then, for each number and
 factor, those that read it, the shortest first, until one fails. Exits with 1 if a number is noticed by no test and is
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("--only", action="append", default=[], metavar="NAME")
     parser.add_argument("--tests", action="append", default=[], metavar="FILE")
-    parser.add_argument("--seconds", type=float, default=1.0, help="a test that takes longer is not fast")
+    parser.add_argument("--seconds", type=float, default=3.0, help="a test that takes longer is not fast")
     parser.add_argument("--json", type=Path)
     given = parser.parse_args(arguments)
     wrong = set(given.only) - set(names())

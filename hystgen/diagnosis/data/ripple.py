@@ -16,6 +16,9 @@ from hystgen.diagnosis.search import acceptance
 
 Array = NDArray[np.float64]
 
+MOST_SAMPLES = 20_000
+"""Samples that a pitch is refined with: it is then as fine as the noise allows."""
+
 FINER = 4
 """Zero padding of the spectrum over position, so that pitches between whole parts of the range have a bin."""
 
@@ -96,7 +99,7 @@ def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
     parts = [(motion, now) for motion, now in ((motion, motion.resolves(pitch)) for motion in motions) if now.any()]
     if not parts:
         return pitch
-    every = max(1, sum(int(np.count_nonzero(now)) for _, now in parts) // acceptance.PITCH_SAMPLES)
+    every = max(1, sum(int(np.count_nonzero(now)) for _, now in parts) // MOST_SAMPLES)
     y = np.concatenate([motion.places[now][::every] for motion, now in parts])
     e = np.concatenate([motion.left[now][::every] - motion.left[now].mean() for motion, now in parts])
 

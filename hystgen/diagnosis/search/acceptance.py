@@ -10,7 +10,8 @@ says what the number is derived from or compared with, and `Changed by` names th
 
 `tests/test_acceptance.py` has a case just below and one just above most of them.
 `python -m tests.threshold_mutants` doubles and halves every number and lists the tests that notice. Other modules read
-the numbers as attributes of this one, so that a number can be changed in one place.
+the numbers as attributes of this one, so that a number can be changed in one place. Tolerances of the searches and
+sizes of caches, which decide nothing, are where they are used.
 """
 
 from __future__ import annotations
@@ -168,14 +169,6 @@ recorded)."""
 IDLE = 0.01
 """[share of the error] A start that changes the error by less does nothing yet, and others go first: behind a large
 effect every start of the next may be worse than none. Changed by: blind pair."""
-
-COARSE = 1e-3
-"""[share of the error] A screening search ends with a step that lowers the error by less; ranks differ by per cents.
-Changed by: blind single."""
-
-POLISHED = 1e-5
-"""[share of the error] A final search ends with a step that lowers the error by less: far below `EQUAL`, the finest
-difference that decides anything. Derived."""
 
 KEPT = 5
 """[shapes] Followed up after the screening, the best on held-out records. Changed by: blind single."""
@@ -438,9 +431,6 @@ RIPPLE_RESOLVED = 0.25
 CONVERTER_STEP = 0.02
 """[share of the pitch] A pitch within this of the smallest step of the output is the converter's. Changed by:
 disturbances."""
-
-PITCH_SAMPLES = 20_000
-"""[samples] From which a pitch is refined. Changed by: run time of disturbances."""
 
 POSITION_BINS = 4096
 """[bins] Of the range, in which errors are averaged to find a pitch: pitches of a thousandth of it are found. Changed

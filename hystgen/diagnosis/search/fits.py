@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.search import acceptance
 from hystgen.diagnosis.search.actuator import Actuator, NotFiniteError, Sums
 from hystgen.diagnosis.search.structure import Structure
 from hystgen.identification import joint, reduction, weights
@@ -24,6 +23,9 @@ from hystgen.identification.reduction import Reduced
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
+
+POLISHED = 1e-5
+"""A search ends with a step that lowers the error by a smaller share: far below any difference that decides."""
 
 
 class _Block:
@@ -155,14 +157,14 @@ class Search:
     now: Shaped
     damping: float = joint.DAMPING
 
-    def further(self, steps: int = joint.MOST_STEPS, little: float | None = None) -> Search:
+    def further(self, steps: int = joint.MOST_STEPS, little: float = POLISHED) -> Search:
         """At most `steps` further, until one lowers the error by a smaller share than `little`."""
         now, damping = joint.search(
             lambda shape, p: linear(self.structure, self.items, shape, p),
             self.structure,
             self.now,
             steps,
-            acceptance.POLISHED if little is None else little,
+            little,
             self.damping,
         )
         return replace(self, now=now, damping=damping)

@@ -25,6 +25,9 @@ from hystgen.identification import joint
 
 Array = NDArray[np.float64]
 
+COARSE = 1e-3
+"""A search of the screening ends with a step that lowers the error by a smaller share: ranks differ by per cents."""
+
 LARGE = 5_000
 """Samples to fit from which the options are tried in several processes; fewer are not worth starting them."""
 
@@ -215,7 +218,7 @@ class _Searches:
             *others, last = option.alone.parts
             amounts = replace(last, candidate=last.candidate.at(start))
             structure = replace(option.alone, parts=(*others, amounts))
-            return fits.begun(structure, thin, start, now.weights).further(1, acceptance.COARSE).now.shape
+            return fits.begun(structure, thin, start, now.weights).further(1, COARSE).now.shape
 
         starts = list(option.starts)
         if option.grown is not None and simpler is not None:
@@ -224,13 +227,13 @@ class _Searches:
         if option.name.startswith(USER) and not any(math.isfinite(each.now.rms) for each in begun):
             raise EffectsError(f"the effect {option.name} gives no finite output wherever a search for it begins")
         near = acceptance.TOO_FAR * min(each.now.rms for each in acting(begun))
-        searches = [each.further(acceptance.FIRST_STEPS, acceptance.COARSE) for each in begun if each.now.rms <= near]
+        searches = [each.further(acceptance.FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
         best = min(acting(searches), key=lambda each: each.now.rms)
-        search = best.further(acceptance.SCREENING_STEPS, acceptance.COARSE)
+        search = best.further(acceptance.SCREENING_STEPS, COARSE)
         for _ in range(acceptance.LONGER - 1):
             if search.now.rms >= acceptance.FALLING * best.now.rms:
                 break
-            best, search = search, search.further(acceptance.SCREENING_STEPS, acceptance.COARSE)
+            best, search = search, search.further(acceptance.SCREENING_STEPS, COARSE)
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
     def _join(self, option: Option, task: _Task) -> Fitted:
@@ -238,7 +241,7 @@ class _Searches:
         assert task.shape is not None
         assert task.weights is not None
         search = fits.begun(option.structure, self.records.quick, task.shape, task.weights)
-        little = acceptance.COARSE if task.what == _JOIN else acceptance.POLISHED
+        little = COARSE if task.what == _JOIN else fits.POLISHED
         return (search.further(task.steps, little) if task.steps else search).found(task.weights)
 
 
