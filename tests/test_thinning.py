@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hystgen.chain import chain
 from hystgen.diagnosis.data import thinning
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search import acceptance
-from hystgen.effects import chain
 from hystgen.effects.base import Effect, Run
 from hystgen.effects.delay.model import Delay
 from hystgen.effects.lag.model import Lag
