@@ -9,7 +9,7 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
-.PHONY: demo test prove lint fuzz check-bounds blind clean
+.PHONY: demo test check prove lint fuzz check-bounds blind clean
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -27,23 +27,28 @@ demo: $(VENV)/ready
 	@echo examples/out/stage.png
 	@echo examples/out/report/report.html
 
+# Every feature once, without what is marked thorough
 test: $(VENV)/ready lint
+	$(BIN)/python -m pytest -n 2 -m "not thorough"
+
+# All that CI runs
+check: $(VENV)/ready lint
+	$(BIN)/python tests/static_checks.py
 	$(BIN)/python -m pytest -n 2
 
-# All proofs of Frama-C, which has to be there; `make test` does half of them
+# All proofs of Frama-C, which has to be there; `make check` does half of them
 prove: $(VENV)/ready
 	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
 
 lint: $(VENV)/ready
 	$(BIN)/ruff check hystgen tests benchmarks examples c_runtime docs
 	$(BIN)/mypy
-	$(BIN)/python tests/static_checks.py
 
 # Ten modules, five minutes each
 fuzz: $(VENV)/ready
 	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
 
-# Ten times the random models of `make test`, against an exact model; those with faults are kept in build/oracle
+# Ten times the random models of `make check`, against an exact model; those with faults are kept in build/oracle
 check-bounds: $(VENV)/ready
 	$(BIN)/python -m tests.oracle --models 3000
 
