@@ -323,7 +323,7 @@ def test_samples_of_a_search() -> None:
 def test_frequencies_from_which_a_resonance_is_sought(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three of five at which the error rings."""
     items = [ramp(4000, name=f"r{k}") for k in range(2)]
-    rings = sum(tone(50.0 + 60.0 * k, 4000, 1.0 + k) for k in range(5))
+    rings = sum(tone(50.0 + 60.0 * k, 4000, 1.0 + 0.05 * k) for k in range(5))
     items = [replace(item, y=item.y + rings + 0.1 * hiss(4000)) for item in items]
     refitted = Fitted(Structure(np.array([0.0, 10.0]), Kept()), np.empty(0), np.array([0.1, 0.0]), 1.0)
     records = screening.Records.of(items[:1], items[1:], refitted, 0.1)

@@ -12,7 +12,7 @@ from static_checks import MODULES, Finding, problems
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator.engines import ENGINES
-from hystgen.emission.module import LAYOUTS
+from hystgen.emission.options import LAYOUTS
 
 # A defect of each kind in C that compiles clean
 DEFECTS = {

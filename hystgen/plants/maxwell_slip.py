@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hystgen.basics.checks import Array, finite, numbers, signal
+from hystgen.cascade import PI
 from hystgen.plays import operators
-from hystgen.plays.play_sum import PlaySum
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class MaxwellSlip:
             force += stiffness * operators.stop(samples, slip / stiffness)
         return force
 
-    def play_sum(self) -> PlaySum:
+    def play_sum(self) -> PI:
         """The same operator as a play sum: `stop_r = identity - play_r` (26), so p_0 = k + sum k_i and p_i = -k_i."""
         thresholds = np.array(self.slip_forces) / np.array(self.stiffnesses)
         distinct, place = np.unique(thresholds, return_inverse=True)
         weights = np.bincount(place, weights=self.stiffnesses)
-        return PlaySum([0.0, *distinct.tolist()], [self.spring + float(sum(weights)), *(-weights).tolist()])
+        return PI([0.0, *distinct.tolist()], [self.spring + float(sum(weights)), *(-weights).tolist()])
