@@ -18,6 +18,3 @@
 #if HYSTGEN_EVAL_METHOD != 0 && HYSTGEN_EVAL_METHOD != 16
 #error "hystgen: this target computes in another precision than hystgen_real_t has"
 #endif
-#if HYSTGEN_REAL_MANT_DIG != HYSTGEN_REAL_BITS
-#error "hystgen: hystgen_real_t is not an IEEE number of the expected size here"
-#endif

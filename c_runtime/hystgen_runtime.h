@@ -31,14 +31,12 @@ typedef int64_t hystgen_sum_t;
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 typedef double hystgen_real_t;
 #define HYSTGEN_REAL_MAX DBL_MAX
-#define HYSTGEN_REAL_MANT_DIG DBL_MANT_DIG
-#define HYSTGEN_REAL_BITS 53
+#include "binary64.h"
 #include "soft_float64.h"
 #else
 typedef float hystgen_real_t;
 #define HYSTGEN_REAL_MAX FLT_MAX
-#define HYSTGEN_REAL_MANT_DIG FLT_MANT_DIG
-#define HYSTGEN_REAL_BITS 24
+#include "binary32.h"
 #include "soft_float32.h"
 #endif
 typedef hystgen_real_t hystgen_play_t;
@@ -52,7 +50,7 @@ typedef hystgen_real_t hystgen_sum_t;
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL
 #define HYSTGEN_FIXED_KERNEL
-#define HYSTGEN_APART_IN_FLOAT HYSTGEN_APART
+#define HYSTGEN_APART_IN_FLOAT_CORNERS HYSTGEN_APART
 #define HYSTGEN_APART_IN_FIXED HYSTGEN_APART
 
 #ifdef HYSTGEN_FIXED

@@ -1,9 +1,10 @@
 #include "hystgen_runtime.h"
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */
-HYSTGEN_APART_IN_FLOAT hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
-                                                              hystgen_real_t level,
-                                                              hystgen_reach_t w, bool *limited)
+HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
+                                                                      hystgen_real_t level,
+                                                                      hystgen_reach_t w,
+                                                                      bool *limited)
 {
     (void)self;
     (void)level;

@@ -12,9 +12,10 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
 /* The drive that gives w on the branch of its own move: that of the reference's move is tried
    first, then the other one, and where neither fits the drive holds; `limited` tells whether no
    drive at all gives w. */
-HYSTGEN_APART_IN_FLOAT hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
-                                                              hystgen_real_t level,
-                                                              hystgen_reach_t w, bool *limited)
+HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
+                                                                      hystgen_real_t level,
+                                                                      hystgen_reach_t w,
+                                                                      bool *limited)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
     hystgen_reach_t v = hystgen_front_inverse(w, up, limited);

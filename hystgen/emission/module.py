@@ -149,7 +149,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
             "runtime.h.j2",
             values,
             banner=_banner(values, f"{file}.h", f"kernels shared by all {arithmetic} models"),
-            build=whole(family.build),
+            build=whole(*family.build),
             typedefs=[(family.real, "real_t"), *((kind, own) for own, kind in family.types.items())],
             types=runtime.all_types((*family.states, *family.tables), prefix, family),
             prototypes=runtime.prototypes(prefix, family),
@@ -197,7 +197,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list
     )
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
-    values.corners = max(n, 1) if values.fixed else n + 1
+    values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     values.glue = render("front.c.j2", values) if values.stages else ""
     pieces = runtime.operator_pieces(values.variant, operators, values.glue)
     kernels = runtime.needed(
@@ -209,7 +209,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
     values.api = runtime.api(operators, name, prefix, family)
-    values.build = runtime.verbatim([family.build], name, family, name)
+    values.build = runtime.verbatim(family.build, name, family, name)
     values.typedefs = _typedefs(values)
     values.limits = _limits(values)
     values.status = _status(values)

@@ -38,14 +38,13 @@ FIXED_KERNELS = (
 class Family:
     """How an arithmetic appears in C: `bits` names it, `real` is the type of inputs and answers.
 
-    In floating point every number has that type, `macros` is what <float.h> calls it and `mantissa` its bits; in fixed
-    point `reach` is the type of where plays start to follow.
+    In floating point every number has that type, and <float.h> calls it `macros`; in fixed point `reach` is the type of
+    where plays start to follow.
     """
 
     bits: str
     real: str
     macros: str = ""
-    mantissa: int = 0
     reach: str = ""
 
     @property
@@ -56,11 +55,7 @@ class Family:
     @property
     def constants(self) -> dict[str, str]:
         """What `hystgen_runtime.h` defines and emitted code names directly."""
-        return {} if self.fixed else {
-            "HYSTGEN_REAL_MAX": f"{self.macros}_MAX",
-            "HYSTGEN_REAL_MANT_DIG": f"{self.macros}_MANT_DIG",
-            "HYSTGEN_REAL_BITS": str(self.mantissa),
-        }  # fmt: skip
+        return {} if self.fixed else {"HYSTGEN_REAL_MAX": f"{self.macros}_MAX"}
 
     @property
     def types(self) -> dict[str, str]:
@@ -95,9 +90,9 @@ class Family:
         return (f"hystgen_kernels_{'fixed' if self.fixed else 'float'}.h", "hystgen_kernels_loop.h")
 
     @property
-    def build(self) -> str:
-        """The header that checks how code is built."""
-        return "build_fixed.h" if self.fixed else "build_float.h"
+    def build(self) -> tuple[str, ...]:
+        """The headers that check how code is built."""
+        return ("build_fixed.h",) if self.fixed else ("build_float.h", f"binary{self.bits[1:]}.h")
 
     def soft(self, kernels: str) -> tuple[str, ...]:
         """The header with what the corner engine asks of floating point, where it is among these kernels."""
@@ -116,8 +111,8 @@ class Family:
 
 
 FAMILIES = {
-    "float32": Family("f32", "float", "FLT", 24),
-    "float64": Family("f64", "double", "DBL", 53),
+    "float32": Family("f32", "float", "FLT"),
+    "float64": Family("f64", "double", "DBL"),
     "q31": Family("q31", "int32_t", reach="int64_t"),
     "q15": Family("q15", "int16_t", reach="int32_t"),
 }
@@ -296,9 +291,13 @@ def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -
 
 
 def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: str, family: Family) -> str:
-    """Operators, or the types of their instances, as C text of the model `name` with the run time `prefix`."""
+    """Operators, or the types of their instances, as C text of the model `name` with the run time `prefix`.
+
+    `corners`: how many the corner engine takes, 0 for engine loop.
+    """
     text = "\n".join(piece.text for piece in pieces)
-    text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
+    apart = corners > 0 and not family.fixed
+    text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
 

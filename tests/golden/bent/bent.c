@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 74cf098374e114c6b58bd74b9435d7128eec5a7dcb0ba277f6265e166ccf3e41, without this line
+ * Text: sha256 e24fa4278cc1ddc968e6f932878b87b60ebbe251a72984ef71259876c0195b11, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -235,9 +235,10 @@ static bent_real_t bent_inverse_clamp(bent_real_t u)
 }
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */
-BENT_APART bent_real_t bent_inverse_choose(const bent_inverse_t *self,
-                                           bent_real_t level,
-                                           bent_real_t w, bool *limited)
+static bent_real_t bent_inverse_choose(const bent_inverse_t *self,
+                                       bent_real_t level,
+                                       bent_real_t w,
+                                       bool *limited)
 {
     (void)self;
     (void)level;

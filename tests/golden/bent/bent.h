@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 bc41a16076a745bd696e59637a710f6f93697a482d1e338204db7edbcc45a5bc, without this line
+ * Text: sha256 3aafbdb1f5990028231ef252dbd82826a1d9633b646ca831a4a2d5dc923814ff, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -54,8 +54,9 @@
 #if BENT_EVAL_METHOD != 0 && BENT_EVAL_METHOD != 16
 #error "bent: this target computes in another precision than bent_real_t has"
 #endif
+
 #if DBL_MANT_DIG != 53
-#error "bent: bent_real_t is not an IEEE number of the expected size here"
+#error "bent: double is not IEEE binary64 here"
 #endif
 
 #ifdef __cplusplus

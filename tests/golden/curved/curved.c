@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 daba7cc92c24657f3510d43ff9fd806e87dc0175d7558028014ab227fc15bc42, without this line
+ * Text: sha256 92595d84cb5a4413ef9fae53519a827c2b3b83688c8a03e72edefd8c1aab300d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -515,7 +515,8 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascendin
 /* The drive that gives w; `limited` tells whether no drive at all does. */
 static curved_reach_t curved_inverse_choose(const curved_inverse_t *self,
                                             curved_real_t level,
-                                            curved_reach_t w, bool *limited)
+                                            curved_reach_t w,
+                                            bool *limited)
 {
     (void)self;
     (void)level;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 b55a4d6dabb196371301e74b5007607745fb15957efe7cfc44f868a89611afcf, without this line
+ * Text: sha256 9e25356eb84ac31a1f6d92c67c20ed1d2ffc74dc7b621cb754e09973f034323b, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -53,8 +53,9 @@
 #if PLAIN_EVAL_METHOD != 0 && PLAIN_EVAL_METHOD != 16
 #error "plain: this target computes in another precision than plain_real_t has"
 #endif
+
 #if FLT_MANT_DIG != 24
-#error "plain: plain_real_t is not an IEEE number of the expected size here"
+#error "plain: float is not IEEE binary32 here"
 #endif
 
 #ifdef __cplusplus

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 b57d3d2ad5b50ccfd00246fe52e47909c565c61778a064b8b0b0553f1b3c36b3, without this line
+ * Text: sha256 9ff63845e632587a9e3feb2fff5eed60e4027465191233068308b8c73ebcc4eb, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -57,8 +57,9 @@
 #if TWO_BRANCHES_EVAL_METHOD != 0 && TWO_BRANCHES_EVAL_METHOD != 16
 #error "two_branches: this target computes in another precision than two_branches_real_t has"
 #endif
+
 #if FLT_MANT_DIG != 24
-#error "two_branches: two_branches_real_t is not an IEEE number of the expected size here"
+#error "two_branches: float is not IEEE binary32 here"
 #endif
 
 #ifdef __cplusplus
