@@ -74,7 +74,7 @@ def read_inside() -> set[str]:
 
 
 class Watch:
-    """A pytest plugin: which numbers each test reads, and its seconds; a test that takes too long is given up."""
+    """A pytest plugin: the numbers that each test reads, and its processor time; a long test is given up."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
@@ -107,15 +107,15 @@ class Watch:
         def late(*_: object) -> None:
             pytest.skip("takes too long")
 
-        signal.signal(signal.SIGALRM, late)
-        signal.setitimer(signal.ITIMER_REAL, self.seconds)
-        began = time.perf_counter()
+        signal.signal(signal.SIGPROF, late)
+        signal.setitimer(signal.ITIMER_PROF, self.seconds)
+        began = time.process_time()
         try:
             result = yield
-            self.tests[item.nodeid] = time.perf_counter() - began, sorted(self._read)
+            self.tests[item.nodeid] = time.process_time() - began, sorted(self._read)
             return result
         finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def apart(what: Callable[[], Any]) -> Any:
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("--only", action="append", default=[], metavar="NAME")
     parser.add_argument("--tests", action="append", default=[], metavar="FILE")
-    parser.add_argument("--seconds", type=float, default=3.0, help="a test that takes longer is not fast")
+    parser.add_argument("--seconds", type=float, default=3.0, help="processor time of a fast test")
     parser.add_argument("--json", type=Path)
     given = parser.parse_args(arguments)
     wrong = set(given.only) - set(names())
