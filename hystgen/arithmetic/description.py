@@ -16,10 +16,12 @@ class Arithmetic:
 
     `name`: of the contract; `short`: in names of the run time; `c_type`: NAME_real_t, the type of inputs and answers,
     of `bytes` bytes, which numpy calls `number_name`; `computed_name`: numpy's name of the type that the bit reference
-    computes with; `finer`: the arithmetic to turn to where this one is too coarse, empty for none.
+    computes with; `finer`: the arithmetic to turn to where this one is too coarse, empty for none; `float_h`: what
+    <float.h> calls it.
 
-    In fixed point (`fixed`) `code_bits` are those of a code without its sign, `degree` is that of the polynomials of
-    the memoryless part, and `finer_plays` says whether the plays' input may have bits below those of a drive code.
+    In fixed point (`fixed`) `reach` is the C type, of `reach_bytes`, of where plays start to follow; `code_bits` are
+    those of a code without its sign, `degree` is that of the polynomials of the memoryless part, and `finer_plays` says
+    whether the plays' input may have bits below those of a drive code.
     """
 
     name: str
@@ -29,7 +31,10 @@ class Arithmetic:
     computed_name: str
     bytes: int
     finer: str = ""
+    float_h: str = ""
     fixed: bool = False
+    reach: str = ""
+    reach_bytes: int = 0
     code_bits: int = 0
     degree: int = 0
     finer_plays: bool = False

@@ -6,11 +6,12 @@ import hashlib
 import re
 from dataclasses import dataclass
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import printable
 
 OPTIONS = {
     "operator": ("inverse", "forward", "both"),
-    "arithmetic": ("float32", "float64", "q31", "q15"),
+    "arithmetic": tuple(ARITHMETICS),
     "engine": ("corners", "loop"),
     "layout": ("self-contained", "shared-runtime", "single-header"),
 }

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.layout import FixedTables, Tables
@@ -69,7 +70,6 @@ class Cost:
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
 
-REAL_BYTES = {"float32": 4, "float64": 8, "q31": 4, "q15": 2}
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
 
@@ -144,15 +144,16 @@ def estimate(
 
 def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
     """Bytes of a self-test's samples, and of the instance that its operators use one after the other."""
-    real = REAL_BYTES[options.arithmetic]
+    real = ARITHMETICS[options.arithmetic].bytes
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
     return samples * sample, max(size for _, size in memory.instances)
 
 
 def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
     n = cascade.pi.n
-    real = REAL_BYTES[options.arithmetic]
-    play, reach = (4, 8 if options.arithmetic == "q31" else 4) if fixed else (real, real)
+    arithmetic = ARITHMETICS[options.arithmetic]
+    real = arithmetic.bytes
+    play, reach = (4, arithmetic.reach_bytes) if fixed else (real, real)
     branches = cascade.branches_differ
     sizes = []
     a_play = play

@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from hystgen.arithmetic import ARITHMETICS, Arithmetic
+
 VERSION = 2  # of the interface between emitted models and a shared run time
 
 FLOAT_KERNELS = (
@@ -36,31 +38,34 @@ FIXED_KERNELS = (
 
 @dataclass(frozen=True)
 class Family:
-    """How an arithmetic appears in C: `bits` names it, `real` is the type of inputs and answers.
+    """How an arithmetic appears in C: which files of the run time and which types it has."""
 
-    In floating point every number has that type, and <float.h> calls it `macros`; in fixed point `reach` is the type of
-    where plays start to follow.
-    """
+    arithmetic: Arithmetic
 
-    bits: str
-    real: str
-    macros: str = ""
-    reach: str = ""
+    @property
+    def bits(self) -> str:
+        """The arithmetic in names of the run time."""
+        return self.arithmetic.short
+
+    @property
+    def real(self) -> str:
+        """The type of inputs and answers."""
+        return self.arithmetic.c_type
 
     @property
     def fixed(self) -> bool:
         """Whether it is fixed point."""
-        return bool(self.reach)
+        return self.arithmetic.fixed
 
     @property
     def constants(self) -> dict[str, str]:
         """What `hystgen_runtime.h` defines and emitted code names directly."""
-        return {} if self.fixed else {"HYSTGEN_REAL_MAX": f"{self.macros}_MAX"}
+        return {} if self.fixed else {"HYSTGEN_REAL_MAX": f"{self.arithmetic.float_h}_MAX"}
 
     @property
     def types(self) -> dict[str, str]:
         """Types of the run time beside `real_t`."""
-        return {"play_t": "int32_t", "reach_t": self.reach, "sum_t": "int64_t"} if self.fixed else {}
+        return {"play_t": "int32_t", "reach_t": self.arithmetic.reach, "sum_t": "int64_t"} if self.fixed else {}
 
     @property
     def includes(self) -> tuple[str, ...]:
@@ -110,12 +115,7 @@ class Family:
         return () if self.fixed else ("rounding_end.h",)
 
 
-FAMILIES = {
-    "float32": Family("f32", "float", "FLT"),
-    "float64": Family("f64", "double", "DBL"),
-    "q31": Family("q31", "int32_t", reach="int64_t"),
-    "q15": Family("q15", "int16_t", reach="int32_t"),
-}
+FAMILIES = {name: Family(arithmetic) for name, arithmetic in ARITHMETICS.items()}
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import decimal
 from typing import Any
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
@@ -55,7 +56,7 @@ def properties(model: Model) -> str:
             f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} are "
             f"answered with drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
         )
-        for arithmetic in ("float32", "float64"):
+        for arithmetic in (each.name for each in ARITHMETICS.values() if not each.fixed):
             bounds = error_bounds(c, arithmetic, model.engine(arithmetic=arithmetic))
             lines.append(
                 f"error, {arithmetic}     forward {_most(bounds.forward)}{output}, inverse "
@@ -116,7 +117,7 @@ def _shown(value: Any) -> str:
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
     """Resolution and bounds of fixed point in physical units, or why it is refused."""
     lines = []
-    for arithmetic in ("q31", "q15"):
+    for arithmetic in (each.name for each in ARITHMETICS.values() if each.fixed):
         try:
             form = _format(model, arithmetic)
         except FormatError as error:
@@ -149,16 +150,16 @@ def warnings(model: Model) -> list[str]:
     share = error / (c.input_range[1] - c.input_range[0])
     if share < WIDE:
         return []
-    unit, finer = model.parameters.units.input, "q31" if arithmetic == "q15" else "float64"
+    unit, finer = model.parameters.units.input, ARITHMETICS[arithmetic].finer
     return [
         f"the inverse in {arithmetic} may be off by {_most(error)}{f' {unit}' if unit else ''}, {100 * share:.0f} % of "
-        f"the drive's range: {'' if arithmetic == finer else f'take {finer}, '}raise p_0 or narrow input_range"
+        f"the drive's range: {f'take {finer}, ' if finer else ''}raise p_0 or narrow input_range"
     ]
 
 
 def _inverse_error(model: Model, arithmetic: str) -> float:
     """Largest difference between the emitted inverse and the exact one, input units. Raises FormatError."""
-    if arithmetic in ("float32", "float64"):
+    if not ARITHMETICS[arithmetic].fixed:
         return error_bounds(model.cascade, arithmetic, model.engine(arithmetic=arithmetic)).rounding
     form = _format(model, arithmetic)
     return 0.0 if form.inverse_rounding is None else form.inverse_rounding * float(form.drive_lsb)
