@@ -376,8 +376,9 @@ def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path
                 with pytest.raises(compilers.CompileError, match="build without -f"):
                     run()
     header = emitted_files(model("curved"), arithmetic="float32")["curved.h"]
+    banner = re.sub(r"\s+\*?\s*", " ", header)  # without its lines
     for words in ("flush denormal", "to nearest", "-fassociative-math", "-ffp-contract=fast"):
-        assert words in header
+        assert words in banner
 
 
 def test_constants_in_single_precision_are_refused(tmp_path: Path) -> None:

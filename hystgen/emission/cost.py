@@ -135,7 +135,7 @@ def estimate(
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
     worst = [
-        (op, _worst(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
+        (op, worst_case(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
     ]
     memory, avr = (_memory(cascade, options, fixed, text, plays, layout) for layout in (CORE_32, AVR))
     code = engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine)
@@ -191,13 +191,9 @@ def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layou
     return layout.struct(plays, *beside, (corners * corner, alignment))[0], corner
 
 
-def _worst(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str:
-    """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside.
-
-    A search through the corner list bisects it, and that through a block bisects it too: at most 3 + 2 b comparisons in
-    all, b the bits of n. A drive that is limited or committed is searched for too, then or when it is taken to memory,
-    the answer once more.
-    """
+def worst_case(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str:
+    """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside;
+    b are the bits of n."""
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
     if isinstance(numbers, FixedTables):
@@ -208,7 +204,7 @@ def _worst(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str
     products, compares, per_play, per_bit = _worst_of_plays(op, corners, fixed, corners and not fronts)
     per_play_products = 0 if corners else 1 if op == "forward" else 2 if fixed else 3
     passes = 1 if op == "forward" else 2 + int(numbers.branches)
-    compares += 12 * int(bool(numbers.branches))
+    compares += (2 if op == "forward" else 16) * int(bool(numbers.branches))
     kernels = ""
     if isinstance(numbers, FixedTables) and fronts:
         products += passes * numbers.coefficient.shape[1]
@@ -235,19 +231,18 @@ def _worst(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str
 
 
 def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[int, int, int, int]:
-    """Multiplications, comparisons, and of these more a play, more a bit of n; of plays, checks and limits."""
+    """Multiplications, comparisons, and of these more a play, more a bit of n; of plays, checks and limits.
+
+    Counted in the bit reference (`tests/test_cost.py`), and rounded up to what a search that bisects its whole list
+    would take.
+    """
     if not corners:
-        return (1, 6, 2, 0) if op == "forward" else (3 if fixed else 2, 13, 3, 0)
-    if fixed:  # a search looks at a corner, then at a play, and bisects both: 2 + 2 b
-        # clamped 3, the same plays 3, turned 1, search, next 1, code 4; the output
         if op == "forward":
-            return 1, 14, 0, 2
-        # Usual 3, repeated 1, clamped 6, turned 1, search, kept near the range 1, the same plays 2, else turned 1 and
-        # another search; ahead 3. Over a slope, output, ahead
-        return 3 + fast, 19 + 3 * fast, 0, 4
-    if op == "forward":  # turning back leaves a corner, the way to a play is halved; the output. Checks 4, turned 2,
-        return 3, 10, 0, 2  # next 1, search 3
-    # The drive: turned 2, foretold 2, next 1, search 3; the reference: checks 7, going on 3, search 3, place 2, limits
-    # 4 + 3, ahead 1; where samples can be fast: two edges, room 1, the range's ends 3, limited 2. The drive's corner
-    # and way, the reference's; two lines; with fast samples the edge.
-    return 6 + fast, 31 + 8 * fast, 0, 4
+            return 1, 11 if fixed else 7, 2, 0
+        return 3, 14, 3, 0
+    if fixed:  # the corner, then the play in its block: either is bisected; clamps, the code, what lies ahead
+        return (1, 15, 0, 2) if op == "forward" else (3 + 2 * fast, 19 + 3 * fast, 0, 4)
+    # the sign of a move takes a multiplication too; up to eight plays are tried one by one before either search
+    if op == "forward" or fast:
+        return 16, 18, 0, 2
+    return 25, 24, 0, 4

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 9e00cbb1c53d026493e787f39035a0b4b23a5672378678cdfac9b656b7b75d99, without this line
+ * Text: sha256 8f418b0f8b607d9f194aa50246afec86eb8ce3eeee5b42a902be3c47108dc075, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -17,8 +17,8 @@
  *     constant tables   512 bytes
  *     forward instance  72 bytes of RAM
  *     inverse instance  104 bytes of RAM
- *     forward step, worst case: 8 multiplications (2 + 1 n), 21 comparisons (9 + 2 n)
- *     inverse step, worst case: 22 multiplications (4 + 3 n), 37 comparisons (19 + 3 n)
+ *     forward step, worst case: 8 multiplications (2 + 1 n), 22 comparisons (10 + 2 n)
+ *     inverse step, worst case: 23 multiplications (5 + 3 n), 38 comparisons (20 + 3 n)
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
  * memory of the parameter file; reset starts again from plays at 0. Not for targets that flush

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 b76426059a287e44e3cc13c95a69acb57ce3e9e86670da4e282c0bafc2b2bed6, without this line
+ * Text: sha256 ce611df2bb471467ac8bfc4aa584b7c929a68773245d91085e46db86b4d0aceb, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -15,7 +15,7 @@
  *         such a model
  *     constant tables   212 bytes
  *     inverse instance  196 bytes of RAM
- *     inverse step, worst case: 7 multiplications, 51 comparisons (39 + 4 b, b = 3 the bits of n)
+ *     inverse step, worst case: 16 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
  * On an 8-bit AVR constants lie in RAM too: at most 380 bytes of RAM in all, 31 of them for each
  * play
  *

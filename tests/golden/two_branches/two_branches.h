@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 821dd7a842c4acee1e9a680a74683bb3b488259586c8523687ecff9ab32fa4e4, without this line
+ * Text: sha256 4b462d3e6e9c1e4a03172e9ad25947ed3876d5bd1942b24d28ea8e5fcbd70ace, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -16,7 +16,7 @@
  *         such a model
  *     constant tables   832 bytes
  *     inverse instance  216 bytes of RAM
- *     inverse step, worst case: 12 multiplications, 61 comparisons (49 + 4 b, b = 3 the bits of n),
+ *     inverse step, worst case: 31 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
  *         1 tanh, 2 atanh
  * On an 8-bit AVR constants lie in RAM too: at most 1012 bytes of RAM in all, 31 of them for each
  * play

@@ -1,0 +1,150 @@
+"""The operations that the banner promises, counted in the bit reference, which runs in Python on numbers that count."""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import jit
+from hystgen.compensator import reference
+from hystgen.emission import cost
+from hystgen.front.tanh import compensator as envelopes
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
+
+FRONTS = {
+    "plays": "",
+    "envelope": "  memoryless: {kind: tanh, ascending: {a0: 20, a1: 0.1, a2: 0.1, a3: 0.2}}\n",
+    "branches": "  memoryless:\n    kind: tanh\n    ascending: {a0: 20, a1: 0.1, a2: 0.1, a3: 0.2}\n"
+    "    descending: {a0: 20, a1: 0.1, a2: 0.1, a3: 0.5}\n",
+}
+SAMPLES = 600
+
+INDICES = {"shift", "first", "pieces", "ascending", "below", "scale", "counts", "top", "rose"}
+"""Arrays of places and numbers of bits, whose comparisons are no operations on numbers of the model."""
+
+
+class Number:
+    """A number that counts what is done with it."""
+
+    products = comparisons = 0
+
+    def __init__(self, value: Any) -> None:
+        self.value = value.value if isinstance(value, Number) else value
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def __index__(self) -> int:
+        return operator.index(self.value)
+
+    def __neg__(self) -> Number:
+        return Number(-self.value)
+
+    def __invert__(self) -> Number:
+        return Number(~self.value)
+
+
+def plain(x: Any) -> Any:
+    return x.value if isinstance(x, Number) else x
+
+
+def arithmetic(name: str) -> tuple[Callable[[Number, Any], Number], Callable[[Number, Any], Number]]:
+    of = getattr(operator, name)
+
+    def left(a: Number, b: Any) -> Number:
+        Number.products += name == "mul"
+        return Number(of(a.value, plain(b)))
+
+    def right(a: Number, b: Any) -> Number:
+        Number.products += name == "mul"
+        return Number(of(plain(b), a.value))
+
+    return left, right
+
+
+def comparison(name: str) -> Callable[[Number, Any], bool]:
+    of = getattr(operator, name)
+
+    def compare(a: Number, b: Any) -> bool:
+        Number.comparisons += 1
+        return bool(of(a.value, plain(b)))
+
+    return compare
+
+
+for each in ("add", "sub", "mul", "lshift", "rshift", "and_"):
+    for prefix, function in zip(("__", "__r"), arithmetic(each), strict=True):
+        setattr(Number, prefix + each.strip("_") + "__", function)
+for each in ("lt", "le", "gt", "ge", "eq", "ne"):
+    setattr(Number, f"__{each}__", comparison(each))
+
+
+def counting(x: Any, name: str = "") -> Any:
+    """Tables or memory in which every number counts."""
+    if isinstance(x, np.ndarray) and name not in INDICES and (x.dtype.kind == "f" or x.dtype == np.int64):
+        out = np.empty(x.shape, dtype=object)
+        for place in np.ndindex(*x.shape):
+            out[place] = Number(x[place].item())
+        return out
+    if hasattr(x, "_fields"):
+        return type(x)(*(counting(getattr(x, field), field) for field in x._fields))
+    return x
+
+
+def model(front: str, n: int) -> Model:
+    r = np.linspace(0.0, 5.0, n + 1)
+    weights = [0.7, *(0.15 * np.exp(-r[1:] / 5.0)).tolist()]
+    text = f"hystgen: 1\nname: m\ninput_range: [-10, 10]\nmodel:\n  pi:\n    thresholds: {r.tolist()}\n"
+    return Model(parse_parameters(f"{text}    weights: {weights}\n{FRONTS[front]}", "m.yaml"))
+
+
+def dearest(one: Model, name: str, engine: str, inverse: bool) -> tuple[int, int]:
+    """Most multiplications and comparisons of a step over jumps of all sizes, beyond the limits too, with commits."""
+    tables = one.tables(name, engine)
+    code, counted = reference.operations(tables), counting(tables)
+    state = counting(reference.new_state(tables))
+    rng = np.random.default_rng(0)
+    x: Any = rng.uniform(-10.5, 10.5, SAMPLES) * rng.choice([1.0, 0.5, 0.1, 0.02], SAMPLES)
+    x[rng.random(SAMPLES) < 0.02] = 11.0
+    if ARITHMETICS[name].fixed:
+        most = ARITHMETICS[name].code_max
+        x = np.clip(np.rint(x / 10.0 * most), -most, most).astype(np.int64)
+    elif inverse:
+        x = x * one.cascade.output_range[1] / 10.0
+    call = np.where(inverse & (rng.random(SAMPLES) < 0.1), slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
+    arguments, answer, status = counting(x), counting(x[:1]), np.zeros(1, np.uint8)
+    found = []
+    with jit.plain():
+        code.init(counted, state, int(inverse))
+        for k in range(SAMPLES):
+            Number.products = Number.comparisons = 0
+            code.run(counted, state, int(inverse), call[k : k + 1], arguments[k : k + 1], answer, status)
+            found.append((Number.products, Number.comparisons) if call[k] == slots.OP_STEP else (0, 0))
+    return max(a for a, _ in found), max(b for _, b in found)
+
+
+@pytest.mark.parametrize("n", [1, 16, 64])
+@pytest.mark.parametrize("operation", ["forward", "inverse"])
+@pytest.mark.parametrize("front", FRONTS)
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+@pytest.mark.parametrize("name", ["float64", "q31", "q15"])
+def test_no_step_takes_more_than_the_banner_says_nor_far_less(
+    name: str, engine: str, front: str, operation: str, n: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Kernels of tanh and atanh aside; more than half of what is promised is met by jumps at random."""
+    for kernel, of in (("tanh", math.tanh), ("atanh", math.atanh)):
+        monkeypatch.setattr(envelopes, kernel, lambda x, _, of=of: Number(of(float(x))))
+    one = model(front, n)
+    words = cost.worst_case(n, operation, engine == "corners", one.tables(name, engine))
+    promised = [int(number) for number in re.findall(r"(\d+) (?:multiplications|comparisons)", words)]
+    for met, most in zip(dearest(one, name, engine, operation == "inverse"), promised, strict=True):
+        assert met <= most <= 2 * met, (words, met)
