@@ -52,6 +52,8 @@ from hystgen.identification.reduction import settled
 from hystgen.identification.uncertainty import correlation_time
 from hystgen.records import Record
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[np.float64]
 
 

@@ -179,6 +179,7 @@ def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 def test_what_was_right_stays_so() -> None:
     """Lists, integers, a single number, generators of paths, NumPy's own scalars."""
     exact = MODEL.simulate(V)

@@ -861,6 +861,7 @@ def test_simulate_inverse_counts_the_drives_that_the_range_limits() -> None:
     assert "references" not in result.stderr
 
 
+@pytest.mark.thorough
 def test_simulate_inverse_after_history_takes_the_branch_of_its_own_move() -> None:
     """Up to 3, down to 2, then a reference a little below: the falling one of two branches that would both do."""
     shifts = {"ascending": 0.2, "descending": 0.5}

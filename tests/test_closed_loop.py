@@ -466,6 +466,7 @@ def test_compiled_float64_gives_the_bits_of_the_reference(compiler: str | None) 
 @pytest.mark.parametrize("name", ["listed", "two_branches"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("operator", ["inverse", "forward"])
+@pytest.mark.thorough
 def test_compiled_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, operator: str) -> None:
     stage = model(FILES[name])
     parts = BitReference(stage, operator, arithmetic), CompiledC(stage, operator, arithmetic)

@@ -99,6 +99,7 @@ PAGES = ("cp932", "koi8-r", "cp437", "cp1252", "ascii", "utf-8")  # two of a kin
 
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("page", PAGES)
+@pytest.mark.thorough
 def test_any_code_page_takes_every_result(page: str) -> None:
     plain = process("show", "stage.yaml", env={"PYTHONIOENCODING": "utf-8"}).stdout.decode()
     assert "µm" in plain
@@ -122,6 +123,7 @@ def test_data_on_standard_output_are_utf_8_in_any_code_page(page: str) -> None:
     assert done.stdout == Path("out.csv").read_bytes()
 
 
+@pytest.mark.thorough
 def test_files_are_utf_8_in_any_locale(tmp_path: Path) -> None:
     """Text that is read or written without an encoding would be in the locale's: Python warns of that when asked."""
     strict = {"PYTHONWARNDEFAULTENCODING": "1", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
@@ -160,6 +162,7 @@ def litter(*folders: Path) -> list[Path]:
     ids=["verify", "alone", "workers"],
 )
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
+@pytest.mark.thorough
 def test_a_process_that_is_ended_leaves_nothing(words: Sequence[str], sign: str, sent: signal.Signals) -> None:
     """SIGTERM and SIGHUP at once; kill -9 can only be cleared up behind by the next run."""
     Path("units").mkdir()
@@ -282,6 +285,7 @@ def test_a_cache_on_a_full_disk_is_none(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "nonsense", "TkAgg", ""])
+@pytest.mark.thorough
 def test_a_backend_from_a_notebook_is_no_matter(backend: str) -> None:
     process("show", "stage.yaml", "--plot", "plain.png")
     done = process("show", "stage.yaml", "--plot", "a.png", env={"MPLBACKEND": backend})

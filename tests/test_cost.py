@@ -20,6 +20,8 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 
+pytestmark = pytest.mark.thorough
+
 FRONTS = {
     "plays": "",
     "envelope": "  memoryless: {kind: tanh, ascending: {a0: 20, a1: 0.1, a2: 0.1, a3: 0.2}}\n",

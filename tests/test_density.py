@@ -22,6 +22,8 @@ from scipy.integrate import quad
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays.density import DensityError, Discretisation, from_formula, from_table, parse_formula
 
+pytestmark = pytest.mark.thorough
+
 Curve = Callable[[float], float]
 U = 2.0**-53  # what one rounding may add, as a share of its result
 

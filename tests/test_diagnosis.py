@@ -81,6 +81,7 @@ def diagnosed(case: Path) -> dict[str, Any]:
 
 
 class TestBlindPlants:
+    @pytest.mark.thorough
     def test_single_effects(self, tmp_path: Path) -> None:
         """A bounded sample: most are named, first and alone, and the gap shrinks."""
         right, alone, wrong = 0, 0, []
@@ -103,6 +104,7 @@ class TestBlindPlants:
         assert right >= SINGLES - 1, wrong
         assert alone >= SINGLES - 1, wrong
 
+    @pytest.mark.thorough
     def test_nothing_is_named_where_nothing_is_missing(self, tmp_path: Path) -> None:
         for case, label in made(tmp_path, "none", NONE):
             content = diagnosed(case)
@@ -174,6 +176,7 @@ class TestSeveralProcesses:
         assert json.dumps(found[0]) == json.dumps(found[1])
 
     @pytest.mark.parametrize(("forks", "fits"), [(1, 0), (2, 0), (2, 10)])
+    @pytest.mark.thorough
     def test_an_interrupt_leaves_nothing(self, case: Path, forks: int, fits: int) -> None:
         program = (
             "import os, sys; from hystgen import cli; from hystgen.basics import parallel; "
@@ -414,6 +417,7 @@ def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
 
 
 @pytest.mark.parametrize("curve", [-0.15, 0.15])
+@pytest.mark.thorough
 def test_a_curved_sensor_beside_a_drift(tmp_path: Path, curve: float) -> None:
     records = []
     for number in range(1, 6):

@@ -64,6 +64,7 @@ def check_codegen(name: str, **options: str) -> None:
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
+@pytest.mark.thorough
 def test_bits_equal(name: str, arithmetic: str, engine: str) -> None:
     check_codegen(name, arithmetic=arithmetic, engine=engine)
 
@@ -76,6 +77,7 @@ ROUND = {
 
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
 @pytest.mark.parametrize("name", ROUND)
+@pytest.mark.thorough
 def test_bits_equal_where_corners_end_at_the_same_drive(name: str, arithmetic: str) -> None:
     """Round numbers: which of two corners is left first, and which play follows, is rounding's choice."""
     ends, thresholds, weights = ROUND[name]
@@ -226,6 +228,7 @@ def test_bits_equal_where_rounding_decides_on_a_limit(ends: tuple[float, float],
 @pytest.mark.parametrize("layout", LAYOUTS[1:])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])
+@pytest.mark.thorough
 def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) -> None:
     check_codegen(name, arithmetic=arithmetic, layout=layout)
 
@@ -287,6 +290,7 @@ ALONE = [
 
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(("name", "operator", "layout"), ALONE)
+@pytest.mark.thorough
 def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_path: Path) -> None:
     arithmetic = {"bent": "float64", "curved": "float64", "mixed": "q31", "listed": "q15"}.get(name, "float32")
     engine = "loop" if operator == "forward" else "corners"
@@ -311,6 +315,7 @@ def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_pat
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])
+@pytest.mark.thorough
 def test_compiles_in_older_dialects(name: str, arithmetic: str, layout: str, tmp_path: Path) -> None:
     """With their extensions, which whole numbers of 64 bits need: <float.h> and <stdint.h> hide much there."""
     hystgen.emit(model(name), tmp_path, operator="both", layout=layout, arithmetic=arithmetic)
@@ -359,6 +364,7 @@ def test_whole_numbers_keep_their_value_in_every_dialect(x: int, tmp_path: Path)
     "-Ofast", "-ffast-math", "-ffinite-math-only", "-funsafe-math-optimizations",
     "-fassociative-math -fno-signed-zeros -fno-trapping-math",
 ])  # fmt: skip
+@pytest.mark.thorough
 def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path: Path) -> None:
     """At compile time, but that clang keeps reordering to itself; whole numbers do not mind."""
     for arithmetic in ("float32", "float64", "q31"):
@@ -457,6 +463,7 @@ def renamed(name: str, to: str) -> Model:
 
 @pytest.mark.parametrize("name", ["x", "n" * MAX_NAME])
 @pytest.mark.parametrize("kind", ["plain", "listed", "bent", "mixed"])
+@pytest.mark.thorough
 def test_no_line_is_longer_than_100_columns(kind: str, name: str, tmp_path: Path) -> None:
     """Whatever the name: statements are broken anew. What is broken most still compiles, clean."""
     one = renamed(kind, name)

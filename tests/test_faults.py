@@ -29,6 +29,8 @@ from hystgen.identification import IdentificationError, faults, pi, prepared
 from hystgen.identification.fronts import Tanh
 from hystgen.records import Record, no_value, read_record
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[np.float64]
 Run = Callable[..., tuple[int, str, str]]
 

@@ -30,6 +30,8 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
 from hystgen.plays.corners import memory
 
+pytestmark = pytest.mark.thorough
+
 ARITHMETICS = ("q31", "q15")
 
 

@@ -28,6 +28,8 @@ from hystgen.fleet import batch, outliers, workers
 from hystgen.fleet.batch import FIGURES, KEPT_IN
 from hystgen.fleet.workers import Result, Task
 
+pytestmark = pytest.mark.thorough
+
 Run = Callable[..., tuple[int, str, str]]
 
 SOUND = 16

@@ -22,6 +22,8 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers, targets
 
+pytestmark = pytest.mark.thorough
+
 REQUIRED = bool(os.environ.get("CI"))
 ARITHMETICS = ("float32", "float64", "q31", "q15")
 KEYWORDS = words(

@@ -15,6 +15,8 @@ from modelfiles import FILES
 
 from hystgen.verification import compilers
 
+pytestmark = pytest.mark.thorough
+
 SECONDS = float(os.environ.get("HYSTGEN_FUZZ_SECONDS", "10"))
 """Of fuzzing a module; `make fuzz` takes longer."""
 

@@ -378,6 +378,7 @@ class TestIntervals:
         return hits / self.TRIALS, wide / self.TRIALS
 
     @pytest.mark.parametrize("colour", [0.0, 0.8])
+    @pytest.mark.thorough
     def test_they_hold_the_truth_as_often_as_they_say(self, colour: float) -> None:
         weights, width = self.covered(colour)
         assert 0.90 <= np.mean(weights) <= 0.99
@@ -402,6 +403,7 @@ class TestIntervals:
 
 
 @pytest.mark.parametrize("front", [np.asarray, bent])
+@pytest.mark.thorough
 def test_an_unknown_history_costs_little(front: Callable[[Array], Array]) -> None:
     """At most 10 % in held-out error, over twenty plants."""
     kind = "pi" if front is np.asarray else "gpi-deadzone"

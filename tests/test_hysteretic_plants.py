@@ -28,6 +28,8 @@ from hystgen.plants import EverettTable, integration
 from hystgen.plants.jiles_atherton import langevin, langevin_slope
 from hystgen.records import Record
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[np.float64]
 EPS = float(np.finfo(np.float64).eps)
 U = EPS / 2.0  # what one rounding may add, as a share of its result

@@ -13,6 +13,8 @@ import pytest
 import hystgen
 from hystgen.basics.jit import Jit, jit, plain
 
+pytestmark = pytest.mark.thorough
+
 LARGE = 2**70  # no number of a compiled function
 
 FACTOR = 3

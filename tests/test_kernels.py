@@ -27,6 +27,8 @@ from hypothesis import strategies as st
 
 from hystgen.front.tanh import kernels
 
+pytestmark = pytest.mark.thorough
+
 RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
 COMPILERS = ("gcc", "clang", "zig")
 FORMATS = ("float32", "float64")

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.thorough
+
 CONFTEST = Path(__file__).with_name("conftest.py")
 OWN = ("CI", "HYSTGEN_REQUIRE_DATA", "HYSTGEN_WHOLE", "PYTEST_ADDOPTS")
 ONE_PROCESS_AND_XDIST = pytest.mark.parametrize("options", [(), ("-n", "1")], ids=["one process", "xdist"])

@@ -21,6 +21,8 @@ from hystgen.verification import comparison, host
 from hystgen.verification import run as verification
 from hystgen.verification.report import Report
 
+pytestmark = pytest.mark.thorough
+
 LENGTH = 20_000
 """Calls of each record, a fifth of what `verify` takes by default."""
 

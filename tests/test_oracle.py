@@ -16,7 +16,10 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from tests.oracle import check, models
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*initial_state cannot have come:UserWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore:.*initial_state cannot have come:UserWarning"),
+]
 
 MODELS = int(os.environ.get("HYSTGEN_ORACLE_MODELS", "300"))
 """Random models of a run; `make check-bounds` takes more."""

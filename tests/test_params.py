@@ -919,6 +919,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
 
 @settings(deadline=None, max_examples=80, suppress_health_check=[HealthCheck.too_slow])
 @given(parameter_data(), st.text(max_size=20), st.text(max_size=20))
+@pytest.mark.thorough
 def test_round_trip(data: dict[str, Any], header: str, comment: str) -> None:
     parameters = make_parameters(data)
     text = dump_parameters(parameters, {"model.pi": comment, "emit.engine": comment, "sample_time": comment}, header)

@@ -22,6 +22,8 @@ from hystgen.report.planned import Plan
 from tests.plants.__main__ import main as plants
 from tests.plants.effects import catalogue
 
+pytestmark = pytest.mark.thorough
+
 Call = Callable[..., tuple[int, str, str]]
 
 SAMPLE = ("asymmetry", "delay", "slew_limit", "thermal")

@@ -26,6 +26,8 @@ from tests.plants.__main__ import main
 from tests.plants.effects import Effect, Surroundings, drive_side, output_side, slow
 from tests.plants.plant import Plant
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[np.float64]
 
 PLANTS = Path(__file__).parent / "plants"

@@ -29,6 +29,8 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.verification import compilers, signals
 
+pytestmark = pytest.mark.thorough
+
 THRESHOLDS = np.linspace(0.0, 9.0, 65)
 WEIGHTS = np.concatenate([[0.7], 0.0375 * np.exp(-THRESHOLDS[1:] / 5)])
 MANY = head("many", -10, 10) + f"\n  pi: {{thresholds: {THRESHOLDS.tolist()}, weights: {WEIGHTS.tolist()}}}\n"

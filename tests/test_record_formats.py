@@ -465,6 +465,7 @@ WIDE = {"text": "on", "numbers": "{}.5", "gaps": "{}.5", "quoted": '"{}.5"'}
 
 
 @pytest.mark.parametrize("kind", WIDE)
+@pytest.mark.thorough
 def test_a_table_of_many_columns_takes_seconds(tmp_path: Path, kind: str) -> None:
     with (tmp_path / "a.csv").open("w") as file:
         file.write(",".join(["t", "v", "y", *(f"c{k}" for k in range(MANY))]) + "\n")
@@ -967,6 +968,7 @@ def test_a_pipe_is_read(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="the high-water mark of memory is read as Linux gives it")
 @pytest.mark.parametrize("file", ["record.csv", "faults.csv", "record.npz", "record.mat", "compressed.h5",
                                   "one_group.parquet"])  # fmt: skip
+@pytest.mark.thorough
 def test_memory_stays_below_three_times_what_is_kept(large: dict[str, dict[str, Any]], file: str) -> None:
     found = large[file]
     assert found["samples"] == 1_000_000

@@ -336,6 +336,7 @@ class TestFolder:
         assert {path.name for path in folder.parent.iterdir()} == {"out", "usual"}
 
     @pytest.mark.parametrize("exists", [False, True])
+    @pytest.mark.thorough
     def test_nothing_half_written(
         self, exists: bool, fitted: tuple[Fit, Record, Record], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -487,6 +488,7 @@ class TestDrawing:
         rising = np.arange(2001) % 400 > 200
         np.testing.assert_allclose(rate[away], np.where(rising, 100.0, -100.0)[away])
 
+    @pytest.mark.thorough
     def test_a_report_of_a_million_samples_is_small(self, tmp_path: Path) -> None:
         n = 1_000_000
         t = np.arange(n) * 1e-4

@@ -20,6 +20,8 @@ from hystgen.plays import fixed, loop, slots
 from hystgen.verification import signals
 from hystgen.verification.compilers import C_WARNINGS, WARNINGS
 
+pytestmark = pytest.mark.thorough
+
 RUNTIME = Path(__file__).resolve().parent.parent / "c_runtime"
 
 DRIVER = """

@@ -14,6 +14,8 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator.engines import ENGINES
 from hystgen.emission.options import LAYOUTS
 
+pytestmark = pytest.mark.thorough
+
 # A defect of each kind in C that compiles clean
 DEFECTS = {
     "cppcheck": ("arrayIndexOutOfBounds", "int f(void)", "int a[2] = {1, 2};\n    return a[2];"),

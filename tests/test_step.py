@@ -19,6 +19,8 @@ from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 
+pytestmark = pytest.mark.thorough
+
 CLOSE = 1e-7
 
 

@@ -31,6 +31,8 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import Row, avr, compilers, cross, emulator, firmware, sources, targets
 
+pytestmark = pytest.mark.thorough
+
 CORES = tuple(target.name for target in targets.TARGETS)
 AVR_CXX = "avr-g++"
 REQUIRED = bool(os.environ.get("CI"))  # CI installs the second compiler and emulator; elsewhere they may be absent

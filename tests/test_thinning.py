@@ -17,6 +17,8 @@ from hystgen.effects.lag.model import Lag
 from hystgen.effects.slew_limit.model import SlewLimit
 from hystgen.plays import operators
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[np.float64]
 
 DT = 1e-3

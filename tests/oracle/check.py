@@ -18,8 +18,7 @@ import numpy as np
 from ruamel.yaml import YAML
 
 import hystgen
-from hystgen.basics.problems import FormatError
-from hystgen.model import NotInvertibleError
+from hystgen.basics.problems import FormatError, NotInvertibleError
 from tests.oracle import models
 
 HERE = Path(__file__).parent
