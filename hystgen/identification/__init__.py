@@ -102,15 +102,15 @@ def identify(
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
-    told = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
-    told += remarks.repeated(fit_records, held_records)
+    reported = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
+    reported += remarks.repeated(fit_records, held_records)
     units, conflicts = agreed_units(read, units)
-    told += conflicts
+    reported += conflicts
     for record in fit_records if loading_curve else ():
         _check_loading_curve(record)
     courses, notes = prepared.courses(fit_records, before, skip)
     held, more = prepared.courses(held_records, before, skip)
-    told += notes + more
+    reported += notes + more
     kinds = gpi.KINDS if model == "auto" else (model,)
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
@@ -125,32 +125,33 @@ def identify(
         else:
             rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how, bar)
             if reason:
-                told.append(reason)
+                reported.append(reason)
             fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, bar.tick)
     masks = used.of_records(fit_records, compared, False)
     if held:
         masks += used.of_records(held_records, done.held, True)
-    told += [text for each in masks for text in each.told()]
+    reported += [text for each in masks for text in each.sentences()]
     errors = [_compare(item, fitted) for item in compared]
     own = pi.row("fit" if held or not rows else "all", "written", errors)
     rows.append(own)
     drive = (min(item.drive_range[0] for item in compared), max(item.drive_range[1] for item in compared))
     if held:
         rows.append(done.held_out)
-        told += [text for item in held if (text := remarks.outside(item.name, item.v, drive))]
-    told += [
+        reported += [text for item in held if (text := remarks.outside(item.name, item.v, drive))]
+    reported += [
         f"{item.name}: only {item.used} samples are left once its start memory is known; it hardly counts"
         for item in compared
         if item.used < SHORTEST
     ]
     if not loading_curve:  # all of one depends on the start
-        told += [text for each in errors if (text := remarks.about_start(each, float(fitted.solution.thresholds[-1])))]
-    told += remarks.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
+        largest = float(fitted.solution.thresholds[-1])
+        reported += [text for each in errors if (text := remarks.about_start(each, largest))]
+    reported += remarks.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
     with threads.alone():
         sure = uncertainty.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
     return Fit(
-        _parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(told), sure, masks, before
+        _parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(reported), sure, masks, before
     )
 
 

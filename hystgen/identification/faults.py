@@ -308,6 +308,6 @@ BRIDGED, NOT_COMPARED = "v jump away and back unseen by y, bridged", "y far from
 """What is done about isolated wrong samples."""
 
 
-def told(name: str, found: NDArray[np.intp], what: str) -> str:
+def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
     """The sentence that counts isolated wrong samples, given where they are."""
     return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"

@@ -142,21 +142,21 @@ class Fit:
     def remarks(self) -> list[str]:
         """What the fit table's words mean, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
-        told = [
+        reported = [
             f"{counted(n, 'play')}. Errors of a free run with a free offset a record; % of the largest "
             "peak-to-peak output that was compared of one of the row's records."
         ]
         if any(row.model == "trial" for row in self.rows):
-            told.append(
+            reported.append(
                 f"trial: fitted to the first {100 * (1 - HELD_OUT):g} % of each record (row fit), compared with the "
                 "rest (row held out), both in % of the whole. written: fitted to everything."
             )
         elif any(row.part == "held out" for row in self.rows):
-            told.append("written: fitted to the records of row fit only.")
+            reported.append("written: fitted to the records of row fit only.")
         if any(row.ignored for row in self.rows):
-            told.append("ignored: samples at the start, before the drive had wiped an unknown start memory.")
-        told.append(f"95 % confidence: {self._interval_sentence()}.")
-        return told
+            reported.append("ignored: samples at the start, before the drive had wiped an unknown start memory.")
+        reported.append(f"95 % confidence: {self._interval_sentence()}.")
+        return reported
 
 
 

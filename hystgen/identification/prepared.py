@@ -39,7 +39,7 @@ def courses(
     `history` precedes every record; behind a gap the memory is unknown again. Raises IdentificationError.
     """
     made: list[Course] = []
-    told: list[str] = []
+    reported: list[str] = []
     for number, record in enumerate(records):
         pieces = faults.between_gaps(record)
         if len(pieces) == 1:
@@ -52,18 +52,18 @@ def courses(
                 course = pi.course(piece.record, before, max(skip - piece.first, 0))
                 found.append(replace(course, origin=(number, piece.first)))
             except IdentificationError as failure:
-                told.append(f"left out: {failure}")
+                reported.append(f"left out: {failure}")
         if not found:
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
-        told.append(
+        reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
             f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
     for k, item in enumerate(made):
         made[k], more = _without_stretches(item)
-        told += more
-    return made, told
+        reported += more
+    return made, reported
 
 
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
@@ -107,7 +107,7 @@ def _less(item: Course, wrong: NDArray[np.bool_]) -> Course:
 def _without_stretches(item: Course) -> tuple[Course, list[str]]:
     """The course without the samples of y in stretches that are plainly wrong, and what they were."""
     left, ends = without_rails(item)
-    told = [
+    reported = [
         f"{item.name}: {counted(number, 'sample')} of y at the converter's end, the {name} of {level:.6g}, not compared"
         for name, level, number in ends
     ]
@@ -115,11 +115,11 @@ def _without_stretches(item: Course) -> tuple[Course, list[str]]:
     for what, places in runs:
         number = counted(sum(b - a for a, b in places), "sample")
         held = " of equal samples while the drive moves" if what == "run" else ""
-        told.append(
+        reported.append(
             f"{item.name}: {counted(len(places), what)}{held}, {number} of y not compared; the first is sample "
             f"{places[0][0]}"
         )
-    return left, told
+    return left, reported
 
 
 def mask_outliers(

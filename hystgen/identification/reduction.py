@@ -164,7 +164,7 @@ def reduce(
     source: Callable[[Course, Array], Source] = play_rows,
     further: int = 0,
 ) -> Reduced:
-    """Reduce the records; `tick` is told the number of samples done, chunk by chunk.
+    """Reduce the records; `tick` gets the number of samples done, chunk by chunk.
 
     `source`: where the rows of a course come from, with `further` columns behind those of the plays of `thresholds`.
     """

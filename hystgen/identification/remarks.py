@@ -29,18 +29,18 @@ def about_model(
     solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
 ) -> list[str]:
     """What the user should know about the model itself."""
-    told = about_inverse(solution.weights, solution.fitted)
+    reported = about_inverse(solution.weights, solution.fitted)
     low = min(item.drive_range[0] for item in compared)
     high = max(item.drive_range[1] for item in compared)
     if solution.reach < SMALL_REACH * (high - low):
-        told.append(
+        reported.append(
             f"the records tell little about hysteresis: no play above {solution.reach:.3g} moves enough in them; "
             "record full cycles, several times, or give --history"
         )
     if isinstance(wanted, tuple):
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
         if beyond:
-            told.append(
+            reported.append(
                 f"{counted(len(beyond), 'threshold')} above {solution.reach:.6g} hardly move in "
                 "these records; their weights are not to be trusted for larger drives"
             )
@@ -48,11 +48,11 @@ def about_model(
     spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
     share = 1.0 - own.rms**2 / spread
     if share < 0.9:
-        told.append(
+        reported.append(
             f"the model explains only {100 * max(share, 0.0):.0f} % of the measured variance; check which column is "
             "which, and the units"
         )
-    return told
+    return reported
 
 
 def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
@@ -92,19 +92,19 @@ def about_start(errors: pi.Errors, largest: float) -> str:
 
 def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
     """Of records that were measured once and given twice."""
-    told = []
+    reported = []
     for k, record in enumerate([*to_fit, *held]):
         for other in to_fit[: min(k, len(to_fit))]:
             if np.array_equal(record.v, other.v) and np.array_equal(np.asarray(record.y), np.asarray(other.y)):
                 if k < len(to_fit):
-                    told.append(f"{record.name}: fitted twice, as {other.name} too; leave one of them out")
+                    reported.append(f"{record.name}: fitted twice, as {other.name} too; leave one of them out")
                 else:
-                    told.append(
+                    reported.append(
                         f"{record.name}: held out and, as {other.name}, fitted too, so that it judges nothing; leave "
                         "it out of the one or the other"
                     )
                 break
-    return told
+    return reported
 
 
 def outside(name: str, v: NDArray[np.float64], allowed: tuple[float, float]) -> str:

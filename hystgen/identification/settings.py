@@ -72,13 +72,13 @@ def of(path: str | os.PathLike[str]) -> Settings:
         return Settings()
     try:
         data = parameter_data(path)
-        told = {key: data[key] for key in (*KEPT, "name", "units") if data.get(key) is not None}
+        known = {key: data[key] for key in (*KEPT, "name", "units") if data.get(key) is not None}
         pi = {"thresholds": (0,), "weights": (1,)}
-        make_parameters({"hystgen": 1, "name": "x", "input_range": (0, 1), "model": {"pi": pi}, **told}, file)
+        make_parameters({"hystgen": 1, "name": "x", "input_range": (0, 1), "model": {"pi": pi}, **known}, file)
     except ParameterError as error:
         return Settings(file, problem=error.problems[0].named)
     model = data.get("model")
     effects = model.get("effects") if isinstance(model, Mapping) else ()
     names = tuple(str(each["name"]) for each in effects or () if isinstance(each, Mapping) and "name" in each)
-    values = {key: told[key] for key in KEPT if key in told}
-    return Settings(file, values, told.get("name"), told.get("units"), names)
+    values = {key: known[key] for key in KEPT if key in known}
+    return Settings(file, values, known.get("name"), known.get("units"), names)

@@ -48,10 +48,10 @@ class Used:
         return found
 
 
-    def told(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """The sentences that count isolated wrong samples."""
         return [
-            faults.told(self.name, found, what)
+            faults.sentence(self.name, found, what)
             for found, what in ((self.bridged, faults.BRIDGED), (self.outliers, faults.NOT_COMPARED))
             if len(found)
         ]

@@ -43,12 +43,12 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
         try:
             with np.errstate(all="ignore"), warnings.catch_warnings():
                 warnings.simplefilter("error", ODEintWarning)
-                found, told = odeint(
+                found, details = odeint(
                     slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS,
                     tcrit=places[-1:], full_output=True,
                 )  # fmt: skip
             # with tcrit LSODA does not say that its steps became too small to move on
-            done = places[-1] == places[0] or np.isclose(told["tcur"][-1], places[-1], rtol=0.0, atol=1e-12 * reach)
+            done = places[-1] == places[0] or np.isclose(details["tcur"][-1], places[-1], rtol=0.0, atol=1e-12 * reach)
         except (ODEintWarning, OverflowError):
             done = False
         if not (done and np.all(np.isfinite(found))):

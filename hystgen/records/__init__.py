@@ -193,7 +193,7 @@ def _read(
 
 
 def _size(source: Record | str | os.PathLike[str]) -> int:
-    """Bytes to read; 0 where there is no file, which is told when it is opened."""
+    """Bytes to read; 0 where there is no file, which is reported when it is opened."""
     try:
         return 0 if isinstance(source, Record) else os.stat(source).st_size
     except OSError:

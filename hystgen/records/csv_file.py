@@ -1,6 +1,6 @@
 """Text tables, read in blocks: numpy's C reader takes those that are sound, the others go line by line.
 
-A file of any size then needs little more memory than its columns, and every fault is told with its place.
+A file of any size then needs little more memory than its columns, and every fault is reported with its place.
 """
 
 from __future__ import annotations

@@ -188,8 +188,8 @@ class Reading:
         chosen = self.chosen(columns, ignored, outside, steps=steps)
         lengths = {c.length for c in chosen.values()}
         if len(lengths) > 1:
-            told = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
-            raise self.refuse(f"the columns differ in length: {told} samples; export them with one length")
+            parts = ", ".join(f"{c.name} has {c.length}" for c in chosen.values())
+            raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
         folders = {c.folder for c in chosen.values()}
         self.left_out("without numbers", ignored)
         self.left_out("kept outside the file", outside)

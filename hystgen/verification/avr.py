@@ -147,7 +147,7 @@ def run(board: Board, image: Path) -> int:
     except subprocess.TimeoutExpired:
         raise EmulatorError(f"{board.simulator} -m {board.name} did not end within {SECONDS} s") from None
     said = done.stdout + done.stderr
-    told = re.search(rf"{TELLS} (\d+)", said)
-    if told is None or done.returncode:
+    count = re.search(rf"{TELLS} (\d+)", said)
+    if count is None or done.returncode:
         raise EmulatorError(f"{board.simulator} -m {board.name} failed ({done.returncode}):\n{said.strip()}")
-    return int(told[1])
+    return int(count[1])

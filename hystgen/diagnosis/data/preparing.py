@@ -72,7 +72,7 @@ def prepare(
             ("y", _outliers(course), faults.NOT_COMPARED),
         ):
             if len(wrong):
-                notes.append(faults.told(course.name, wrong, what))
+                notes.append(faults.sentence(course.name, wrong, what))
                 repaired.append(IsolatedSamples(course.name, channel, float(record.t[wrong[0]]), len(wrong)))
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
