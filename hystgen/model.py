@@ -26,6 +26,7 @@ from hystgen.parameters.files import Parameters, load_parameters
 
 if TYPE_CHECKING:
     from hystgen.chain.chain import Chain
+    from hystgen.compensator.chain.tables import ChainTables
     from hystgen.compensator.chained import Compensator
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
@@ -84,6 +85,22 @@ class Model:
                 "the model and its inverse in double precision"
             )
 
+    def need_compensated(self, arithmetic: str) -> None:
+        """Raise where the operators of `arithmetic` cannot have all the model's effects, with all reasons.
+
+        Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse`.
+        """
+        if not self.effects:
+            return
+        from hystgen.compensator.chain import tables as chain_tables
+
+        if self.parameters.sample_time is None:
+            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
+            raise EffectsError(f"C for a model with effects ({names}) needs sample_time in the parameter file")
+        refused = list(chain_tables.problems(self.chain, arithmetic))
+        if refused:
+            raise UnsupportedEffectsError("not in the C: " + "; ".join(refused) + "; remove it from model.effects")
+
     def engine(
         self,
         engine: str | None = None,
@@ -93,11 +110,19 @@ class Model:
     ) -> str:
         """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
         emit = self.parameters.emit
+        if self.effects:
+            return "loop"
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
         return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
 
-    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables:
+    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables | ChainTables:
         """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
+        if self.effects:
+            from hystgen.compensator.chain import tables as chain_tables
+
+            self.need_compensated(arithmetic)
+            assert self.parameters.sample_time is not None
+            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
 
     @property

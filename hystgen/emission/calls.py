@@ -35,7 +35,6 @@ def emit_options(
     optimize: str | None = None,
 ) -> Options:
     """What is to be emitted: the arguments given, else the parameter file's `emit` section."""
-    model.need_static("C")
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
     check_arithmetic(arithmetic)
@@ -43,6 +42,7 @@ def emit_options(
     arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
+    model.need_compensated(arithmetic)
     return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout)
 
 
