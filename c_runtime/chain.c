@@ -5,7 +5,7 @@
    actuator's and nothing else. Which blocks there are, the model's own functions say:
 
    drive_side    lag: in front of the memoryless part and the plays
-   output_side   creep, gain: behind the plays
+   output_side   creep, ageing, gain: behind the plays
    displaced     saturation and offsets, behind everything
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
@@ -32,6 +32,9 @@ static hystgen_real_t hystgen_inside_offset(hystgen_real_t d)
 static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
 {
     const bool moving = self->moving;
+    if (moving) {
+        hystgen_forward_travelled(self, v);
+    }
     const hystgen_real_t a = moving ? hystgen_forward_drive_side_absorb(self, v)
                                     : hystgen_forward_drive_side_rest(self, v);
     hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_forward_arrive(self, a));
@@ -46,6 +49,9 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
 static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
 {
     const bool moving = self->moving;
+    if (moving) {
+        hystgen_inverse_travelled(self, v);
+    }
     const hystgen_real_t a = moving ? hystgen_inverse_drive_side_absorb(self, v)
                                     : hystgen_inverse_drive_side_rest(self, v);
     hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_inverse_arrive(self, a));
@@ -144,6 +150,9 @@ void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v)
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
+    if (self->moving) {
+        hystgen_forward_travelled(self, inside);
+    }
     self->moving = false;
     hystgen_forward_absorb(self, inside);
 }
@@ -158,6 +167,9 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
     const hystgen_real_t inside = hystgen_clamp_drive(v) + 0; /* no drive is -0 */
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    if (self->moving) {
+        hystgen_inverse_travelled(self, inside);
     }
     self->moving = false;
     hystgen_inverse_absorb(self, inside);

@@ -8,5 +8,10 @@ void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v);
 void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d);
 /* The temperature, degC, from the next step on. */
 void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature);
+/* A gain in place of that of the travel, from the next step on, until a travel is set. */
+void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain);
+/* Distance that the drive has travelled: keep it where it survives, and set it behind init. */
+hystgen_real_t hystgen_forward_travel(const hystgen_forward_t *self);
+void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_real_t travel);
 
 #endif

@@ -32,4 +32,12 @@ typedef struct {
     hystgen_real_t offset;
 } hystgen_gain_t;
 
+typedef struct {
+    hystgen_real_t high; /* travel, in two parts */
+    hystgen_real_t low;
+    hystgen_real_t gain;
+    hystgen_real_t inverse;
+    bool own; /* the gain follows the travel */
+} hystgen_ageing_t;
+
 #endif

@@ -47,4 +47,24 @@ typedef struct {
     hystgen_real_t largest;
 } hystgen_gain_table_t;
 
+/* A piece of the gain over travel, cubic in the share of its length. */
+typedef struct {
+    hystgen_real_t begin;
+    hystgen_real_t inverse_length;
+    hystgen_real_t c0;
+    hystgen_real_t c1;
+    hystgen_real_t c2;
+    hystgen_real_t c3;
+} hystgen_ageing_piece_t;
+
+/* Gain over travel up to `last`; one set from outside lies between `least` and `largest`. */
+typedef struct {
+    const hystgen_ageing_piece_t *piece;
+    hystgen_real_t least;
+    hystgen_real_t largest;
+    hystgen_real_t last;
+    uint_least16_t n;
+    uint_least8_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
+} hystgen_ageing_table_t;
+
 #endif

@@ -85,8 +85,8 @@ class Model:
                 "the model and its inverse in double precision"
             )
 
-    def need_compensated(self, arithmetic: str) -> None:
-        """Raise where the operators of `arithmetic` cannot have all the model's effects, with all reasons.
+    def need_compensated(self, arithmetic: str, operator: str) -> None:
+        """Raise where an operator in `arithmetic` cannot have all the model's effects, with all reasons.
 
         Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse`.
         """
@@ -97,7 +97,9 @@ class Model:
         if self.parameters.sample_time is None:
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
             raise EffectsError(f"C for a model with effects ({names}) needs sample_time in the parameter file")
-        refused = list(chain_tables.problems(self.chain, arithmetic))
+        if operator != "forward":
+            self.inverse()
+        refused = list(chain_tables.problems(self.chain, arithmetic, operator))
         if refused:
             raise UnsupportedEffectsError("not in the C: " + "; ".join(refused) + "; remove it from model.effects")
 
@@ -120,7 +122,7 @@ class Model:
         if self.effects:
             from hystgen.compensator.chain import tables as chain_tables
 
-            self.need_compensated(arithmetic)
+            self.need_compensated(arithmetic, self.parameters.emit.operator)
             assert self.parameters.sample_time is not None
             return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
@@ -162,8 +164,31 @@ class Model:
         if not self.effects:
             return self.session("forward", arithmetic, engine, clamp).run(v)[0]
         if arithmetic is not None:
-            self.need_static("the bit reference")
+            return self._reference(v, arithmetic, t, extra, inverse=False)
         return self.chain.simulate([self.run(v, t, extra, clamp)])[0]
+
+    def _reference(
+        self,
+        x: ArrayLike,
+        arithmetic: str,
+        t: ArrayLike | None,
+        extra: Mapping[str, ArrayLike] | None,
+        inverse: bool,
+    ) -> NDArray[Any]:
+        """Answers (N,) of the bit reference of a model with effects; see `simulate`."""
+        from hystgen.compensator.chain import run, tables
+
+        check_arithmetic(arithmetic)
+        self.need_compensated(arithmetic, "inverse" if inverse else "forward")
+        seconds = self.parameters.sample_time
+        assert seconds is not None
+        record = self.run(x, t, extra)
+        if np.max(np.abs(record.steps - seconds), initial=0.0) > run.EVEN * seconds:
+            raise EffectsError(
+                f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
+                "in double precision, which takes any times"
+            )
+        return run.answers(tables.build(self.chain, arithmetic, seconds), record, inverse)
 
     def run(
         self,
@@ -236,7 +261,7 @@ class InverseModel:
         if not self.forward.effects:
             return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
         if arithmetic is not None:
-            self.forward.need_static("the bit reference")
+            return self.forward._reference(u, arithmetic, t, extra, inverse=True)
         ends = self.forward.cascade.input_range if clamp else (-math.inf, math.inf)
         return self.forward.compensator.drives(self.forward.run(u, t, extra), ends)
 

@@ -42,7 +42,7 @@ def emit_options(
     arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
-    model.need_compensated(arithmetic)
+    model.need_compensated(arithmetic, operator)
     return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout)
 
 

@@ -5,7 +5,7 @@ What a block does stands in `c_runtime/`; here are only its places.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from hystgen.compensator.chain.tables import ChainTables, Compiled
@@ -28,8 +28,10 @@ class Field:
         return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
 
 
-STRUCTS = {"creep": 2, "creep_state": 2, "lag": 5, "lag_exact": 2, "gain": 3}
-"""Reals in the memory of a block, by the name of its type."""
+STRUCTS = {
+    "creep": (2, 0), "creep_state": (2, 0), "lag": (5, 0), "lag_exact": (2, 0), "gain": (3, 0), "ageing": (4, 1),
+}  # fmt: skip
+"""Reals and flags in the memory of a block, by the name of its type."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +59,12 @@ _TABLE = {
     "lag": ("solve", "absorb"),
     "lag_exact": ("solve", "absorb"),
     "gain": (),
+    "ageing": (),
 }
 """Verbs of a block that read its table."""
 
 
-def _entries(values: Sequence[float]) -> str:
+def _entries(values: Iterable[float]) -> str:
     return ", ".join(map(literal, values))
 
 
@@ -87,6 +90,14 @@ def output_side(t: ChainTables, prefix: str) -> list[Block]:
         text = f"static const {prefix}_creep_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
         fields = (Field("creep", name), Field("creep_state", f"{name}_state", "", n))
         blocks.append(Block("creep", name, fields, (own, text), f"&hystgen_{name}", f"{name}_state"))
+    for j in range(1, len(t.ageing.turns) + 1):
+        pieces = t.ageing.piece[t.ageing.first[j - 1] : t.ageing.first[j]]
+        name, n = f"ageing_{j}", len(pieces)
+        lines = ",\n".join(f"    {{{_entries(piece)}}}" for piece in pieces)
+        own = f"static const {prefix}_ageing_piece_t {prefix}_{name}_piece[{n}] = {{\n{lines},\n}};\n"
+        numbers = f"    {prefix}_{name}_piece, {_entries(t.ageing.number[j - 1, 2:])}, {n}, {t.ageing.turns[j - 1]},"
+        text = f"static const {prefix}_ageing_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
+        blocks.append(Block("ageing", name, (Field("ageing", name),), (own, text), f"&hystgen_{name}"))
     for j, row in enumerate(t.gain, 1):
         name = f"gain_{j}"
         text = f"static const {prefix}_gain_table_t {prefix}_{name} = {{\n    {_entries(row[:7])},\n}};\n"
@@ -116,10 +127,11 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, len(t.gain) > 0)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
-    every = ["init", "reset", "step", "status", "settle", "set_offset", *heated]
+    aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
+    every = ["settle", "set_offset", *heated, *aged]
     calls = {
         "forward": every,
-        "inverse": [*every, "commit", "expected", "correct", *(["push"] * (len(t.tap) > 0))],
+        "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
     arrays = [text for block in (*before, *after) for text in block.arrays]
     if len(t.tap):
@@ -238,10 +250,21 @@ def _functions(
             ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else ["(void)self;"],
         )  # fmt: skip
     gains = [block for block in after if block.kind == "gain"]
+    ageing = [block for block in after if block.kind == "ageing"]
     yield _function(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
-        ["self->offset = 0;", *(f"hystgen_gain_init(&self->{block.name});" for block in gains)],
+        [
+            "self->offset = 0;",
+            *(f"hystgen_gain_init(&self->{block.name});" for block in gains),
+            *(f"(void)hystgen_ageing_set_travel({each.table}, &self->{each.name}, 0);" for each in ageing),
+        ],
+    )
+    yield _function(
+        "The drive moves to v from where it was.",
+        f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
+        [f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing]
+        or ["(void)self;", "(void)v;"],
     )
     if heated:
         calls = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
@@ -254,4 +277,4 @@ def _functions(
 
 def _verb(block: Block, verb: str) -> str:
     """What a block without memory calls it."""
-    return {"rest": "absorb", "resting": "solve"}.get(verb, verb) if block.kind == "gain" else verb
+    return {"rest": "absorb", "resting": "solve"}.get(verb, verb) if block.kind in ("gain", "ageing") else verb

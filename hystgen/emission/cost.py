@@ -117,6 +117,8 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1
         "lag_table_t": layout.struct(*4 * [reach]),
         "lag_exact_table_t": layout.struct(*4 * [reach]),
         "gain_table_t": layout.struct(*7 * [reach]),
+        "ageing_piece_t": layout.struct(*6 * [reach]),
+        "ageing_table_t": layout.struct((layout.pointer, layout.pointer), *3 * [reach], count, (1, 1)),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
@@ -168,10 +170,11 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks of a model with effects in one step, of each operator."""
-    lags, creeps, gains, states = len(t.lag.block), len(t.creep.block), len(t.gain), len(t.creep.term)
+    lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
+    gains = len(t.gain) + len(t.ageing.turns)
     envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
     stages = len(t.behind.stage_kind) + envelopes
-    absorbed = 3 * lags + creeps + 5 * states + gains
+    absorbed = 3 * lags + creeps + 5 * states + gains + sum(4 + 2 * int(n) for n in t.ageing.turns)
     return {"forward": absorbed + stages, "inverse": absorbed + 2 * lags + creeps + gains + stages + len(t.tap)}
 
 
@@ -211,8 +214,9 @@ def _memory(
 def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
     """Size and alignment of a field of an instance."""
     one = {"flag": 1, "status": layout.integer}.get(field.kind, real)
-    size = STRUCTS.get(field.kind, 1) * one
-    return size * max(field.count, 1), one if not layout.packed else 1
+    reals, flags = STRUCTS.get(field.kind, (0, 0))
+    size, alignment = layout.struct(*reals * [(real, real)], *flags * [(1, 1)]) if reals else (one, one)
+    return size * max(field.count, 1), alignment
 
 
 def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layout: Layout) -> tuple[int, int]:

@@ -212,6 +212,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.variant = runtime.Variant(
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list,
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
+        compiled is not None and bool(compiled.parts.ageing),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled) if compiled else []
@@ -285,8 +286,11 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    if values.inverse and values.branches:
-        words = "the same while both take the same branch"
+    apart = values.variant.slew and values.inverse_rounding_error != values.inverse_max_error
+    if values.inverse and (values.branches or apart):
+        words = "the same while " + " and ".join(
+            ["both take the same branch"] * values.branches + ["no slew limit acts"] * values.variant.slew
+        )
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 

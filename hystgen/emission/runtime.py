@@ -29,7 +29,7 @@ FLOAT_KERNELS = (
     "loop_solve.c",
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
-CHAIN_BLOCKS = ("creep.c", "lag.c", "lag_exact.c", "gain.c", "preview.c")
+CHAIN_BLOCKS = ("creep.c", "lag.c", "lag_exact.c", "ageing.c", "gain.c", "preview.c")
 """What models with effects have of their own, also beside a shared run time."""
 
 FIXED_KERNELS = (
@@ -129,7 +129,7 @@ class Variant:
 
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value; `chain`: it has
-    effects, `slew`: one of them keeps the drive within a rate.
+    effects, `slew`: one of them keeps the drive within a rate, `ages`: one is a gain that follows the travel.
     """
 
     engine: str
@@ -141,6 +141,7 @@ class Variant:
     start_list: bool = False
     chain: bool = False
     slew: bool = False
+    ages: bool = False
 
     def state(self, operator: str) -> str:
         """The header with the type of an instance."""
@@ -166,7 +167,8 @@ class Variant:
         kind = "fixed" if self.fixed else "float"
         start = "loop_start_list.c" if self.start_list else "loop_start.c"
         if self.chain:
-            return (start, f"loop_{front}.c", "chain_slew.c" if self.slew else "chain_free.c", "chain.c")
+            slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
+            return (start, f"loop_{front}.c", slew, "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

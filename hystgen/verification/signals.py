@@ -138,6 +138,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
     kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
     if len(tables.gain):
         kinds.append(slots.OP_TEMPERATURE)
+    if len(tables.ageing.turns):
+        kinds += [slots.OP_GAIN, slots.OP_TRAVEL, slots.OP_TRAVELLED]
     if inverse:
         kinds += [slots.OP_COMMIT, slots.OP_EXPECTED, slots.OP_CORRECT, *([slots.OP_PUSH] * (len(tables.tap) > 0))]
     for name, chance in (("settings now and then", 0.01), ("settings", 0.4)):
@@ -150,6 +152,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         x = np.where((op == slots.OP_SETTLE) | (op == slots.OP_COMMIT), drives, x)
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
         x = np.where(op == slots.OP_TEMPERATURE, 20.0 + rng.standard_cauchy(length) * 30.0, x)
+        x = np.where(op == slots.OP_GAIN, rng.uniform(0.3, 2.2, length), x)
+        x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(0.0, 9.0, length), x)
         odd = rng.random(length) < 0.01
         x[odd] = rng.choice([np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30], int(odd.sum()))
         yield name, op, x

@@ -19,6 +19,8 @@ SETTINGS = {
     "settle": slots.OP_SETTLE,
     "set_offset": slots.OP_OFFSET,
     "set_temperature": slots.OP_TEMPERATURE,
+    "set_gain": slots.OP_GAIN,
+    "set_travel": slots.OP_TRAVEL,
 }
 """Calls of models with effects that take a number and return none."""
 
@@ -57,6 +59,8 @@ def _chain_calls(name: str, op: str, more: Sequence[str]) -> Iterator[tuple[int,
     for call, number in SETTINGS.items():
         if call in more:
             yield number, f"{own}_{call}(&self, x[i])"
+    if "travel" in more:
+        yield slots.OP_TRAVELLED, f"answer[i] = {own}_travel(&self)"
     if "expected" in more:
         yield slots.OP_EXPECTED, f"answer[i] = {own}_expected(&self)"
         yield slots.OP_CORRECT, f"{own}_correct(&self, x[i], ({name}_real_t){VERIFIED_SHARE})"

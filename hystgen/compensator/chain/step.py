@@ -22,6 +22,15 @@ from hystgen.compensator.step import (
     plays_of,
 )
 from hystgen.compensator.step_float import finite
+from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
+from hystgen.effects.ageing.compensator import (
+    AgeingState,
+    ageing_absorb,
+    ageing_move,
+    ageing_set,
+    ageing_set_travel,
+    ageing_solve,
+)
 from hystgen.effects.creep.compensator import (
     CreepState,
     creep_absorb,
@@ -55,6 +64,7 @@ from hystgen.plays.slots import (
     OP_COMMIT,
     OP_CORRECT,
     OP_EXPECTED,
+    OP_GAIN,
     OP_INIT,
     OP_OFFSET,
     OP_PUSH,
@@ -62,6 +72,8 @@ from hystgen.plays.slots import (
     OP_SETTLE,
     OP_STEP,
     OP_TEMPERATURE,
+    OP_TRAVEL,
+    OP_TRAVELLED,
     OUTPUT_CLAMPED,
     SLEW_LIMITED,
     ZERO,
@@ -81,6 +93,7 @@ class ChainState(NamedTuple):
     plays: State
     lag: Reals  # (k, 5)
     creep: CreepState
+    ageing: AgeingState
     gain: Reals  # (k, 3)
     line: Line
     real: Reals
@@ -94,6 +107,7 @@ def new_state(t: ChainTables) -> ChainState:
         loop.new_state(t.plays),
         np.zeros((len(t.lag.block), 5), dtype),
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
+        AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(3, dtype),
@@ -139,6 +153,8 @@ def output_side_rest(t: ChainTables, s: ChainState, h: Any) -> Any:
     x = h
     for j in range(len(t.creep.block)):
         x = creep_rest(t.creep, s.creep, j, x)
+    for j in range(len(t.ageing.turns)):
+        x = ageing_absorb(s.ageing, j, x)
     for j in range(len(t.gain)):
         x = gain_absorb(s.gain, j, x)
     return x
@@ -150,6 +166,8 @@ def output_side_absorb(t: ChainTables, s: ChainState, h: Any) -> Any:
     x = h
     for j in range(len(t.creep.block)):
         x = creep_absorb(t.creep, s.creep, j, x)
+    for j in range(len(t.ageing.turns)):
+        x = ageing_absorb(s.ageing, j, x)
     for j in range(len(t.gain)):
         x = gain_absorb(s.gain, j, x)
     return x
@@ -161,6 +179,8 @@ def output_side_resting(t: ChainTables, s: ChainState, y: Any) -> Any:
     x = y
     for j in range(len(t.gain) - 1, -1, -1):
         x = gain_solve(s.gain, j, x)
+    for j in range(len(t.ageing.turns) - 1, -1, -1):
+        x = ageing_solve(s.ageing, j, x)
     for j in range(len(t.creep.block) - 1, -1, -1):
         x = creep_resting(t.creep, s.creep, j, x)
     return x
@@ -172,6 +192,8 @@ def output_side_solve(t: ChainTables, s: ChainState, y: Any) -> Any:
     x = y
     for j in range(len(t.gain) - 1, -1, -1):
         x = gain_solve(s.gain, j, x)
+    for j in range(len(t.ageing.turns) - 1, -1, -1):
+        x = ageing_solve(s.ageing, j, x)
     for j in range(len(t.creep.block) - 1, -1, -1):
         x = creep_solve(t.creep, s.creep, j, x)
     return x
@@ -195,6 +217,15 @@ def settings_reset(t: ChainTables, s: ChainState) -> None:
     s.real[SET] = t.plays.limits[ZERO]
     for j in range(len(t.gain)):
         gain_reset(t.gain, s.gain, j)
+    for j in range(len(t.ageing.turns)):
+        ageing_set_travel(t.ageing, s.ageing, j, t.plays.limits[ZERO])
+
+
+@jit
+def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
+    """The drive moves to v from where it was."""
+    for j in range(len(t.ageing.turns)):
+        ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
 
 
 # ---------------------------------------------------------------- chain.c
@@ -232,6 +263,8 @@ def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
 def absorb(t: ChainTables, s: ChainState, v: Any) -> None:
     """The actuator has seen drive v; the first one finds everything at rest."""
     moving = s.flags[MOVING] != 0
+    if moving:
+        travelled(t, s, v)
     a = drive_side_absorb(t, s, v) if moving else drive_side_rest(t, s, v)
     loop_absorb(t.plays, s.plays, arrive(t.plays, s.plays, a))
     h = loop_output(t.plays, s.plays)
@@ -250,6 +283,8 @@ def settle(t: ChainTables, s: ChainState, v: Any) -> None:
     inside = clamp_drive(t.plays, v) + t.plays.limits[ZERO]
     if inside != v:
         s.plays.counts[STATUS] |= INPUT_CLAMPED
+    if s.flags[MOVING]:
+        travelled(t, s, inside)
     s.flags[MOVING] = 0
     absorb(t, s, inside)
 
@@ -389,6 +424,24 @@ def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
 
 
 @jit
+def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
+    """A gain in place of that of the travel, from the next step on."""
+    if not finite(t.plays, gain):
+        s.plays.counts[STATUS] |= HELD
+    elif ageing_set(t.ageing, s.ageing, 0, gain):
+        s.plays.counts[STATUS] |= LIMITED_SETTING
+
+
+@jit
+def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
+    """The distance travelled, from the next step on."""
+    if not finite(t.plays, travel):
+        s.plays.counts[STATUS] |= HELD
+    elif ageing_set_travel(t.ageing, s.ageing, 0, travel):
+        s.plays.counts[STATUS] |= LIMITED_SETTING
+
+
+@jit
 def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
     """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read and
     cleared."""
@@ -407,6 +460,12 @@ def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answer
             set_offset(t, s, x[i])
         elif op[i] == OP_TEMPERATURE:
             set_temperature(t, s, x[i])
+        elif op[i] == OP_GAIN:
+            set_gain(t, s, x[i])
+        elif op[i] == OP_TRAVEL:
+            set_travel(t, s, x[i])
+        elif op[i] == OP_TRAVELLED:
+            answers[i] = s.ageing.block[0, AGEING_HIGH]
         elif op[i] == OP_CORRECT:
             correct(t, s, x[i], t.number[SHARE])
         elif op[i] == OP_EXPECTED:

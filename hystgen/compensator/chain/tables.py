@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -19,6 +19,8 @@ from hystgen.compensator.chain import preview
 from hystgen.compensator.chain.preview import Taps
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.compensator.layout import Tables
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
@@ -58,6 +60,7 @@ class ChainTables(NamedTuple):
     plays: Tables
     lag: LagTables
     creep: CreepTables
+    ageing: AgeingTables
     gain: Reals  # (k, 8)
     behind: Stages
     tap: Reals  # (L,), none without a preview
@@ -86,6 +89,7 @@ class Parts:
 
     lags: list[Any]
     creeps: list[Any]
+    ageing: list[Any]
     thermal: list[Any]
     modes: list[Any]
     saturations: list[Any]
@@ -100,8 +104,8 @@ class Parts:
             return [effect for effect in effects if effect.name == name]
 
         return cls(
-            [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("thermal"),
-            called("resonance"), called("saturation"), called("slew_limit"),
+            [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
+            called("thermal"), called("resonance"), called("saturation"), called("slew_limit"),
             math.fsum(each.time for each in called("delay")),
         )  # fmt: skip
 
@@ -162,6 +166,19 @@ def _behind(parts: Parts, dtype: Any) -> Stages:
     return Stages(kind, first, size, numbers, kernels.tanh_tables(dtype), kernels.atanh_tables(dtype))
 
 
+def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]], roundoff: float) -> AgeingTables:
+    """Gains over travel."""
+    rows = [ageing.pieces(each) for each in parts.ageing]
+    last = [float(pieces[-1, ageing.BEGIN] + 1.0 / pieces[-1, ageing.INVERSE_LENGTH]) for pieces in rows]
+    numbers = [(1.0, 2.0, thermal.LEAST_GAIN, thermal.LARGEST_GAIN, end) for end in last]
+    return AgeingTables(
+        np.cumsum([0, *map(len, rows)]).astype(np.int64),
+        reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
+        reals(numbers, "travels of the ageing").reshape(-1, 5),
+        np.array([ageing.turns(each, span, roundoff) for each in parts.ageing], dtype=np.int64),
+    )
+
+
 def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
@@ -188,12 +205,17 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
     creeps = [creep.numbers(each, seconds) for each in parts.creeps]
     rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in creeps]
     lags = [lag.numbers(each, seconds) for each in parts.lags]
-    span = float(high) - float(low)
+    span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
     taps = None
     if parts.modes or parts.delay:
         taps = preview.taps(parts.delay, parts.modes, seconds)
     rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
     rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
+    lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
+    steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
+    weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
+    most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
+    reals([most], "intermediate results")
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
     tables = ChainTables(
         plays,
@@ -206,6 +228,7 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
             first.astype(np.int64),
             reals(np.concatenate([np.empty((0, 4)), *(one.terms for one in creeps)]), "constants of the creep"),
         ),
+        _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
         reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
         _behind(parts, dtype),
         reals(taps.weights if taps else [], "weights of the preview"),
@@ -215,14 +238,20 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
     return Compiled(tables, taps, parts, static)
 
 
-def problems(chain: Chain, arithmetic: str) -> Iterator[str]:
-    """Why the C of a model with effects cannot have them all, one sentence an effect."""
+def problems(chain: Chain, arithmetic: str, operator: str) -> Iterator[str]:
+    """Why an operator cannot have all effects in the C, one sentence an effect."""
     for effect in chain.effects:
-        if effect.name in ("rate_dependence", "noncongruent", "ageing", "drift"):
+        if operator != "inverse" and effect.name in ("delay", "resonance"):
+            yield f"{effect.name}: the forward operator has none; emit the inverse alone"
+        if effect.name in ("rate_dependence", "noncongruent", "drift"):
             yield f"{effect.name}: C for it is not written yet"
+        elif effect.name == "ageing":
+            yield from ageing.problems(effect, chain.cascade.input_range[1] - chain.cascade.input_range[0])  # type: ignore[arg-type]
         elif effect.name == "thermal" and not effect.columns:
             yield "thermal from the drive's own heat: open loop, the temperature is not measured"
         elif effect.name.startswith("user:"):
             yield f"{effect.name}: an effect of your own without a compensator"
+    if sum(effect.name == "ageing" for effect in chain.effects) > 1:
+        yield "ageing: there is more than one"
     if ARITHMETICS[arithmetic].fixed:
         yield f"arithmetic {arithmetic}: effects are emitted in float32 and float64"
