@@ -37,8 +37,7 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
     }
     const hystgen_real_t a = moving ? hystgen_forward_drive_side_absorb(self, v)
                                     : hystgen_forward_drive_side_rest(self, v);
-    hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_forward_arrive(self, a));
-    self->level = hystgen_loop_output(&hystgen_model_tables, self->play);
+    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, a));
     self->output = moving ? hystgen_forward_output_side_absorb(self, self->level)
                           : hystgen_forward_output_side_rest(self, self->level);
     self->applied = v;
@@ -54,8 +53,7 @@ static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
     }
     const hystgen_real_t a = moving ? hystgen_inverse_drive_side_absorb(self, v)
                                     : hystgen_inverse_drive_side_rest(self, v);
-    hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_inverse_arrive(self, a));
-    self->level = hystgen_loop_output(&hystgen_model_tables, self->play);
+    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, a));
     self->output = moving ? hystgen_inverse_output_side_absorb(self, self->level)
                           : hystgen_inverse_output_side_rest(self, self->level);
     self->applied = v;
@@ -88,7 +86,7 @@ static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
-    self->level = hystgen_loop_output(&hystgen_model_tables, self->play);
+    self->level = hystgen_forward_started(self);
     self->applied = hystgen_forward_drive_side_rest(self, drive);
     self->output = hystgen_forward_output_side_rest(self, self->level);
     self->answer = hystgen_forward_displaced(self, self->output);
@@ -107,7 +105,7 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
-    self->level = hystgen_loop_output(&hystgen_model_tables, self->play);
+    self->level = hystgen_inverse_started(self);
     self->applied = hystgen_inverse_drive_side_rest(self, drive);
     self->output = hystgen_inverse_output_side_rest(self, self->level);
 }
@@ -276,8 +274,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     const hystgen_real_t h = moving ? hystgen_inverse_output_side_solve(self, y)
                                     : hystgen_inverse_output_side_resting(self, y);
     self->bits = 0;
-    const hystgen_real_t a = hystgen_inverse_drive(
-        self, h, hystgen_loop_solve(&hystgen_model_tables, self->play, h));
+    const hystgen_real_t a = hystgen_inverse_drive(self, h, hystgen_inverse_input(self, h));
     const hystgen_real_t v = moving ? hystgen_inverse_drive_side_solve(self, a) : a;
     const hystgen_real_t reached = hystgen_inverse_slewed(self, v);
     if (reached < v || reached > v) {

@@ -92,16 +92,34 @@ class Model:
         """
         if not self.effects:
             return
-        from hystgen.compensator.chain import tables as chain_tables
-
+        names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
         if self.parameters.sample_time is None:
-            names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
             raise EffectsError(f"C for a model with effects ({names}) needs sample_time in the parameter file")
+        if ARITHMETICS[arithmetic].fixed:
+            raise UnsupportedEffectsError(
+                f"effects ({names}) are compensated in float32 and float64, not in {arithmetic}"
+            )
+        if refused := self.refusals(operator):
+            raise UnsupportedEffectsError(
+                "not in the C: " + "; ".join(f"{effect.name}: {reason}" for effect, reason in refused)
+                + "; remove it from model.effects, or leave it out with --allow-partial"
+            )
         if operator != "forward":
             self.inverse()
-        refused = list(chain_tables.problems(self.chain, arithmetic, operator))
-        if refused:
-            raise UnsupportedEffectsError("not in the C: " + "; ".join(refused) + "; remove it from model.effects")
+
+    def refusals(self, operator: str) -> list[tuple[Effect, str]]:
+        """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""
+        if not self.effects or self.parameters.sample_time is None:
+            return []
+        from hystgen.compensator.chain import tables as chain_tables
+
+        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time))
+
+    def without(self, effects: Sequence[Effect]) -> Model:
+        """The model with these of its effects left out."""
+        part = self.parameters.model
+        kept = tuple(effect for effect in part.effects if effect not in effects)
+        return Model(self.parameters.model_copy(update={"model": part.model_copy(update={"effects": kept})}))
 
     def engine(
         self,

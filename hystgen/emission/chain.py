@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.moving import MovingTables
 from hystgen.compensator.chain.tables import ChainTables, Compiled
-from hystgen.emission.text import literal, table
+from hystgen.emission.text import literal, operand, table
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,41 @@ def output_side(t: ChainTables, prefix: str) -> list[Block]:
     return blocks
 
 
+MOVES = ("play", "dilated", "relaxing")
+BENDS = ("none", "polynomial", "centre")
+"""Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
+
+
+def plays(t: ChainTables) -> tuple[str, str]:
+    """How plays move and are bent; empty where engine loop has them."""
+    return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
+
+
+def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
+    """Tables and numbers of plays that an effect moves or bends."""
+    real_t = f"{prefix}_real_t"
+    arrays = []
+    if t.moves == moving.DILATED:
+        arrays.append(table(real_t, f"{prefix}_wider", list(t.first)))
+    if t.moves == moving.RELAXING:
+        arrays += [table(real_t, f"{prefix}_late", list(t.first)), table(real_t, f"{prefix}_kept", list(t.second))]
+    if t.bends == moving.POLYNOMIAL:
+        n, terms = t.curve.shape
+        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.curve)
+        arrays.append(f"static const {real_t} {prefix}_curve[{n}][{terms}] = {{\n{rows},\n}};\n")
+    words = (
+        ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
+        ("CENTRE", moving.MIDDLE, "of the loops that count more or less"),
+        ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
+        ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
+        ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
+        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""), ("HALF", moving.HALF, ""),
+    )  # fmt: skip
+    constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
+    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search")]
+    return arrays, [*constants, *counts]
+
+
 @dataclass(frozen=True)
 class Glue:
     """The operators of a model with effects: the memory of an instance and the text of its type by operator, functions,
@@ -143,10 +180,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_RISING": "largest move of the drive in a step",
         "SLEW_FALLING": "",
     }
-    constants = [(name, literal(value) if value >= 0 else f"({literal(value)})", words[name])
-                 for name, value in number.items()]  # fmt: skip
+    constants = [(name, operand(value), words[name]) for name, value in number.items()]
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
-    fields = {op: instance(op, [*before, *after], len(t.tap), len(t.threshold) - 1) for op in operators}
+    if t.moving.used:
+        more, numbers = _moving(t.moving, prefix)
+        arrays, constants = arrays + more, constants + numbers
+    fields = {op: instance(op, [*before, *after], len(t.tap), len(t.threshold) - 1, t.moving.used) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
@@ -154,7 +193,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     )  # fmt: skip
 
 
-def instance(op: str, blocks: Sequence[Block], taps: int, plays: int) -> list[Field]:
+def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse = op == "inverse"
     return [
@@ -174,6 +213,7 @@ def instance(op: str, blocks: Sequence[Block], taps: int, plays: int) -> list[Fi
           else []),
         Field("status", "status"),
         Field("play", "play", "play 0 is the input of the plays", plays + 1),
+        *([Field("real", "bent", "what each contributes", plays + 1)] if moving else []),
     ]  # fmt: skip
 
 

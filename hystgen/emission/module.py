@@ -45,11 +45,17 @@ def render(template: str, values: SimpleNamespace, **more: object) -> str:
     return _environment().get_template(template).render({**vars(values), **more})
 
 
-def files(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, str]:
-    """File names and their ASCII text. Raises NotInvertibleError and tables.FormatError."""
+def files(
+    parameters: Parameters, cascade: StaticModel, options: Options, sha256: str | None = None
+) -> dict[str, str]:
+    """File names and their ASCII text; `sha256`: of the parameters that the file has, by default these.
+
+    Raises NotInvertibleError and tables.FormatError.
+    """
     if options.inverse and cascade.inverse_problems():
         raise NotInvertibleError(cascade.inverse_problems())
     values = values_of(parameters, cascade, options)
+    values.sha256 = sha256 or values.sha256
     name, shared = parameters.name, options.layout == "shared-runtime"
     single = options.layout == "single-header"
 
@@ -212,7 +218,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.variant = runtime.Variant(
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list,
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
-        compiled is not None and bool(compiled.parts.ageing),
+        compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled) if compiled else []
@@ -301,6 +307,7 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
     return [
         ("SAMPLE_TIME", literal(kind(parameters.sample_time)), "s, from step to step"),
         ("PREVIEW", str(compiled.ahead), "samples that the argument of step is ahead of the motion"),
+        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
     ]
 
 
@@ -330,7 +337,8 @@ def _macros(values: SimpleNamespace) -> list[str]:
 
 
 def _command(name: str, options: Options) -> str:
-    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}"
+    partial = " --allow-partial" if options.left_out else ""
+    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}{partial}"
 
 
 def _units(parameters: Parameters) -> SimpleNamespace:
@@ -397,6 +405,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         *([about] if about else []),
         f"Model: {model}; arithmetic {options.arithmetic}; engine {options.engine}; operator {options.operator}; "
         f"layout {options.layout}",
+        *(f"Not compensated: {words}" for words in options.left_out),
         *([""] if values.precision else []),
         *values.precision,
         "",

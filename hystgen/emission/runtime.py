@@ -129,7 +129,8 @@ class Variant:
 
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value; `chain`: it has
-    effects, `slew`: one of them keeps the drive within a rate, `ages`: one is a gain that follows the travel.
+    effects, `slew`: one of them keeps the drive within a rate, `ages`: one is a gain that follows the travel, `moves`
+    and `bends`: how plays move and are bent where that is not as in engine loop.
     """
 
     engine: str
@@ -142,6 +143,8 @@ class Variant:
     chain: bool = False
     slew: bool = False
     ages: bool = False
+    moves: str = ""
+    bends: str = ""
 
     def state(self, operator: str) -> str:
         """The header with the type of an instance."""
@@ -168,7 +171,9 @@ class Variant:
         start = "loop_start_list.c" if self.start_list else "loop_start.c"
         if self.chain:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
-            return (start, f"loop_{front}.c", slew, "chain.c", *more)
+            moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
+            plays = moving if self.moves else ("chain_plays.c",)
+            return (start, f"loop_{front}.c", slew, *plays, "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

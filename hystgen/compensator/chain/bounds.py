@@ -25,6 +25,7 @@ import math
 import numpy as np
 
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
+from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.tables import Compiled
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
@@ -90,9 +91,28 @@ def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, fl
 
 
 def _late(compiled: Compiled) -> float:
-    """Share of the output that the gain may change in one move, and that its table may be off by."""
-    low, high = compiled.static.input_range
-    return max(ageing.most_at_once(each, high - low) for each in compiled.parts.ageing) + TABLE_ERROR
+    """Share of the output that the gain changes at most in one step at the fastest rate, and that of its table."""
+    return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
+
+
+def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
+    """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it."""
+    u = float(np.finfo(kind).eps) / 2
+    t, static = compiled.tables.moving, compiled.static
+    p, r = np.abs(np.array(static.pi.weights)), np.array(static.pi.thresholds)
+    low, high = static.play_range
+    size = 3.0 * max(abs(low), abs(high)) + float(r[-1])
+    steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
+    play = 4.0 * u * size
+    if t.moves == moving.RELAXING:
+        slow = t.first[1:].astype(float)
+        play = 8.0 * u * size / float(np.min(slow))
+        if kind != "float64":
+            play += compiled.largest_step / 4.0  # contacts inside a step, taken at the first touch
+    each = steep * play + (12.0 + len(static.pi.weights)) * u * size * steep
+    error = float(np.sum(p)) * each
+    width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
+    return error, error + float(np.sum(p)) * steep * width
 
 
 def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
@@ -144,10 +164,15 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     """Bounds for `arithmetic` 'float32' or 'float64', with no more set from outside than gains and temperatures."""
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     plays = error_bounds(static, arithmetic, "loop")
-    u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
-    forward, asked = (sum(each) for each in zip(_one(compiled, arithmetic), _one(compiled, "float64"), strict=True))
     pi = static.pi
     gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
+    if compiled.tables.moving.used:
+        gain = 2.0 / moving.least_slope(static, compiled.parts.plays) / static.front_slopes[0]
+        pairs = zip(_moving(compiled, arithmetic), _moving(compiled, "float64"), strict=True)
+        there, back = (sum(each) for each in pairs)
+        plays = ErrorBounds(plays.forward + there, plays.inverse + gain * back, plays.rounding + gain * back)
+    u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
+    forward, asked = (sum(each) for each in zip(_one(compiled, arithmetic), _one(compiled, "float64"), strict=True))
     whole = static.input_range[1] - static.input_range[0]
     inverse, rounding = (
         min(SECOND_ORDER * _lags(compiled, own + gain * asked, u), whole) for own in (plays.inverse, plays.rounding)

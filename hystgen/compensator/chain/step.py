@@ -11,6 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
+from hystgen.compensator.chain.moving import (
+    PLAIN,
+    STRAIGHT,
+    moved_follow,
+    moved_input,
+    moved_rest,
+)
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat, preview_target
 from hystgen.compensator.chain.tables import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
 from hystgen.compensator.step import (
@@ -91,6 +98,7 @@ class ChainState(NamedTuple):
     `flags`: whether any drive has been applied yet."""
 
     plays: State
+    bent: Reals  # (n + 1,), what each play contributes, where an effect moves or bends them
     lag: Reals  # (k, 5)
     creep: CreepState
     ageing: AgeingState
@@ -105,6 +113,7 @@ def new_state(t: ChainTables) -> ChainState:
     dtype = t.threshold.dtype
     return ChainState(
         loop.new_state(t.plays),
+        np.zeros(len(t.threshold), dtype),
         np.zeros((len(t.lag.block), 5), dtype),
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
@@ -228,6 +237,39 @@ def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
         ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
 
 
+# ---------------------------------------------------------------- chain_plays.c, or chain_moving.c
+
+
+@jit
+def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+    """The plays follow their input w; their sum."""
+    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
+        loop_absorb(t.plays, s.plays, w)
+        return loop_output(t.plays, s.plays)
+    r, p = t.plays.threshold, t.plays.weight
+    if s.flags[MOVING]:
+        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
+
+
+@jit
+def started(t: ChainTables, s: ChainState) -> Any:
+    """The sum of the plays as they are set."""
+    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
+        return loop_output(t.plays, s.plays)
+    r, p = t.plays.threshold, t.plays.weight
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.plays.play[0])
+
+
+@jit
+def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+    """Input of the plays at which their sum is h."""
+    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
+        return loop_solve(t.plays, s.plays, h)
+    r, p = t.plays.threshold, t.plays.weight
+    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.flags[MOVING] != 0, h)
+
+
 # ---------------------------------------------------------------- chain.c
 
 
@@ -237,7 +279,7 @@ def begin(t: ChainTables, s: ChainState) -> None:
     s.line.filled[0] = 0
     s.flags[MOVING] = 0
     s.real[APPLIED] = drive_side_rest(t, s, s.plays.real[DRIVE])
-    s.real[OUTPUT] = output_side_rest(t, s, loop_output(t.plays, s.plays))
+    s.real[OUTPUT] = output_side_rest(t, s, started(t, s))
 
 
 @jit
@@ -266,8 +308,7 @@ def absorb(t: ChainTables, s: ChainState, v: Any) -> None:
     if moving:
         travelled(t, s, v)
     a = drive_side_absorb(t, s, v) if moving else drive_side_rest(t, s, v)
-    loop_absorb(t.plays, s.plays, arrive(t.plays, s.plays, a))
-    h = loop_output(t.plays, s.plays)
+    h = follow(t, s, arrive(t.plays, s.plays, a))
     s.plays.real[LEVEL] = h
     s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
     s.real[APPLIED] = v
@@ -363,7 +404,7 @@ def inverse_step(t: ChainTables, s: ChainState, u: Any) -> Any:
     moving = s.flags[MOVING] != 0
     h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
     s.plays.counts[BITS] = 0
-    a = inverse_drive(t.plays, s.plays, h, loop_solve(t.plays, s.plays, h))
+    a = inverse_drive(t.plays, s.plays, h, inverse_input(t, s, h))
     v = drive_side_solve(t, s, a) if moving else a
     reached = slewed(t, s, v)
     if reached != v:

@@ -15,13 +15,15 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import preview
+from hystgen.compensator.chain import moving, preview
+from hystgen.compensator.chain.moving import MovingTables
 from hystgen.compensator.chain.preview import Taps
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.compensator.layout import Tables
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import AgeingTables
-from hystgen.effects.base import Effect
+from hystgen.effects.ageing.model import SHAPES as AGEING
+from hystgen.effects.base import USER, Effect, Place
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
 from hystgen.effects.lag import compensator as lag
@@ -38,6 +40,10 @@ OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
 and the share that verification corrects with."""
 
 VERIFIED_SHARE = 0.125
+
+SAMPLES_A_SWEEP = 50
+"""A drive that takes no fewer samples from one end of its range to the other is what bounds are stated for: at a
+hundredth of the sample rate a triangle still has shape, and what ageing and contacts inside a step leave is small."""
 
 
 class Stages(NamedTuple):
@@ -58,6 +64,7 @@ class ChainTables(NamedTuple):
     """
 
     plays: Tables
+    moving: MovingTables
     lag: LagTables
     creep: CreepTables
     ageing: AgeingTables
@@ -94,6 +101,7 @@ class Parts:
     modes: list[Any]
     saturations: list[Any]
     slew: list[Any]
+    plays: list[Effect]
     delay: float
 
     @classmethod
@@ -106,6 +114,7 @@ class Parts:
         return cls(
             [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
             called("thermal"), called("resonance"), called("saturation"), called("slew_limit"),
+            [effect for effect in effects if effect.place is Place.PLAYS],
             math.fsum(each.time for each in called("delay")),
         )  # fmt: skip
 
@@ -117,7 +126,15 @@ class Compiled:
     tables: ChainTables
     taps: Taps | None
     parts: Parts
+    seconds: float
     static: StaticModel
+    max_rate: float
+
+    @property
+    def largest_step(self) -> float:
+        """Largest move of the drive in a step for which the bounds hold."""
+        low, high = self.static.input_range
+        return min(self.max_rate * self.seconds, high - low)
 
     @property
     def ahead(self) -> int:
@@ -125,9 +142,21 @@ class Compiled:
         return max(self.taps.ahead, 0) if self.taps else 0
 
 
+def _settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
+    """The sum of the plays once their input has gone straight to w from the start memory."""
+    pi = static.pi
+    r = np.array(pi.thresholds)
+    rows = np.clip(np.array(pi.start), w - r, w + r)[:, None]
+    rows[0] = w
+    for effect in effects:
+        if effect.bends_plays():
+            rows = effect.bent(rows, r)
+    return math.fsum((np.array(pi.weights) * rows[:, 0]).tolist())
+
+
 def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:
     """Extremes of the settled output over every drive history inside the input range."""
-    low, high = (end - static.output_offset for end in static.output_range)
+    low, high = (_settled(static, parts.plays, end) for end in static.play_range)
     for each in parts.creeps:
         rest = creep.numbers(each, seconds).rest
         low, high = low * rest, high * rest
@@ -182,7 +211,7 @@ def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]]
 def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
-    Its effects are ones that `hystgen.compensator.chain.problems` has nothing to say of. Raises FormatError when a
+    None of its effects is among the `refusals`. Raises FormatError when a
     number does not fit the arithmetic.
     """
     dtype = ARITHMETICS[arithmetic].computed.type
@@ -219,6 +248,7 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
     tables = ChainTables(
         plays,
+        moving.build(static, parts.plays, seconds, dtype),
         LagTables(
             np.array([int(exact) for exact, _ in lags], dtype=np.int64),
             reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
@@ -235,23 +265,26 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),
     )
-    return Compiled(tables, taps, parts, static)
+    return Compiled(tables, taps, parts, seconds, static, drive_span / (SAMPLES_A_SWEEP * seconds))
 
 
-def problems(chain: Chain, arithmetic: str, operator: str) -> Iterator[str]:
-    """Why an operator cannot have all effects in the C, one sentence an effect."""
+def refusals(chain: Chain, operator: str, seconds: float) -> Iterator[tuple[Effect, str]]:
+    """The effects that an operator cannot have in the C, each with its reason."""
+    low, high = chain.cascade.input_range
+    parts = Parts.of(chain.effects)
     for effect in chain.effects:
         if operator != "inverse" and effect.name in ("delay", "resonance"):
-            yield f"{effect.name}: the forward operator has none; emit the inverse alone"
-        if effect.name in ("rate_dependence", "noncongruent", "drift"):
-            yield f"{effect.name}: C for it is not written yet"
-        elif effect.name == "ageing":
-            yield from ageing.problems(effect, chain.cascade.input_range[1] - chain.cascade.input_range[0])  # type: ignore[arg-type]
+            yield effect, "only the inverse has it; emit the inverse alone"
+        elif effect.name == "drift":
+            yield effect, "a clock that runs alone, and nothing says when it began; set_offset takes it from outside"
         elif effect.name == "thermal" and not effect.columns:
-            yield "thermal from the drive's own heat: open loop, the temperature is not measured"
-        elif effect.name.startswith("user:"):
-            yield f"{effect.name}: an effect of your own without a compensator"
-    if sum(effect.name == "ageing" for effect in chain.effects) > 1:
-        yield "ageing: there is more than one"
-    if ARITHMETICS[arithmetic].fixed:
-        yield f"arithmetic {arithmetic}: effects are emitted in float32 and float64"
+            yield effect, "the drive's own heat, open loop: its temperature drifts with the room's; measure it"
+        elif effect.name.startswith(USER):
+            yield effect, "an effect of your own, which has no compensator"
+        elif effect in parts.ageing[1:]:
+            yield effect, "one gain follows the travel, and there is another one"
+        elif isinstance(effect, AGEING):
+            yield from ((effect, reason) for reason in ageing.problems(effect, high - low))
+    if operator != "inverse":
+        yield from moving.beyond_forward(chain.cascade, parts.plays, seconds)
+    yield from moving.problems(chain.cascade, parts.plays)

@@ -32,7 +32,7 @@ def gain(effect: Ageing, travelled: float) -> float:
     if isinstance(effect, ExponentialAgeing):
         return 1.0 + effect.loss * math.expm1(-travelled / effect.travel)
     pairs = zip(effect.losses, effect.travels, strict=True)
-    return 1.0 + sum(loss * math.expm1(-travelled / travel) for loss, travel in pairs)
+    return 1.0 + math.fsum(loss * math.expm1(-travelled / travel) for loss, travel in pairs)
 
 
 def steepness(effect: Ageing, travelled: float) -> float:
@@ -79,7 +79,8 @@ def _error(effect: Ageing, row: tuple[float, ...]) -> float:
     at, inverse, *c = row
     shares = np.linspace(0.0, 1.0, 17)[1:-1]
     curve = ((c[3] * shares + c[2]) * shares + c[1]) * shares + c[0]
-    return max(abs(gain(effect, at + x / inverse) - y) for x, y in zip(shares.tolist(), curve.tolist(), strict=True))
+    pairs = zip(shares.tolist(), curve.tolist(), strict=True)
+    return float(max(abs(gain(effect, at + x / inverse) - y) for x, y in pairs))
 
 
 def most_at_once(effect: Ageing, span: float) -> float:
@@ -93,7 +94,7 @@ def problems(effect: Ageing, span: float) -> Iterator[str]:
     """Why the C cannot follow the gain."""
     change = most_at_once(effect, span)
     if len(pieces(effect)) == 0 or change > MOST:
-        yield f"ageing: the gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST:.0%}"
+        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST:.0%}"
 
 
 MOST = 0.25
