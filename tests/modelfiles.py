@@ -80,6 +80,7 @@ CHAINS = {
                      "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]"),
     "dilated": chain("dilated", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
+    "bumpy": chain("bumpy", "name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5"),
     "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
     "late": chain("late", "name: delay, time: 2.6e-3", "name: resonance, frequency: 30, damping: 0.05", CREEP),
     "everything": chain("everything", CREEP, "name: lag, time_constant: 0.01", "name: delay, time: 2.0e-3",

@@ -35,6 +35,7 @@ ROOMS = (
     "verification",
     "closed_loop",
     "identification",
+    "tracking",
     "fleet",
     "diagnosis",
     "planning",

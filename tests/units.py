@@ -47,6 +47,8 @@ UNITS = (
     ("aged", "float32", "loop"),
     ("viscous", "float32", "loop"),
     ("dilated", "float64", "loop"),
+    ("bumpy", "float32", "loop"),
+    ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
