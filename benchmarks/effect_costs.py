@@ -4,7 +4,7 @@
 
 Code is that of a module at -O2, of zig and gcc the larger one; instructions are the mean of the inverse, strict -O2
 build of zig, over a slow sine. `any` is what any effect at all adds, a gain among it, which is the least of them; the
-others are more than that, or less. Plays that are moved or bent have a search in common, `dilated`, and more than that.
+others are more than that, or less. Plays that a search finds have that in common, `dilated`, and more than that.
 `effect_sizes.csv`, which the banner of emitted files is made from, has the code on both cores that
 `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
 """
@@ -30,7 +30,7 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import comparison, emulator, sources, targets
 
-MOVED = ("relaxing", "polynomial", "centre")
+MOVED = ("polynomial", "centre")
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 FLOATS = ("float32", "float64")
 PLAYS = 10

@@ -131,6 +131,8 @@ class Model:
         """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
         emit = self.parameters.emit
         if self.effects:
+            if (engine or emit.engine) == "corners":
+                raise UnsupportedEffectsError("effects are compensated with engine loop; give --engine loop, or auto")
             return "loop"
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
         return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
@@ -195,13 +197,14 @@ class Model:
     ) -> NDArray[Any]:
         """Answers (N,) of the bit reference of a model with effects; see `simulate`."""
         from hystgen.compensator.chain import run, tables
+        from hystgen.compensator.chained import EVEN
 
         check_arithmetic(arithmetic)
         self.need_compensated(arithmetic, "inverse" if inverse else "forward")
         seconds = self.parameters.sample_time
         assert seconds is not None
         record = self.run(x, t, extra)
-        if np.max(np.abs(record.steps - seconds), initial=0.0) > run.EVEN * seconds:
+        if np.max(np.abs(record.steps - seconds), initial=0.0) > EVEN * seconds:
             raise EffectsError(
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any times"

@@ -78,6 +78,7 @@ CHAINS = {
     "worn": chain("worn", "name: ageing, shape: exponentials, losses: [0.02, 0.03], travels: [10, 200]", CREEP),
     "viscous": chain("viscous", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
                      "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]"),
+    "relaxing": chain("relaxing", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", front=BRANCHES),
     "dilated": chain("dilated", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
     "bumpy": chain("bumpy", "name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5"),

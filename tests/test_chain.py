@@ -69,7 +69,9 @@ def test_cores_give_the_same_bits(name: str) -> None:
     assert report.ok, report.table()
 
 
-EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick"), 1e-12) | {"viscous": 2e-4, "dilated": 1e-12}
+EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy"), 1e-12) | {
+    "viscous": 2e-4, "relaxing": 2e-4,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", EXACT)

@@ -948,14 +948,19 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
     assert np.array_equal(static.simulate(v, t=t), static.simulate(v))
 
 
-@pytest.mark.parametrize("ask", [
-    lambda m: m.inverse().simulate([0.0], "float32"), lambda m: hystgen.emit(m, "nowhere"), lambda m: hystgen.verify(m),
-    lambda m: m.simulate([0.0], "float32"), lambda m: m.session(),
+@pytest.mark.parametrize(("ask", "said"), [
+    (lambda m: m.inverse().simulate([0.0], "q15"), r"effects \(lag, creep\) are compensated in float32 and float64"),
+    (lambda m: hystgen.emit(m, "nowhere", arithmetic="q31"), "in float32 and float64, not in q31"),
+    (lambda m: hystgen.emit(m, "nowhere", engine="corners"), "engine loop"),
+    (lambda m: hystgen.verify(m, arithmetic="q31"), "in float32 and float64, not in q31"),
+    (lambda m: m.simulate([0.0], "q31"), "in float32 and float64, not in q31"),
+    (lambda m: m.session(), r"of a model with effects \(lag, creep\) is not supported yet"),
 ])  # fmt: skip
-def test_what_effects_do_not_have_yet_is_refused_by_name(ask: Callable[[hystgen.Model], Any]) -> None:
+def test_what_effects_do_not_have_yet_is_refused_by_name(ask: Callable[[hystgen.Model], Any], said: str) -> None:
     model = model_of("    - {name: lag, time_constant: 1}\n    - {name: creep, time_constants: [1], weights: [0.1]}\n")
-    with pytest.raises(EffectsError, match=r"of a model with effects \(lag, creep\) is not supported yet"):
-        ask(model)
+    timed = model.parameters.model_copy(update={"sample_time": 1e-3})
+    with pytest.raises(EffectsError, match=said):
+        ask(hystgen.Model(timed))
 
 
 def test_loading_a_plain_model_imports_no_effect() -> None:
@@ -1194,10 +1199,14 @@ def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[i
         ("simulate", path, data, "--arithmetic", "q31"),
     ):  # fmt: skip
         code, said, err = run(*words)
-        assert (code, said) == (1, "")
-        refusal = r"\S.* of a model with effects \(lag, slew_limit\) is not supported yet; remove model.effects, .*"
-        assert re.fullmatch(f"{path}: error: {refusal}", err)
+        assert (code, said) == (2, "")
+        assert err == "error: C for a model with effects (lag, slew_limit) needs sample_time in the parameter file"
         assert not out.exists()
+    path.write_text(path.read_text() + "sample_time: 1.0e-3\n")
+    code, said, err = run("emit", path, "-o", out, "--arithmetic", "q31")
+    assert (code, said) == (1, "")
+    assert err == f"{path}: error: effects (lag, slew_limit) are compensated in float32 and float64, not in q31"
+    assert not out.exists()
 
 
 def test_show_lists_effects_and_what_they_mean(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ UNITS = (
     ("bumpy", "float32", "loop"),
     ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
+    ("relaxing", "float32", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
 

@@ -28,14 +28,15 @@ from hystgen.effects.resonance.compensator import led
 from hystgen.effects.saturation.compensator import unsaturated
 
 EVEN = 1e-3
-"""Share of a step by which steps may differ for a mode's inverse, which takes them for equal: as much as its own error,
-`w0^2 T^2/12` with 60 samples a period."""
+"""Share of a step by which steps may differ where they are taken for equal: as much as the error of a mode's inverse,
+`w0^2 T^2/12`, 9e-4 with 60 samples a period."""
 
 ROUNDING = 1e-14
 """Share of a number below which a change of it is rounding: some tens of roundings of 1.1e-16."""
 
 TURNS = 8
-"""Most repetitions of a sample in which the gain depends on the drive that is sought; each leaves a thousandth."""
+"""Most repetitions of a sample in which the gain depends on the drive that is sought. 500 jumps over a quarter of the
+range, with a loss of 1 % a decade from half the range on, take 5 in the mean and 7 at most to the last bit."""
 
 TAKEN_IN = frozenset({
     "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.moving import MovingTables
 from hystgen.compensator.chain.tables import ChainTables, Compiled
-from hystgen.emission.text import literal, operand, table
+from hystgen.emission.text import literal, operand, structure, table
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,13 @@ BENDS = ("none", "polynomial", "centre")
 """Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
 
 
+SCANNED = "scanned"
+
+
 def plays(t: ChainTables) -> tuple[str, str]:
     """How plays move and are bent; empty where engine loop has them."""
+    if t.moving.scanned:
+        return SCANNED, ""
     return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
 
 
@@ -121,6 +126,11 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     """Tables and numbers of plays that an effect moves or bends."""
     real_t = f"{prefix}_real_t"
     arrays = []
+    if t.scanned:
+        members = [("share", list(t.share)), ("inverse", list(t.inverse))]
+        numbers = [("LATE", operand(t.first[1]), "of a stretch, what a play gains at the end of a step"),
+                   ("KEPT", operand(t.second[1]), "and on the way to the next")]  # fmt: skip
+        return [structure(real_t, f"{prefix}_relaxing", members)], numbers
     if t.moves == moving.DILATED:
         arrays.append(table(real_t, f"{prefix}_wider", list(t.first)))
     if t.moves == moving.RELAXING:
@@ -185,7 +195,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     if t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
-    fields = {op: instance(op, [*before, *after], len(t.tap), len(t.threshold) - 1, t.moving.used) for op in operators}
+    fields = {op: instance(op, [*before, *after], len(t.tap), len(t.threshold) - 1, t.moving.used and not t.moving.scanned) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},

@@ -172,7 +172,7 @@ class Variant:
         if self.chain:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
             moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
-            plays = moving if self.moves else ("chain_plays.c",)
+            plays = ("chain_plays.c",) if not self.moves else moving if self.bends else ("chain_relaxing.c",)
             return (start, f"loop_{front}.c", slew, *plays, "chain.c", *more)
         return (
             start,

@@ -17,7 +17,7 @@ PARTS = (
     "polynomial", "centre",
 )  # fmt: skip
 """What is counted: `any` once for a model with effects, the others for each kind of block that there is; `dilated`
-for plays that are moved or bent in any way."""
+for all plays that a search finds."""
 
 
 def parts(t: ChainTables) -> list[str]:
@@ -28,7 +28,7 @@ def parts(t: ChainTables) -> list[str]:
         "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
         "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
-        "relaxing": t.moving.moves == moving.RELAXING, "dilated": t.moving.used,
+        "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
     return ["any", *(part for part in PARTS[1:] if found[part])]

@@ -48,6 +48,9 @@ class MovingTables(NamedTuple):
     curve: Reals
     number: Reals
     halves: int
+    scanned: int  # 1 for viscous plays of one time constant that nothing bends
+    share: Reals  # of these, p_i b1 (n + 1,)
+    inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
 
     @property
     def used(self) -> bool:
@@ -132,8 +135,13 @@ def build(
             number[[MIDDLE, INVERSE_WIDTH]] = effect.centre, 1.0 / effect.width
             number[[BUMP, TANH_CENTRE]] = effect.amplitude * effect.width, math.tanh(effect.centre / effect.width)
     halves = int(np.finfo(dtype).nmant) + 4
-    first, second, curve, number = (np.array(each, dtype=dtype) for each in (first, second, curve, number))
-    return MovingTables(moves, bends, first, second, curve, number, halves)
+    p = np.array(static.pi.weights)
+    scanned = moves == RELAXING and bends == STRAIGHT and len(set(first[1:].tolist())) == 1 and float(np.min(p)) >= 0.0
+    share = np.append(0.0, p[1:] * first[1:])
+    inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
+    given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse))
+    first, second, curve, number, share, inverse = given
+    return MovingTables(moves, bends, first, second, curve, number, halves, int(scanned), share, inverse)
 
 
 def _viscous(seconds: float, tau: float) -> tuple[float, float]:
@@ -215,6 +223,38 @@ def moved_follow(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: Sta
         s.play[i] = rest
     s.play[0] = w
     return total
+
+
+@jit
+def relaxing_follow(t: MovingTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
+    """Viscous plays follow their input w; their sum."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = s.play[i] + t.first[1] * beyond(w - s.play[i], r[i])
+        total = total + p[i] * z
+        s.play[i] = z + t.second[1] * beyond(w - z, r[i])
+    s.play[0] = w
+    return total
+
+
+@jit
+def relaxing_input(t: MovingTables, r: Reals, p: Reals, s: State, h: Any) -> Any:
+    """Input of viscous plays at which their sum is h: of none at first, then of those stretched on the way there."""
+    rest = r[0]
+    for i in range(1, len(r)):
+        rest = rest + p[i] * s.play[i]
+    rest = h - rest
+    w = rest * t.inverse[0]
+    rising = w > s.play[1]
+    for i in range(1, len(r)):
+        first = s.play[i] + r[i] if rising else s.play[i] - r[i]
+        if w <= first if rising else w >= first:
+            break
+        rest = rest + t.share[i] * first
+        w = rest * t.inverse[i]
+        if w < first if rising else w > first:
+            w = first
+    return w
 
 
 @jit

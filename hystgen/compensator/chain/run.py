@@ -13,9 +13,6 @@ from hystgen.effects.base import Run
 from hystgen.effects.thermal.model import COLUMN
 from hystgen.plays import slots
 
-EVEN = 1e-3
-"""Share of a step by which times may differ from even ones: what a clock of a recorder makes of them."""
-
 
 def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
     """Answers (N,) for the drives or references in `record.v`; a preview sees what follows, the last sample stays."""

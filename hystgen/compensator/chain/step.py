@@ -17,6 +17,8 @@ from hystgen.compensator.chain.moving import (
     moved_follow,
     moved_input,
     moved_rest,
+    relaxing_follow,
+    relaxing_input,
 )
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat, preview_target
 from hystgen.compensator.chain.tables import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
@@ -247,6 +249,11 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
         loop_absorb(t.plays, s.plays, w)
         return loop_output(t.plays, s.plays)
     r, p = t.plays.threshold, t.plays.weight
+    if t.moving.scanned:
+        if s.flags[MOVING]:
+            return relaxing_follow(t.moving, r, p, s.plays, w)
+        loop_absorb(t.plays, s.plays, w)
+        return loop_output(t.plays, s.plays)
     if s.flags[MOVING]:
         return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
     return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
@@ -255,7 +262,7 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
 @jit
 def started(t: ChainTables, s: ChainState) -> Any:
     """The sum of the plays as they are set."""
-    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
+    if t.moving.scanned or (t.moving.moves == PLAIN and t.moving.bends == STRAIGHT):
         return loop_output(t.plays, s.plays)
     r, p = t.plays.threshold, t.plays.weight
     return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.plays.play[0])
@@ -267,6 +274,10 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
     if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
         return loop_solve(t.plays, s.plays, h)
     r, p = t.plays.threshold, t.plays.weight
+    if t.moving.scanned:
+        if s.flags[MOVING]:
+            return relaxing_input(t.moving, r, p, s.plays, h)
+        return loop_solve(t.plays, s.plays, h)
     return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.flags[MOVING] != 0, h)
 
 
