@@ -195,7 +195,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     if t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
-    fields = {op: instance(op, [*before, *after], len(t.tap), len(t.threshold) - 1, t.moving.used and not t.moving.scanned) for op in operators}
+    searched = t.moving.used and not t.moving.scanned
+    blocks, n = [*before, *after], len(t.threshold) - 1
+    fields = {op: instance(op, blocks, len(t.tap), n, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
