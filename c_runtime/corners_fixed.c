@@ -1,7 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* One by one, since a copy of all may become a call of memcpy, which a freestanding target need not
- * have. */
+/* Field by field: for a whole structure a compiler may call memcpy. */
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
 {
     to->output = from->output;
@@ -17,14 +16,26 @@ static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x)
     return here->rising ? x : -x;
 }
 
-static void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t *corner)
+HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t *corner)
 {
     hystgen_corner_t *c = &corner[here->depth];
-    c->output = here->output;
+    c->high = (int32_t)(here->output >> HYSTGEN_LOW_BITS);
+    c->low = (hystgen_low_t)here->output;
     c->input = here->input;
-    c->top = here->k;
+    c->top = here->k & HYSTGEN_MOST_PLAYS;
     c->rose = here->rising;
     here->depth = (uint_least16_t)(here->depth + 1u);
+}
+
+/* Where play k of a corner's block begins to follow, as the present move sees it. */
+HYSTGEN_APART int64_t hystgen_begins(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                     const hystgen_corner_t *c, unsigned int k, bool by_output)
+{
+    const hystgen_segment_t *s = &t->segment[k];
+    const int64_t output = (int64_t)c->high * ((int64_t)1 << HYSTGEN_LOW_BITS) + c->low;
+    const int64_t whole = by_output ? s->reach : (int64_t)s->way;
+    return hystgen_along(here, by_output ? output : c->input) +
+           (c->rose == here->rising ? 0 : whole);
 }
 
 /* A corner stays where plays have followed. */
@@ -48,15 +59,12 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    kink->input = here->input;
-    kink->output = here->output;
+    kink->input = hystgen_along(here, here->input);
+    kink->output = hystgen_along(here, here->output);
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
-        const hystgen_segment_t *s = &t->segment[corner[middle].top];
-        const int64_t on =
-            to - hystgen_along(here, by_output ? corner[middle].output : corner[middle].input);
-        const int64_t whole = by_output ? s->reach : (int64_t)s->way;
-        const bool passed = on >= (corner[middle].rose == here->rising ? 0 : whole);
+        const hystgen_corner_t *at = &corner[middle];
+        const bool passed = to >= hystgen_begins(t, here, at, at->top, by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -66,7 +74,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const hystgen_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - hystgen_along(here, by_output ? top->output : top->input);
+        const int64_t on = to - hystgen_begins(t, here, top, 0, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -81,12 +89,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        kink->input = c->input;
-        kink->output = c->output;
-        if (c->rose != here->rising) {
-            kink->input += hystgen_along(here, t->segment[k].way);
-            kink->output += hystgen_along(here, t->segment[k].reach);
-        }
+        kink->input = hystgen_begins(t, here, c, k, false);
+        kink->output = hystgen_begins(t, here, c, k, true);
     }
 }
 
@@ -105,7 +109,7 @@ static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
                           int64_t moved)
 {
-    here->output = kink->output + hystgen_along(here, moved);
+    here->output = hystgen_along(here, kink->output + moved);
     here->input = to;
     here->k = kink->k;
     here->depth = kink->depth;
@@ -115,7 +119,7 @@ static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int
 HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int32_t to)
 {
-    const int64_t way = hystgen_along(here, to - kink->input);
+    const int64_t way = hystgen_along(here, to) - kink->input;
     return way < 0 ? -1 : (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
 
@@ -134,9 +138,8 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
 {
     int64_t x = HYSTGEN_LARGEST;
     if (here->depth > 0) {
-        const hystgen_corner_t *c = &corner[here->depth - 1u];
-        const int64_t begins = hystgen_along(here, c->input) +
-                               (c->rose == here->rising ? 0 : t->segment[here->k + 1u].way);
+        const int64_t begins =
+            hystgen_begins(t, here, &corner[here->depth - 1u], here->k + 1u, false);
         x = begins < x ? begins : x;
     }
     return (int32_t)hystgen_along(here, x);
@@ -170,35 +173,29 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
 {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
-        hystgen_find(t, here, corner, output, true, kink);
-    } else if (hystgen_along(here, output) < next) {
-        kink->output = here->output;
-        kink->input = here->input;
+        next = -HYSTGEN_FAR;
+    }
+    const int64_t to = hystgen_along(here, output);
+    if (to < next) {
+        kink->output = hystgen_along(here, here->output);
+        kink->input = hystgen_along(here, here->input);
         kink->k = here->k;
         kink->depth = here->depth;
     } else {
         hystgen_find(t, here, corner, output, true, kink);
     }
     const hystgen_segment_t *s = &t->segment[kink->k];
-    const int64_t on = hystgen_along(here, output - kink->output);
-    const int64_t x =
-        hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
+    const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
     const int64_t most = t->range[here->rising];
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners
- * are left. */
+/* Output, as the present move sees it, at which another play begins to follow behind a kink. */
 static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                   const hystgen_corner_t *corner, unsigned int depth,
-                                   unsigned int k)
+                                   const hystgen_corner_t *corner, const hystgen_kink_t *kink)
 {
-    if (depth == 0) {
-        return HYSTGEN_FAR;
-    }
-    const hystgen_corner_t *c = &corner[depth - 1u];
-    return hystgen_along(here, c->output) +
-           (c->rose == here->rising ? 0 : t->segment[k + 1u].reach);
+    return kink->depth > 0 ? hystgen_begins(t, here, &corner[kink->depth - 1u], kink->k + 1u, true)
+                           : HYSTGEN_FAR;
 }
 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
@@ -207,12 +204,11 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
                                              hystgen_corner_t *corner, hystgen_kink_t *kink,
                                              int32_t to)
 {
-    int64_t next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
+    int64_t next = hystgen_next_output(t, here, corner, kink);
     int64_t moved = hystgen_gained(t, here, kink, to);
-    if (moved < 0 || hystgen_along(here, kink->output) + moved > next) {
-        /* by rounding, or it was limited */
+    if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
         hystgen_find_input(t, here, corner, to, kink);
-        next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
+        next = hystgen_next_output(t, here, corner, kink);
         moved = hystgen_gained(t, here, kink, to);
     }
     hystgen_go_on(here, kink, to, moved);

@@ -7,6 +7,9 @@
 /* The largest input of the plays. */
 #define HYSTGEN_LARGEST 2147483647
 
+/* The largest number of plays that a corner can name. */
+#define HYSTGEN_MOST_PLAYS 0x7fffu
+
 /* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
  * line. */
 typedef struct {

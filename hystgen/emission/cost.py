@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.layout import FixedTables, Tables
@@ -74,19 +74,22 @@ _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "ui
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
 
 
-def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[int, int]]:
+def _corner_structs(arithmetic: Arithmetic, layout: Layout) -> dict[str, tuple[int, int]]:
     """Sizes and alignments of the structures of the corner engine."""
-    reals, pointer = (real, real), (layout.pointer, layout.pointer)
+    pointer = (layout.pointer, layout.pointer)
     eight, four, two, one = (8, 8), (4, 4), (2, 2), (1, 1)
-    if fixed:
+    if arithmetic.fixed:
+        low = arithmetic.low_bits // 8
+        direction = [one] if low == 4 else []  # else a bit of the number beside it
         return {
             "place_t": layout.struct(eight, four, two, two, one),
             "segment_t": layout.struct(eight, four, four, four, one),
             "kink_t": layout.struct(eight, eight, two, two),
-            "corner_t": layout.struct(eight, four, two, one),
+            "corner_t": layout.struct(four, four, (low, low), two, *direction),
             "curve_t": layout.struct(pointer, eight, eight, eight, two),
             "drive_t": layout.struct(four, one),
         }
+    reals = (arithmetic.bytes, arithmetic.bytes)
     corner = layout.struct(*3 * [reals], two, one)
     return {
         "place_t": layout.struct(reals, reals, two, two, one),
@@ -98,9 +101,11 @@ def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[i
     }
 
 
-def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1) -> int:
+def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1) -> int:
     """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
     of `plays` the bytes of one."""
+    fixed = arithmetic.fixed
+    real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
@@ -109,7 +114,7 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1
         "envelope_t": layout.struct(*(7 * [reach])),
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
         "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
-        **_corner_structs(real, fixed, layout),
+        **_corner_structs(arithmetic, layout),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
@@ -131,13 +136,12 @@ def estimate(
 
     `plays`: the part of it that defines the tables with an entry for each play.
     """
-    fixed = isinstance(numbers, FixedTables)
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
     worst = [
         (op, worst_case(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
     ]
-    memory, avr = (_memory(cascade, options, fixed, text, plays, layout) for layout in (CORE_32, AVR))
+    memory, avr = (_memory(cascade, options, text, plays, layout) for layout in (CORE_32, AVR))
     code = engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine)
     return Cost(code, memory, avr if known else None, worst)
 
@@ -149,11 +153,11 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
     return samples * sample, max(size for _, size in memory.instances)
 
 
-def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
+def _memory(cascade: StaticModel, options: Options, text: str, plays: str, layout: Layout) -> Memory:
     n = cascade.pi.n
     arithmetic = ARITHMETICS[options.arithmetic]
-    real = arithmetic.bytes
-    play, reach = (4, arithmetic.reach_bytes) if fixed else (real, real)
+    real, fixed = arithmetic.bytes, arithmetic.fixed
+    play = 4 if fixed else real
     branches = cascade.branches_differ
     sizes = []
     a_play = play
@@ -161,21 +165,22 @@ def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, play
         if not getattr(options, op):
             continue
         if options.engine == "corners":
-            size, a_play = _corner_instance(n, op, real, bool(cascade.stages), fixed, layout)
+            size, a_play = _corner_instance(n, op, arithmetic, bool(cascade.stages), layout)
         else:
             fields = [real] * (1 + branches) + [1] * branches + [layout.integer]
             if op == "inverse":
                 fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
             size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
         sizes.append((op, size))
-    more = _constants(plays, reach, fixed, layout, n + 1) + a_play * len(sizes)
-    return Memory(_constants(text, reach, fixed, layout), sizes, more)
+    more = _constants(plays, arithmetic, layout, n + 1) + a_play * len(sizes)
+    return Memory(_constants(text, arithmetic, layout), sizes, more)
 
 
-def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layout: Layout) -> tuple[int, int]:
+def _corner_instance(n: int, op: str, arithmetic: Arithmetic, front: bool, layout: Layout) -> tuple[int, int]:
     """Bytes of an instance of the corner engine, and of one corner."""
+    real, fixed = arithmetic.bytes, arithmetic.fixed
     reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
-    structs = _corner_structs(real, fixed, layout)
+    structs = _corner_structs(arithmetic, layout)
     place, (corner, alignment) = structs["place_t"], structs["corner_t"]
     plays = place if fixed else layout.struct(place, *8 * [reals], flag)
     if op == "forward":
