@@ -25,7 +25,7 @@ extern void not_granted(int line);
 # What stands in the emitted C, how often, and what takes its place. The list:
 PLACES = [
     (
-        r"(NAME_APART void NAME_leave_corner\([^{]*\{\n)",
+        r"(\w+ void NAME_leave_corner\([^{]*\{\n)",
         1,
         r"\1    GRANTED(here->depth < PLAYS);\n    WITHIN(here->output, HELD);\n",
     ),
