@@ -182,7 +182,7 @@ def _corner_instance(n: int, op: str, arithmetic: Arithmetic, front: bool, layou
     reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
     structs = _corner_structs(arithmetic, layout)
     place, (corner, alignment) = structs["place_t"], structs["corner_t"]
-    plays = place if fixed else layout.struct(place, *8 * [reals], flag)
+    plays = place if fixed else layout.struct(place, *9 * [reals], flag)
     if op == "forward":
         own = [(4, 4), *([reals, flag] if front else []), status, structs["kink_t"]] if fixed else []
         beside = own or ([reals, flag, status] if front else [status])
