@@ -48,8 +48,7 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last place on the present move where another play begins to follow before the output, or the
-   input, is x; or the present one. */
+/* The last place where another play begins to follow before the output, or input, is x; or here. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
                                 const hystgen_corner_t *corner, int64_t x, bool by_output,
                                 hystgen_kink_t *kink)
@@ -104,8 +103,7 @@ static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
     hystgen_find(t, here, corner, to, false, kink);
 }
 
-/* Moves the plays on from a kink to an input at which the same ones follow; `moved` is the output
- * between. */
+/* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
                           int64_t moved)
 {
@@ -164,9 +162,8 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns,
-   moves nothing. Short of `next`, an output as the present move sees it, the same plays are known
-   to follow. */
+/* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
+   moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, int64_t output, int64_t next,
                                   hystgen_kink_t *kink)
@@ -215,8 +212,8 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
     return next;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its
-   own, as if left by a move that ended where the play begins to follow. */
+/* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
+   left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, const int32_t *play, unsigned int step)
 {

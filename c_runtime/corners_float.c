@@ -3,7 +3,7 @@
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x)
 {
-#if HYSTGEN_SOFT_FLOAT
+#ifdef HYSTGEN_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
     return m->sign * x;
@@ -57,8 +57,7 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of
- * segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
                                          unsigned int last, hystgen_real_t x)
 {
@@ -73,8 +72,7 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
     return k;
 }
 
-/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if
- * that comes first. */
+/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input)
@@ -116,8 +114,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
-/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop
- * them there. */
+/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_corner_t *corner, hystgen_real_t input)
 {
@@ -187,8 +184,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     return true;
 }
 
-/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a
- * search is faster. */
+/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
 HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_real_t input)
 {
@@ -235,8 +231,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, as if left by a move that ended where the play
- * begins to follow. */
+/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start)
 {

@@ -110,13 +110,18 @@ class Family:
 
     @property
     def opening(self) -> tuple[str, ...]:
-        """What stands before all code of a file; `closing` behind it."""
+        """What stands before all code of a file; in a header between `opening_apart` and `closing`."""
         double = ("constants_double.h",) if self.real == "double" else ()
         return () if self.fixed else ("rounding_begin.h", *double)
 
     @property
+    def opening_apart(self) -> tuple[str, ...]:
+        """What stands before that where the code of a user follows."""
+        return () if self.fixed else ("rounding_push.h",)
+
+    @property
     def closing(self) -> tuple[str, ...]:
-        """What stands behind all code of a file."""
+        """What stands behind all code of a header, so that the code of its user is compiled as before."""
         return () if self.fixed else ("rounding_end.h",)
 
 
