@@ -61,13 +61,12 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
 static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
                                          unsigned int last, hystgen_real_t x)
 {
-    unsigned int middle = k;
     while (k < last) {
+        const unsigned int middle = (k + last) / 2;
         const unsigned int at = 4u * middle;
         const bool before = x > step[at];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
-        middle = (k + last) / 2;
     }
     return k;
 }
@@ -145,7 +144,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     hystgen_real_t start = hystgen_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != rising) { /* else none follows before the corner, there all of the block do */
+    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
         const hystgen_real_t from = c->pass[!rising];
         const hystgen_real_t room = t->inside[rising] - start;
         k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);

@@ -17,8 +17,7 @@ typedef struct {
     hystgen_real_t range[2];  /* of the input */
 } hystgen_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does.
- */
+/* A start memory. `center`: input and output of the sum while plays 0 .. k do what play k does. */
 typedef struct {
     const hystgen_real_t (*center)[2];
     uint_least16_t step;  /* 1: a center for each play, 0: one for all, which hold the same */

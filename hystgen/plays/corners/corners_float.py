@@ -78,13 +78,12 @@ def turn_back(t: Curve, m: Memory) -> None:
 @jit
 def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
     """The last of segments k .. last that begins before `way`; `step` are all ways, or all reaches."""
-    middle = k
     while k < last:
+        middle = (k + last) // 2
         if way > step[middle + 1]:
             k = middle + 1
         else:
             last = middle
-        middle = (k + last) // 2
     return k
 
 
