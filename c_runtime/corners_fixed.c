@@ -27,12 +27,12 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where play k of a corner's block begins to follow, as the present move sees it. */
-HYSTGEN_APART int64_t hystgen_begins(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                     const hystgen_corner_t *c, unsigned int k, bool by_output)
+/* Where the play of a segment, of a corner's block, begins to follow, as the present move sees it.
+ */
+static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
+                                     const hystgen_segment_t *s, bool by_output)
 {
-    const hystgen_segment_t *s = &t->segment[k];
-    const int64_t output = (int64_t)c->high * ((int64_t)1 << HYSTGEN_LOW_BITS) + c->low;
+    const int64_t output = (int64_t)c->high * ((int64_t)1 << HYSTGEN_LOW_BITS) + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     return hystgen_along(here, by_output ? output : c->input) +
            (c->rose == here->rising ? 0 : whole);
@@ -46,6 +46,14 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
         here->k = 0;
     }
     here->rising = !here->rising;
+}
+
+/* Puts a kink where the play of a segment began to follow that corner c held. */
+HYSTGEN_APART void hystgen_count_from(const hystgen_place_t *here, const hystgen_corner_t *c,
+                                      const hystgen_segment_t *s, hystgen_kink_t *kink)
+{
+    kink->input = hystgen_begins(here, c, s, false);
+    kink->output = hystgen_begins(here, c, s, true);
 }
 
 /* The last place where another play begins to follow before the output, or input, is x; or here. */
@@ -63,7 +71,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const hystgen_corner_t *at = &corner[middle];
-        const bool passed = to >= hystgen_begins(t, here, at, at->top, by_output);
+        const bool passed = to >= hystgen_begins(here, at, &t->segment[at->top], by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -73,7 +81,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const hystgen_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - hystgen_begins(t, here, top, 0, by_output);
+        const int64_t on = to - hystgen_begins(here, top, t->segment, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -88,8 +96,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        kink->input = hystgen_begins(t, here, c, k, false);
-        kink->output = hystgen_begins(t, here, c, k, true);
+        hystgen_count_from(here, c, &t->segment[k], kink);
     }
 }
 
@@ -137,7 +144,7 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
     int64_t x = HYSTGEN_LARGEST;
     if (here->depth > 0) {
         const int64_t begins =
-            hystgen_begins(t, here, &corner[here->depth - 1u], here->k + 1u, false);
+            hystgen_begins(here, &corner[here->depth - 1u], &t->segment[here->k + 1u], false);
         x = begins < x ? begins : x;
     }
     return (int32_t)hystgen_along(here, x);
@@ -191,8 +198,9 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
 static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
                                    const hystgen_corner_t *corner, const hystgen_kink_t *kink)
 {
-    return kink->depth > 0 ? hystgen_begins(t, here, &corner[kink->depth - 1u], kink->k + 1u, true)
-                           : HYSTGEN_FAR;
+    return kink->depth > 0
+               ? hystgen_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
+               : HYSTGEN_FAR;
 }
 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 227fd7497e01a03ea760b960aca8b688b2585c0c033f528b397521388bcfde1f, without this line
+ * Text: sha256 ebd4bd4b2ad59dce1cf281ba939cc0f8009b2f95e1cb4916f31ee4bf25f4ea57, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -115,12 +115,12 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where play k of a corner's block begins to follow, as the present move sees it. */
-CURVED_APART int64_t curved_begins(const curved_curve_t *t, const curved_place_t *here,
-                                   const curved_corner_t *c, unsigned int k, bool by_output)
+/* Where the play of a segment, of a corner's block, begins to follow, as the present move sees it.
+ */
+static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
+                                    const curved_segment_t *s, bool by_output)
 {
-    const curved_segment_t *s = &t->segment[k];
-    const int64_t output = (int64_t)c->high * ((int64_t)1 << 16) + c->low;
+    const int64_t output = (int64_t)c->high * ((int64_t)1 << 16) + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     return curved_along(here, by_output ? output : c->input) +
            (c->rose == here->rising ? 0 : whole);
@@ -134,6 +134,14 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
         here->k = 0;
     }
     here->rising = !here->rising;
+}
+
+/* Puts a kink where the play of a segment began to follow that corner c held. */
+CURVED_APART void curved_count_from(const curved_place_t *here, const curved_corner_t *c,
+                                    const curved_segment_t *s, curved_kink_t *kink)
+{
+    kink->input = curved_begins(here, c, s, false);
+    kink->output = curved_begins(here, c, s, true);
 }
 
 /* The last place where another play begins to follow before the output, or input, is x; or here. */
@@ -151,7 +159,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const curved_corner_t *at = &corner[middle];
-        const bool passed = to >= curved_begins(t, here, at, at->top, by_output);
+        const bool passed = to >= curved_begins(here, at, &t->segment[at->top], by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -161,7 +169,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const curved_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - curved_begins(t, here, top, 0, by_output);
+        const int64_t on = to - curved_begins(here, top, t->segment, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -176,8 +184,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        kink->input = curved_begins(t, here, c, k, false);
-        kink->output = curved_begins(t, here, c, k, true);
+        curved_count_from(here, c, &t->segment[k], kink);
     }
 }
 
@@ -244,8 +251,9 @@ static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curve
 static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t *here,
                                   const curved_corner_t *corner, const curved_kink_t *kink)
 {
-    return kink->depth > 0 ? curved_begins(t, here, &corner[kink->depth - 1u], kink->k + 1u, true)
-                           : CURVED_FAR;
+    return kink->depth > 0
+               ? curved_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
+               : CURVED_FAR;
 }
 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
