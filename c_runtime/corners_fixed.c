@@ -56,12 +56,11 @@ HYSTGEN_APART void hystgen_count_from(const hystgen_place_t *here, const hystgen
     kink->output = hystgen_begins(here, c, s, true);
 }
 
-/* The last place where another play begins to follow before the output, or input, is x; or here. */
+/* The last place where another play begins to follow before the output, or input, `to`; or here. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                const hystgen_corner_t *corner, int64_t x, bool by_output,
+                                const hystgen_corner_t *corner, int64_t to, bool by_output,
                                 hystgen_kink_t *kink)
 {
-    const int64_t to = hystgen_along(here, x);
     const hystgen_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
@@ -101,13 +100,13 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
 }
 
 /* The same for any move to an input; turns, moves nothing. */
-static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
-                               hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink)
+static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
+                                      hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink)
 {
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
     }
-    hystgen_find(t, here, corner, to, false, kink);
+    hystgen_find(t, here, corner, hystgen_along(here, to), false, kink);
 }
 
 /* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
@@ -169,6 +168,17 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
+/* The input, near the range, that gives an output behind a kink, `to` as the present move sees it.
+ */
+HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                     const hystgen_kink_t *kink, int64_t to)
+{
+    const hystgen_segment_t *s = &t->segment[kink->k];
+    const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
+    const int64_t most = t->range[here->rising];
+    return hystgen_along(here, x > most ? most : x);
+}
+
 /* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
    moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
@@ -186,12 +196,9 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
         kink->k = here->k;
         kink->depth = here->depth;
     } else {
-        hystgen_find(t, here, corner, output, true, kink);
+        hystgen_find(t, here, corner, to, true, kink);
     }
-    const hystgen_segment_t *s = &t->segment[kink->k];
-    const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
-    const int64_t most = t->range[here->rising];
-    return hystgen_along(here, x > most ? most : x);
+    return hystgen_solved(t, here, kink, to);
 }
 
 /* Output, as the present move sees it, at which another play begins to follow behind a kink. */

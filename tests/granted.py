@@ -32,7 +32,7 @@ PLACES = [
     # bisection is looked at for each number of corners on its own
     (r"(    unsigned int left = here->depth;\n    unsigned int k = here->k;\n)", 1, r"\1    /*@ split left; */\n"),
     # sums and ways
-    (r"(        kink->output = NAME_begins\(.*;\n)", 1, r"\1        WITHIN(kink->output, SUM);\n"),
+    (r"(    kink->output = NAME_begins\(.*;\n)", 1, r"\1    WITHIN(kink->output, SUM);\n"),
     (
         r"(    const int64_t way = NAME_along\(here, to\) - kink->input;\n)",
         1,

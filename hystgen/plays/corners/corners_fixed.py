@@ -53,10 +53,15 @@ def turn_back(m: FixedMemory) -> None:
 
 
 @jit
-def find(t: FixedPlayTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
-    """The last place on the present move where another play begins to follow before the output, or the input, is x; or
-    the present one."""
-    to = along(m, x)
+def count_from(t: FixedPlayTables, m: FixedMemory, c: int, k: int, left: int) -> Kink:
+    """The kink where play k began to follow that corner c held; `left` corners hold others."""
+    return begins(t, m, c, k, True), begins(t, m, c, k, False), k, left
+
+
+@jit
+def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
+    """The last place where another play begins to follow before the output, or the input, `to`, as the present move sees
+    it; or the present place."""
     c = -1
     low = 0
     left = m.counts[DEPTH]
@@ -84,7 +89,7 @@ def find(t: FixedPlayTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
         c = top if k > before else c
     if c < 0:
         return along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), k, left
-    return begins(t, m, c, k, True), begins(t, m, c, k, False), k, left
+    return count_from(t, m, c, k, left)
 
 
 @jit
@@ -92,7 +97,7 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
     """The same for any move to an input; turns, moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
-    return find(t, m, to, False)
+    return find(t, m, along(m, to), False)
 
 
 @jit
@@ -142,6 +147,14 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
 
 
 @jit
+def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """The input, near the range, that gives an output behind a kink, `to` as the present move sees it."""
+    x = kink[1] + over_slope(t, to - kink[0], kink[2] + 1)
+    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
+    return along(m, most if x > most else x)
+
+
+@jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
     """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing.
     Short of `following`, an output as the present move sees it, the same plays are known to follow."""
@@ -152,10 +165,8 @@ def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tu
     if to < following:
         kink = (along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), m.counts[K], m.counts[DEPTH])
     else:
-        kink = find(t, m, output, True)
-    x = kink[1] + over_slope(t, to - kink[0], kink[2] + 1)
-    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
-    return along(m, most if x > most else x), kink
+        kink = find(t, m, to, True)
+    return solved(t, m, kink, to), kink
 
 
 @jit

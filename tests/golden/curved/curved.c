@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 ebd4bd4b2ad59dce1cf281ba939cc0f8009b2f95e1cb4916f31ee4bf25f4ea57, without this line
+ * Text: sha256 8e9650b31b5a163a5416e9075638bfb6c1577756cdcbac8cff8142ddd38b4a47, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -144,12 +144,11 @@ CURVED_APART void curved_count_from(const curved_place_t *here, const curved_cor
     kink->output = curved_begins(here, c, s, true);
 }
 
-/* The last place where another play begins to follow before the output, or input, is x; or here. */
+/* The last place where another play begins to follow before the output, or input, `to`; or here. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
-                              const curved_corner_t *corner, int64_t x, bool by_output,
+                              const curved_corner_t *corner, int64_t to, bool by_output,
                               curved_kink_t *kink)
 {
-    const int64_t to = curved_along(here, x);
     const curved_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
@@ -189,13 +188,13 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
 }
 
 /* The same for any move to an input; turns, moves nothing. */
-static void curved_find_input(const curved_curve_t *t, curved_place_t *here,
-                              curved_corner_t *corner, int32_t to, curved_kink_t *kink)
+static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
+                                     curved_corner_t *corner, int32_t to, curved_kink_t *kink)
 {
     if (here->rising ? to < here->input : to > here->input) {
         curved_turn_back(here, corner);
     }
-    curved_find(t, here, corner, to, false, kink);
+    curved_find(t, here, corner, curved_along(here, to), false, kink);
 }
 
 /* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
@@ -223,6 +222,17 @@ CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
 
+/* The input, near the range, that gives an output behind a kink, `to` as the present move sees it.
+ */
+CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
+                                   const curved_kink_t *kink, int64_t to)
+{
+    const curved_segment_t *s = &t->segment[kink->k];
+    const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
+    const int64_t most = t->range[here->rising];
+    return curved_along(here, x > most ? most : x);
+}
+
 /* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
    moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
 static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
@@ -239,12 +249,9 @@ static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curve
         kink->k = here->k;
         kink->depth = here->depth;
     } else {
-        curved_find(t, here, corner, output, true, kink);
+        curved_find(t, here, corner, to, true, kink);
     }
-    const curved_segment_t *s = &t->segment[kink->k];
-    const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
-    const int64_t most = t->range[here->rising];
-    return curved_along(here, x > most ? most : x);
+    return curved_solved(t, here, kink, to);
 }
 
 /* Output, as the present move sees it, at which another play begins to follow behind a kink. */
