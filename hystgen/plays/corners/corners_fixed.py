@@ -60,8 +60,8 @@ def count_from(t: FixedPlayTables, m: FixedMemory, c: int, k: int, left: int) ->
 
 @jit
 def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
-    """The last place where another play begins to follow before the output, or the input, `to`, as the present move sees
-    it; or the present place."""
+    """The last place where another play begins to follow before the output, or the input, `to`, as the present move
+    sees it; or the present place."""
     c = -1
     low = 0
     left = m.counts[DEPTH]
