@@ -127,12 +127,11 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     if (m->here.depth > 1u && x >= c->pass[rising]) {
         unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
         unsigned int passed = m->here.depth - 1u;
-        unsigned int middle = passed - 1u;
         while (passed - kept > 1u) {
+            const unsigned int middle = (kept + passed) / 2;
             const bool beyond = x >= corner[middle].pass[rising];
             passed = beyond ? middle : passed;
             kept = beyond ? kept : middle;
-            middle = (kept + passed) / 2;
         }
         m->here.k = corner[passed].top;
         m->here.depth = (uint_least16_t)passed;

@@ -136,13 +136,12 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     passed = m.counts[DEPTH] - 1
     if passed > 0 and x >= m.passed[passed, rising]:
         kept = 0
-        middle = passed - 1
         while passed - kept > 1:
+            middle = (kept + passed) // 2
             if x >= m.passed[middle, rising]:
                 passed = middle
             else:
                 kept = middle
-            middle = (kept + passed) // 2
         m.counts[K] = m.top[passed]
         m.counts[DEPTH] = passed
     c = m.counts[DEPTH] - 1

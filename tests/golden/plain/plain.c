@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 ade98d8f46d5905428a77fac6dbbe16a731099183abf2bb0bea17124028676fe, without this line
+ * Text: sha256 26c99048d2fb40d22d81fb79e867f468879b59abb5d51af9b53850b6b2e5b379, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -180,12 +180,11 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     if (m->here.depth > 1u && x >= c->pass[rising]) {
         unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
         unsigned int passed = m->here.depth - 1u;
-        unsigned int middle = passed - 1u;
         while (passed - kept > 1u) {
+            const unsigned int middle = (kept + passed) / 2;
             const bool beyond = x >= corner[middle].pass[rising];
             passed = beyond ? middle : passed;
             kept = beyond ? kept : middle;
-            middle = (kept + passed) / 2;
         }
         m->here.k = corner[passed].top;
         m->here.depth = (uint_least16_t)passed;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 e014cd27fe6fce73555b86f16e3e06d181ac83044668ed5180c41cf72e1fd632, without this line
+ * Text: sha256 c397a6ec1a9f26b8e9903e25fe5d107b841717dd744180c83f78a9ea8148ee56, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -525,12 +525,11 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     if (m->here.depth > 1u && x >= c->pass[rising]) {
         unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
         unsigned int passed = m->here.depth - 1u;
-        unsigned int middle = passed - 1u;
         while (passed - kept > 1u) {
+            const unsigned int middle = (kept + passed) / 2;
             const bool beyond = x >= corner[middle].pass[rising];
             passed = beyond ? middle : passed;
             kept = beyond ? kept : middle;
-            middle = (kept + passed) / 2;
         }
         m->here.k = corner[passed].top;
         m->here.depth = (uint_least16_t)passed;
