@@ -146,7 +146,10 @@ def multisine(samples: int, stride: int = 1) -> Reals:
 
 
 def walk(samples: int) -> Reals:
-    """Random walk in parts of the range: the sine of a sum of normally distributed steps of 0.02."""
+    """Random walk in parts of the range: the sine of a sum of normally distributed steps of 0.02 (seed 0).
+
+    Over the range of -10 to 10 a step is about 0.2, and every other one turns. `verify` runs a walk of the same kind.
+    """
     return np.asarray(np.sin(np.cumsum(np.random.default_rng(0).normal(0.0, 0.02, samples))))
 
 
@@ -727,8 +730,8 @@ def table_text(figures: Iterable[Figures]) -> str:
 
 
 GOALS: dict[int, dict[str, float]] = {
-    16: {"fine": 28, "coarse": 42, "worst case": 340, FROM_0: 440, BEHIND: 440, "commit": 440},
-    128: {"fine": 32, "coarse": 60, "worst case": 400, FROM_0: 500, BEHIND: 500, "commit": 500},
+    16: {"fine": 28, "coarse": 42, "walk": 112, "worst case": 340, FROM_0: 440, BEHIND: 440, "commit": 440},
+    128: {"fine": 32, "coarse": 60, "walk": 136, "worst case": 400, FROM_0: 500, BEHIND: 500, "commit": 500},
 }
 """Instructions of a float32 inverse on a Cortex-M4F, by plays: means over signals, dearest samples of the others. In a
 range from 0 moves end at a limit."""

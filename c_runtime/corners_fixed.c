@@ -1,7 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* One by one, since a copy of all may become a call of memcpy, which a freestanding target need not
- * have. */
+/* Field by field: for a whole structure a compiler may call memcpy. */
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
 {
     to->output = from->output;
@@ -17,14 +16,26 @@ static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x)
     return here->rising ? x : -x;
 }
 
-static void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t *corner)
+HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t *corner)
 {
     hystgen_corner_t *c = &corner[here->depth];
-    c->output = here->output;
+    c->high = (int32_t)(here->output >> HYSTGEN_LOW_BITS);
+    c->low = (hystgen_low_t)here->output;
     c->input = here->input;
-    c->top = here->k;
+    c->top = here->k & HYSTGEN_MOST_PLAYS;
     c->rose = here->rising;
     here->depth = (uint_least16_t)(here->depth + 1u);
+}
+
+/* Where the play of a segment, of a corner's block, begins to follow, as the present move sees it.
+ */
+static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
+                                     const hystgen_segment_t *s, bool by_output)
+{
+    const int64_t output = (int64_t)c->high * ((int64_t)1 << HYSTGEN_LOW_BITS) + (int64_t)c->low;
+    const int64_t whole = by_output ? s->reach : (int64_t)s->way;
+    return hystgen_along(here, by_output ? output : c->input) +
+           (c->rose == here->rising ? 0 : whole);
 }
 
 /* A corner stays where plays have followed. */
@@ -37,26 +48,29 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last place on the present move where another play begins to follow before the output, or the
-   input, is x; or the present one. */
+/* Puts a kink where the play of a segment began to follow that corner c held. */
+HYSTGEN_APART void hystgen_count_from(const hystgen_place_t *here, const hystgen_corner_t *c,
+                                      const hystgen_segment_t *s, hystgen_kink_t *kink)
+{
+    kink->input = hystgen_begins(here, c, s, false);
+    kink->output = hystgen_begins(here, c, s, true);
+}
+
+/* The last place where another play begins to follow before the output, or input, `to`; or here. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                const hystgen_corner_t *corner, int64_t x, bool by_output,
+                                const hystgen_corner_t *corner, int64_t to, bool by_output,
                                 hystgen_kink_t *kink)
 {
-    const int64_t to = hystgen_along(here, x);
     const hystgen_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    kink->input = here->input;
-    kink->output = here->output;
+    kink->input = hystgen_along(here, here->input);
+    kink->output = hystgen_along(here, here->output);
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
-        const hystgen_segment_t *s = &t->segment[corner[middle].top];
-        const int64_t on =
-            to - hystgen_along(here, by_output ? corner[middle].output : corner[middle].input);
-        const int64_t whole = by_output ? s->reach : (int64_t)s->way;
-        const bool passed = on >= (corner[middle].rose == here->rising ? 0 : whole);
+        const hystgen_corner_t *at = &corner[middle];
+        const bool passed = to >= hystgen_begins(here, at, &t->segment[at->top], by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -66,7 +80,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const hystgen_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - hystgen_along(here, by_output ? top->output : top->input);
+        const int64_t on = to - hystgen_begins(here, top, t->segment, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -81,31 +95,25 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        kink->input = c->input;
-        kink->output = c->output;
-        if (c->rose != here->rising) {
-            kink->input += hystgen_along(here, t->segment[k].way);
-            kink->output += hystgen_along(here, t->segment[k].reach);
-        }
+        hystgen_count_from(here, c, &t->segment[k], kink);
     }
 }
 
 /* The same for any move to an input; turns, moves nothing. */
-static void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
-                               hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink)
+static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
+                                      hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink)
 {
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
     }
-    hystgen_find(t, here, corner, to, false, kink);
+    hystgen_find(t, here, corner, hystgen_along(here, to), false, kink);
 }
 
-/* Moves the plays on from a kink to an input at which the same ones follow; `moved` is the output
- * between. */
+/* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
                           int64_t moved)
 {
-    here->output = kink->output + hystgen_along(here, moved);
+    here->output = hystgen_along(here, kink->output + moved);
     here->input = to;
     here->k = kink->k;
     here->depth = kink->depth;
@@ -115,7 +123,7 @@ static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int
 HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int32_t to)
 {
-    const int64_t way = hystgen_along(here, to - kink->input);
+    const int64_t way = hystgen_along(here, to) - kink->input;
     return way < 0 ? -1 : (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
 
@@ -134,9 +142,8 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
 {
     int64_t x = HYSTGEN_LARGEST;
     if (here->depth > 0) {
-        const hystgen_corner_t *c = &corner[here->depth - 1u];
-        const int64_t begins = hystgen_along(here, c->input) +
-                               (c->rose == here->rising ? 0 : t->segment[here->k + 1u].way);
+        const int64_t begins =
+            hystgen_begins(here, &corner[here->depth - 1u], &t->segment[here->k + 1u], false);
         x = begins < x ? begins : x;
     }
     return (int32_t)hystgen_along(here, x);
@@ -161,44 +168,46 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns,
-   moves nothing. Short of `next`, an output as the present move sees it, the same plays are known
-   to follow. */
+/* The input, near the range, that gives an output behind a kink, `to` as the present move sees it.
+ */
+HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
+                                     const hystgen_kink_t *kink, int64_t to)
+{
+    const hystgen_segment_t *s = &t->segment[kink->k];
+    const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
+    const int64_t most = t->range[here->rising];
+    return hystgen_along(here, x > most ? most : x);
+}
+
+/* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
+   moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, int64_t output, int64_t next,
                                   hystgen_kink_t *kink)
 {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
-        hystgen_find(t, here, corner, output, true, kink);
-    } else if (hystgen_along(here, output) < next) {
-        kink->output = here->output;
-        kink->input = here->input;
+        next = -HYSTGEN_FAR;
+    }
+    const int64_t to = hystgen_along(here, output);
+    if (to < next) {
+        kink->output = hystgen_along(here, here->output);
+        kink->input = hystgen_along(here, here->input);
         kink->k = here->k;
         kink->depth = here->depth;
     } else {
-        hystgen_find(t, here, corner, output, true, kink);
+        hystgen_find(t, here, corner, to, true, kink);
     }
-    const hystgen_segment_t *s = &t->segment[kink->k];
-    const int64_t on = hystgen_along(here, output - kink->output);
-    const int64_t x =
-        hystgen_along(here, kink->input) + hystgen_over_slope(on, s->reciprocal, s->shift);
-    const int64_t most = t->range[here->rising];
-    return hystgen_along(here, x > most ? most : x);
+    return hystgen_solved(t, here, kink, to);
 }
 
-/* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners
- * are left. */
+/* Output, as the present move sees it, at which another play begins to follow behind a kink. */
 static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                   const hystgen_corner_t *corner, unsigned int depth,
-                                   unsigned int k)
+                                   const hystgen_corner_t *corner, const hystgen_kink_t *kink)
 {
-    if (depth == 0) {
-        return HYSTGEN_FAR;
-    }
-    const hystgen_corner_t *c = &corner[depth - 1u];
-    return hystgen_along(here, c->output) +
-           (c->rose == here->rising ? 0 : t->segment[k + 1u].reach);
+    return kink->depth > 0
+               ? hystgen_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
+               : HYSTGEN_FAR;
 }
 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
@@ -207,20 +216,19 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
                                              hystgen_corner_t *corner, hystgen_kink_t *kink,
                                              int32_t to)
 {
-    int64_t next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
+    int64_t next = hystgen_next_output(t, here, corner, kink);
     int64_t moved = hystgen_gained(t, here, kink, to);
-    if (moved < 0 || hystgen_along(here, kink->output) + moved > next) {
-        /* by rounding, or it was limited */
+    if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
         hystgen_find_input(t, here, corner, to, kink);
-        next = hystgen_next_output(t, here, corner, kink->depth, kink->k);
+        next = hystgen_next_output(t, here, corner, kink);
         moved = hystgen_gained(t, here, kink, to);
     }
     hystgen_go_on(here, kink, to, moved);
     return next;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its
-   own, as if left by a move that ended where the play begins to follow. */
+/* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
+   left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, const int32_t *play, unsigned int step)
 {

@@ -3,7 +3,7 @@
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x)
 {
-#if HYSTGEN_SOFT_FLOAT
+#ifdef HYSTGEN_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
     return m->sign * x;
@@ -26,6 +26,7 @@ HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m)
     m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
+    m->behind = m->here.input;
 }
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
@@ -56,8 +57,7 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of
- * segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
                                          unsigned int last, hystgen_real_t x)
 {
@@ -71,8 +71,7 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
     return k;
 }
 
-/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if
- * that comes first. */
+/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input)
@@ -114,8 +113,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
-/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop
- * them there. */
+/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_corner_t *corner, hystgen_real_t input)
 {
@@ -141,35 +139,41 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     }
     hystgen_real_t cap = c->pass[rising];
     hystgen_real_t next = cap;
+    hystgen_real_t begin = cap;
+    hystgen_real_t start = hystgen_along(m, c->output);
     unsigned int k = m->here.k;
-    if (c->rose == rising) {
-        /* no play follows before the input is back at the corner, then all of its block do */
-        m->begin = hystgen_along(m, cap);
-        m->start = c->output;
-    } else {
-        k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x + c->pass[!rising]);
-        m->from = -hystgen_along(m, c->pass[!rising]);
-        m->base = c->output;
+    m->behind = input;
+    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
+        const hystgen_real_t from = c->pass[!rising];
+        const hystgen_real_t room = t->inside[rising] - start;
+        k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
         const hystgen_segment_t *s = &t->segment[k];
-        m->begin = m->from + hystgen_along(m, s->way);
-        m->start = m->base + hystgen_along(m, s->reach);
-        next = s[1].way - c->pass[!rising];
-        cap = t->segment[c->top].way - c->pass[!rising];
-        const hystgen_real_t room = t->inside[rising] - hystgen_along(m, m->base);
+        begin = s->way - from;
+        start = start + s->reach;
+        next = s[1].way - from;
+        cap = t->segment[c->top].way - from;
         if (t->segment[c->top].reach > room) {
             /* gains fall from segment to segment: the limit lies here or beyond */
-            cap = hystgen_along(m, m->begin) + (room - s->reach) * s->slope;
+            cap = begin + (room - s->reach) * s->slope;
+        }
+        m->from = -hystgen_along(m, from);
+        m->base = c->output;
+        if (k == 0 && from <= t->range[!rising]) {
+            m->behind = m->from; /* back to the corner it is the same line */
         }
     }
+    m->begin = hystgen_along(m, begin);
+    m->start = hystgen_along(m, start);
     m->gain = t->segment[k].gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
     if (hystgen_along(m, output) > t->limit[rising]) {
         return false;
     }
-    const bool back = hystgen_along(m, output) <
-                      hystgen_along(m, m->here.output); /* by rounding: no move leads back */
-    cap = back ? x : cap;
-    m->here.output = back ? m->here.output : output;
+    if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
+        cap = x; /* by rounding: no move leads back */
+    } else {
+        m->here.output = output;
+    }
     cap = t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = hystgen_along(m, cap);
     m->next = hystgen_along(m, next < cap ? next : cap);
@@ -178,8 +182,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     return true;
 }
 
-/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a
- * search is faster. */
+/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
 HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_real_t input)
 {
@@ -209,16 +212,16 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
                                               hystgen_corner_t *corner, hystgen_real_t input)
 {
-    if (m->here.rising ? input > m->here.input : input < m->here.input) {
-        if (m->here.rising ? input < m->next : input > m->next) {
-            m->here.input = input;
-            m->here.output = m->start + (input - m->begin) * m->gain;
-            return m->here.output;
-        }
-        if ((m->here.rising ? input < m->cap : input > m->cap) &&
-            hystgen_move_in_block(t, m, input)) {
-            return m->here.output;
-        }
+    const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
+    if (on ? (m->here.rising ? input < m->next : input > m->next)
+           : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
+        m->here.input = input;
+        m->here.output = m->start + (input - m->begin) * m->gain;
+        return m->here.output;
+    }
+    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
+        hystgen_move_in_block(t, m, input)) {
+        return m->here.output;
     }
     if (input < m->here.input || input > m->here.input) {
         (void)hystgen_move_to_input(t, m, corner, input);
@@ -226,8 +229,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, as if left by a move that ended where the play
- * begins to follow. */
+/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start)
 {

@@ -10,22 +10,13 @@ typedef struct {
     bool rising; /* direction of the present move */
 } hystgen_place_t;
 
-/* A place on the present move where another play begins to follow, or where the move is now: from
-   there on plays 0 .. k do and `depth` corners hold the others. */
+/* A place, as the present move sees it, where another play begins to follow, or where the move is
+   now: from there on plays 0 .. k do and `depth` corners hold the others. */
 typedef struct {
     int64_t output;
     int64_t input;
     uint_least16_t k;
     uint_least16_t depth;
 } hystgen_kink_t;
-
-/* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
- * play `top`. */
-typedef struct {
-    int64_t output; /* at the turning point */
-    int32_t input;
-    uint_least16_t top;
-    bool rose; /* whether a rising move ended here, or a falling one */
-} hystgen_corner_t;
 
 #endif

@@ -1,14 +1,11 @@
 #ifndef HYSTGEN_CORNERS_FIXED_TABLES_H
 #define HYSTGEN_CORNERS_FIXED_TABLES_H
 
-/* An output that none reaches. */
-#define HYSTGEN_FAR ((int64_t)1 << 62)
+#define HYSTGEN_FAR ((int64_t)1 << 62) /* an output that none reaches */
+#define HYSTGEN_LARGEST 2147483647     /* the largest input of the plays */
+#define HYSTGEN_MOST_PLAYS 0x7fffu     /* the largest number of plays that a corner can name */
 
-/* The largest input of the plays. */
-#define HYSTGEN_LARGEST 2147483647
-
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
- * line. */
+/* Play k begins to follow this far from a turning point; from there to the next is a line. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */

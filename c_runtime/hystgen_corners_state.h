@@ -23,9 +23,10 @@ typedef struct {
 /* The place of the play sum, and the line that its next outputs lie on. */
 typedef struct {
     hystgen_place_t here;
-    hystgen_real_t next; /* input up to which the same plays follow and nothing is limited */
-    hystgen_real_t cap;  /* input up to which the same corner counts and nothing is limited */
-    hystgen_real_t from; /* input and output that the top corner's block counts from */
+    hystgen_real_t next;   /* input up to which the same plays follow and nothing is limited */
+    hystgen_real_t cap;    /* input up to which the same corner counts and nothing is limited */
+    hystgen_real_t behind; /* while no play follows: input on the other side, likewise */
+    hystgen_real_t from;   /* input and output that the top corner's block counts from */
     hystgen_real_t base;
     hystgen_real_t begin; /* output = start + (input - begin) gain */
     hystgen_real_t start;

@@ -1,8 +1,7 @@
 #ifndef HYSTGEN_CORNERS_TABLES_H
 #define HYSTGEN_CORNERS_TABLES_H
 
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
- * line. */
+/* Play k begins to follow this far from a turning point; from there to the next is a line. */
 typedef struct {
     hystgen_real_t way;   /* of the input: 2 r_k of the drive, or 2 z_k of the output */
     hystgen_real_t reach; /* of the output, the other one of them */
@@ -18,13 +17,11 @@ typedef struct {
     hystgen_real_t range[2];  /* of the input */
 } hystgen_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does,
-   one for each play (step 1), or one for all where they hold the same (step 0). Plays up to `risen`
-   are left by rising moves, the others by falling ones. */
+/* A start memory. `center`: input and output of the sum while plays 0 .. k do what play k does. */
 typedef struct {
     const hystgen_real_t (*center)[2];
-    uint_least16_t step;
-    uint_least16_t risen;
+    uint_least16_t step;  /* 1: a center for each play, 0: one for all, which hold the same */
+    uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
     hystgen_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } hystgen_start_t;
 

@@ -16,14 +16,18 @@
 
 /* What the numbers of a model are: in floating point all of one type, in fixed point whole numbers
    as wide as they have to be. play: inputs of the plays; reach: where plays start to follow; sum:
-   outputs before they are rounded. */
+   outputs before they are rounded; low: the lower part of one that a corner keeps. */
 #if defined(HYSTGEN_FIXED)
 #ifdef HYSTGEN_REAL_IS_SHORT
 typedef int32_t hystgen_reach_t;
 typedef int16_t hystgen_real_t;
+typedef uint16_t hystgen_low_t;
+#define HYSTGEN_LOW_BITS 16
 #else
 typedef int64_t hystgen_reach_t;
 typedef int32_t hystgen_real_t;
+typedef uint32_t hystgen_low_t;
+#define HYSTGEN_LOW_BITS 32
 #endif
 typedef int32_t hystgen_play_t;
 typedef int64_t hystgen_sum_t;
@@ -56,6 +60,11 @@ typedef hystgen_real_t hystgen_sum_t;
 #ifdef HYSTGEN_FIXED
 #include "build_fixed.h"
 #include "hystgen_corners_fixed_state.h"
+#ifdef HYSTGEN_REAL_IS_SHORT
+#include "hystgen_corner_q15.h"
+#else
+#include "hystgen_corner_q31.h"
+#endif
 #include "hystgen_corners_fixed_tables.h"
 #include "hystgen_tables_fixed.h"
 #include "hystgen_kernels_fixed.h"

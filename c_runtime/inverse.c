@@ -46,20 +46,21 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
 {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
-    if (m->here.rising ? x > m->here.input : x < m->here.input) {
-        if (m->here.rising ? x < m->next : x > m->next) {
-            /* the usual sample: the same plays follow */
-            self->before = m->here.input;
-            m->here.input = x;
-            m->here.output = m->start + (x - m->begin) * m->gain;
+    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
+    if (on ? (m->here.rising ? x < m->next : x > m->next)
+           : m->here.k == 0 && (m->here.rising ? x > m->behind && x < m->here.input
+                                               : x < m->behind && x > m->here.input)) {
+        /* the usual sample: the same plays follow */
+        self->before = m->here.input;
+        m->here.input = x;
+        m->here.output = m->start + (x - m->begin) * m->gain;
+        return m->here.output;
+    }
+    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
+        hystgen_copy_place(&self->undo, &m->here);
+        self->before = x;
+        if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
             return m->here.output;
-        }
-        if (m->here.rising ? x < m->cap : x > m->cap) {
-            hystgen_copy_place(&self->undo, &m->here);
-            self->before = x;
-            if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
-                return m->here.output;
-            }
         }
     }
     return hystgen_inverse_search(self, u);

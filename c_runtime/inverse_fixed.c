@@ -1,7 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* A reference as the present move sees it: ~u is one less than -u, and never less than the least
- * number. */
+/* A reference as the present move sees it; ~u is -u - 1, which overflows for no code. */
 static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_t u)
 {
     return self->here.rising ? u : ~u;
@@ -14,8 +13,7 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self)
     self->usual = false;
 }
 
-/* Steps are usual up to the next kink or limit, less what rounding can add; none is from before the
- * least reference. */
+/* Steps are usual to the next kink or limit, less rounding, but not before the least reference. */
 HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
 {
     const hystgen_place_t *here = &self->here;

@@ -5,8 +5,7 @@
 #define HYSTGEN_HALF_WORD 16u
 #define HYSTGEN_LOW_HALF 0xffffu
 
-/* a times b. Cores without a long multiplication take half words, which is what they can do without
- * a call. */
+/* a times b; with half words, and no call, on cores without a long multiplication. */
 HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b)
 {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)

@@ -3,7 +3,5 @@
 /* Whether each operation of a number is a call of a library. */
 #if (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) ||    \
     defined(__AVR__)
-#define HYSTGEN_SOFT_FLOAT 1
-#else
-#define HYSTGEN_SOFT_FLOAT 0
+#define HYSTGEN_SOFT_FLOAT
 #endif

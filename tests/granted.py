@@ -24,17 +24,21 @@ extern void not_granted(int line);
 
 # What stands in the emitted C, how often, and what takes its place. The list:
 PLACES = [
-    (r"(static void NAME_leave_corner\([^{]*\{\n)", 1, r"\1    GRANTED(here->depth < PLAYS);\n"),
+    (
+        r"(\w+ void NAME_leave_corner\([^{]*\{\n)",
+        1,
+        r"\1    GRANTED(here->depth < PLAYS);\n    WITHIN(here->output, HELD);\n",
+    ),
     # bisection is looked at for each number of corners on its own
     (r"(    unsigned int left = here->depth;\n    unsigned int k = here->k;\n)", 1, r"\1    /*@ split left; */\n"),
     # sums and ways
-    (r"(            kink->output \+= .*;\n)", 1, r"\1            WITHIN(kink->output, SUM);\n"),
+    (r"(    kink->output = NAME_begins\(.*;\n)", 1, r"\1    WITHIN(kink->output, SUM);\n"),
     (
-        r"(    const int64_t way = NAME_along\(here, to - kink->input\);\n)",
+        r"(    const int64_t way = NAME_along\(here, to\) - kink->input;\n)",
         1,
         r"\1    GRANTED(way <= WAY);\n",
     ),
-    (r"(    here->output = kink->output \+ .*;\n)", 1, r"\1    WITHIN(here->output, SUM);\n"),
+    (r"(    here->output = NAME_along\(here, kink->output.*;\n)", 1, r"\1    WITHIN(here->output, SUM);\n"),
     (r"(        const int64_t moved = \(int64_t\)NAME_wide\(.*;\n)", 1, r"        GRANTED(way <= WAY);\n\1"),
     (r"(        here->output = here->rising \? here->output .*;\n)", 1, r"\1        WITHIN(here->output, SUM);\n"),
 ]
@@ -72,7 +76,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
     ends = [least, most, *map(int, tables.start)]
     way = max(max(ends) - min(ends), 2 * int(tables.threshold[-1]), *map(abs, ends))
     numbers = {
-        "SUM": form.largest_sum // sums, "WAY": way, "LEAST": least, "MOST": most,
+        "SUM": form.largest_sum // sums, "HELD": form.largest_held, "WAY": way, "LEAST": least, "MOST": most,
         "PLAYS": model.cascade.pi.n,
     }  # fmt: skip
     usual = USUAL_PLACES if f"{name}_inverse_look_ahead(" in text else []

@@ -95,15 +95,33 @@ KILLED = (
     ),
     Mutant(
         "a step back by rounding goes on", FLOAT,
-        "    cap = back ? x : cap;\n",
-        "",
+        "        cap = x; /* by",
+        "        /* by",
         "listed", "float32",
     ),
     Mutant(
         "an answer steps back", FLOAT,
-        "m->here.output = back ? m->here.output : output;",
-        "m->here.output = output;",
+        "    } else {\n        m->here.output = output;\n    }\n",
+        "    }\n    m->here.output = output;\n",
         "listed", "float32",
+    ),
+    Mutant(
+        "a line leads back where plays follow", INVERSE,
+        "           : m->here.k == 0 && (m->here.rising",
+        "           : (m->here.rising",
+        "plain", "float32",
+    ),
+    Mutant(
+        "a line leads back where plays follow, forward", FLOAT,
+        "           : m->here.k == 0 && (m->here.rising",
+        "           : (m->here.rising",
+        "plain", "float32",
+    ),
+    Mutant(
+        "a line leads back beyond the range", FLOAT,
+        "if (k == 0 && from <= t->range[!rising]) {",
+        "if (k == 0) {",
+        "outside", "float32",
     ),
     Mutant(
         "no number behind a commit keeps the commit", INVERSE,
@@ -243,16 +261,16 @@ EQUIVALENT = (
     # Where the same plays are known to follow, a search finds that they do.
     *(
         Mutant(
-            "no step is known to have the same plays", CORNERS, "} else if (hystgen_along(here, output) < next) {",
-            "} else if (hystgen_along(here, output) < next && next < 0 && next > 0) {", name, bits,
+            "no step is known to have the same plays", CORNERS, "    if (to < next) {",
+            "    if (to < next && next < 0 && next > 0) {", name, bits,
         )
         for name, bits in (("two_branches", "q31"), ("bent", "q15"))
     ),
     # That a drive is where solving has put it saves a search, which would find the same place.
     *(
         Mutant(
-            "every drive is searched for", CORNERS, "if (moved < 0 || hystgen_along(",
-            "if (moved < 0 || moved >= 0 || hystgen_along(", name, bits,
+            "every drive is searched for", CORNERS, "if (moved < 0 || kink->output",
+            "if (moved < 0 || moved >= 0 || kink->output", name, bits,
         )
         for name, bits in (("outside", "q15"), ("listed", "q31"), ("two_branches", "q15"))
     ),

@@ -21,7 +21,8 @@ class Arithmetic:
 
     In fixed point (`fixed`) `reach` is the C type, of `reach_bytes`, of where plays start to follow; `code_bits` are
     those of a code without its sign, `degree` is that of the polynomials of the memoryless part, and `finer_plays` says
-    whether the plays' input may have bits below those of a drive code.
+    whether the plays' input may have bits below those of a drive code. `play_bits` are those of the plays' input where
+    it is not the drive code itself, without its sign; a corner keeps a sum in 32 bits and `low_bits` more.
     """
 
     name: str
@@ -38,6 +39,8 @@ class Arithmetic:
     code_bits: int = 0
     degree: int = 0
     finer_plays: bool = False
+    play_bits: int = 0
+    low_bits: int = 0
 
     @cached_property
     def number(self) -> np.dtype[Any]:

@@ -6,22 +6,17 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables
-from hystgen.plays.fixed import loop_solve, nearest
+from hystgen.plays.fixed import code, loop_solve
 from hystgen.plays.loop import STATUS, State, loop_output
-from hystgen.plays.slots import CODE_MAX, FRACTION, OFFSET, OUTPUT_CLAMPED, SATURATED
+from hystgen.plays.slots import FRACTION, OFFSET
 
 
 @jit
 def output(t: FixedTables, s: State) -> Any:
     """Output code for the memory as it is, limited to the type."""
-    code = nearest(loop_output(t, s) + t.limits[OFFSET], t.limits[FRACTION])
-    if code > t.limits[SATURATED] or code < -t.limits[SATURATED]:
-        s.counts[STATUS] |= OUTPUT_CLAMPED
-    if code > t.limits[CODE_MAX]:
-        return t.limits[CODE_MAX]
-    if code < -t.limits[CODE_MAX]:
-        return -t.limits[CODE_MAX]
-    return code
+    found, bits = code(t, loop_output(t, s) + t.limits[OFFSET])
+    s.counts[STATUS] |= bits
+    return found
 
 
 @jit

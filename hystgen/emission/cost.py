@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.chain import costs
@@ -77,19 +77,22 @@ _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "ui
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
 
 
-def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[int, int]]:
+def _corner_structs(arithmetic: Arithmetic, layout: Layout) -> dict[str, tuple[int, int]]:
     """Sizes and alignments of the structures of the corner engine."""
-    reals, pointer = (real, real), (layout.pointer, layout.pointer)
+    pointer = (layout.pointer, layout.pointer)
     eight, four, two, one = (8, 8), (4, 4), (2, 2), (1, 1)
-    if fixed:
+    if arithmetic.fixed:
+        low = arithmetic.low_bits // 8
+        direction = [one] if low == 4 else []  # else a bit of the number beside it
         return {
             "place_t": layout.struct(eight, four, two, two, one),
             "segment_t": layout.struct(eight, four, four, four, one),
             "kink_t": layout.struct(eight, eight, two, two),
-            "corner_t": layout.struct(eight, four, two, one),
+            "corner_t": layout.struct(four, four, (low, low), two, *direction),
             "curve_t": layout.struct(pointer, eight, eight, eight, two),
             "drive_t": layout.struct(four, one),
         }
+    reals = (arithmetic.bytes, arithmetic.bytes)
     corner = layout.struct(*3 * [reals], two, one)
     return {
         "place_t": layout.struct(reals, reals, two, two, one),
@@ -101,9 +104,11 @@ def _corner_structs(real: int, fixed: bool, layout: Layout) -> dict[str, tuple[i
     }
 
 
-def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1) -> int:
+def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1) -> int:
     """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
     of `plays` the bytes of one."""
+    fixed = arithmetic.fixed
+    real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
@@ -112,7 +117,7 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1
         "envelope_t": layout.struct(*(7 * [reach])),
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
         "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
-        **_corner_structs(real, fixed, layout),
+        **_corner_structs(arithmetic, layout),
         "creep_term_t": layout.struct(*4 * [reach]),
         "creep_table_t": layout.struct((layout.pointer, layout.pointer), *4 * [reach], count),
         "lag_table_t": layout.struct(*4 * [reach]),
@@ -147,7 +152,6 @@ def estimate(
     `plays`: the part of it that defines the tables with an entry for each play; `fields`: of a model with effects, the
     memory of each operator.
     """
-    fixed = isinstance(numbers, FixedTables)
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
     static = numbers.plays if isinstance(numbers, ChainTables) else numbers
@@ -157,7 +161,7 @@ def estimate(
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    memory, avr = (_memory(cascade, options, fixed, text, plays, layout, fields) for layout in (CORE_32, AVR))
+    memory, avr = (_memory(cascade, options, text, plays, layout, fields) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
         more = costs.code_bytes(numbers, options.arithmetic)
@@ -186,7 +190,6 @@ def chain_products(t: ChainTables) -> dict[str, int]:
 def _memory(
     cascade: StaticModel,
     options: Options,
-    fixed: bool,
     text: str,
     plays: str,
     layout: Layout,
@@ -194,8 +197,8 @@ def _memory(
 ) -> Memory:
     n = cascade.pi.n
     arithmetic = ARITHMETICS[options.arithmetic]
-    real = arithmetic.bytes
-    play, reach = (4, arithmetic.reach_bytes) if fixed else (real, real)
+    real, fixed = arithmetic.bytes, arithmetic.fixed
+    play = 4 if fixed else real
     branches = cascade.branches_differ
     sizes = []
     a_play = play
@@ -205,15 +208,15 @@ def _memory(
         if op in chain:
             size = layout.struct(*(_field(each, real, layout) for each in chain[op]))[0]
         elif options.engine == "corners":
-            size, a_play = _corner_instance(n, op, real, bool(cascade.stages), fixed, layout)
+            size, a_play = _corner_instance(n, op, arithmetic, bool(cascade.stages), layout)
         else:
             fields = [real] * (1 + branches) + [1] * branches + [layout.integer]
             if op == "inverse":
                 fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
             size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
         sizes.append((op, size))
-    more = _constants(plays, reach, fixed, layout, n + 1) + a_play * len(sizes)
-    return Memory(_constants(text, reach, fixed, layout), sizes, more)
+    more = _constants(plays, arithmetic, layout, n + 1) + a_play * len(sizes)
+    return Memory(_constants(text, arithmetic, layout), sizes, more)
 
 
 def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
@@ -224,12 +227,13 @@ def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
     return size * max(field.count, 1), alignment
 
 
-def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layout: Layout) -> tuple[int, int]:
+def _corner_instance(n: int, op: str, arithmetic: Arithmetic, front: bool, layout: Layout) -> tuple[int, int]:
     """Bytes of an instance of the corner engine, and of one corner."""
+    real, fixed = arithmetic.bytes, arithmetic.fixed
     reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
-    structs = _corner_structs(real, fixed, layout)
+    structs = _corner_structs(arithmetic, layout)
     place, (corner, alignment) = structs["place_t"], structs["corner_t"]
-    plays = place if fixed else layout.struct(place, *8 * [reals], flag)
+    plays = place if fixed else layout.struct(place, *9 * [reals], flag)
     if op == "forward":
         own = [(4, 4), *([reals, flag] if front else []), status, structs["kink_t"]] if fixed else []
         beside = own or ([reals, flag, status] if front else [status])

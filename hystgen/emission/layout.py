@@ -94,9 +94,10 @@ def _statement(lines: list[str], indent: str) -> Iterator[str]:
     comment = (last[2] or "") if code else ""
     code = re.sub(r" {2,}", " ", code)
     kept = _aligned(lines)
+    anew = list(_broken(code, indent))
     if len(indent + code + comment) <= WIDTH and "/*" not in code:
         yield indent + code + comment
-    elif max(map(len, kept)) <= WIDTH:
+    elif max(map(len, kept)) <= WIDTH and (comment or "/*" in code or len(kept) <= len(anew)):
         yield from kept
     elif comment and code.endswith("{"):
         yield from _broken(code, indent)
@@ -104,7 +105,7 @@ def _statement(lines: list[str], indent: str) -> Iterator[str]:
     else:
         if comment:
             yield from _comment([indent + comment.strip()])
-        yield from _broken(code, indent)
+        yield from anew
 
 
 def _aligned(lines: list[str]) -> list[str]:

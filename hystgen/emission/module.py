@@ -91,9 +91,14 @@ def files(
 def _implementation(values: SimpleNamespace) -> str:
     """The operators with all that they need of the run time, but what a shared one has."""
     family: runtime.Family = values.family
+    single = values.single_header
     opening, apart, closing = (
         runtime.verbatim(files, values.name, family, values.name)
-        for files in (family.opening, (*family.soft(values.kernels), "apart.h"), family.closing)
+        for files in (
+            (*(family.opening_apart if single else ()), *family.opening),
+            (*family.soft(values.kernels), "apart.h"),
+            family.closing if single else (),
+        )
     )
     tables = render("tables.c.j2", values)
     parts = (opening, apart, values.kernels, values.types, tables, values.operators, closing)
@@ -169,9 +174,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
             "runtime.c.j2",
             values,
             banner=_banner(values, f"{file}.c", f"see {file}.h"),
-            implementation="\n".join(
-                [whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels, whole(*family.closing)]
-            ),
+            implementation="\n".join([whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels]),
         ),
     }
 

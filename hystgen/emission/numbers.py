@@ -20,7 +20,7 @@ from hystgen.compensator.chain.tables import Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
-from hystgen.emission.text import WIDTH, literal, operand, structure, table
+from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
 from hystgen.front.curve import FORWARD, INVERSE
 from hystgen.front.stage import StageTables
 from hystgen.front.tanh.model import TanhEnvelope
@@ -147,7 +147,7 @@ def _loop_pointers(name: str, options: Options) -> list[str]:
 def _loop_tables(pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str) -> str:
     """What points to the tables of engine loop."""
     entries = _lines([*pointers, str(len(numbers.threshold) - 1)])
-    return f"static const {prefix}_tables_t {name}_model_tables = {{\n{entries}\n}};\n"
+    return constant(f"{prefix}_tables_t {name}_model_tables", entries.splitlines())
 
 
 def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> list[str]:
@@ -187,7 +187,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
     entries = _lines([f"{own}_segment", *pairs])
     found = [
         f"static const {prefix}_segment_t {own}_segment[{len(curve.way)}] = {{\n{segments}\n}};\n",
-        f"static const {prefix}_curve_t {own}_curve = {{\n{entries}\n}};\n",
+        constant(f"{prefix}_curve_t {own}_curve", entries.splitlines()),
     ]
     before: dict[str, str] = {}
     memories = []
@@ -345,7 +345,7 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
     parts = _lines([f"{name}_model_segment", literal(limits[slots.OFFSET]), ends, str(n)])
     arrays = [
         f"static const {prefix}_segment_t {name}_model_segment[{len(numbers.way)}] = {{\n{rows}\n}};\n",
-        f"static const {prefix}_curve_t {name}_model_curve = {{\n{parts}\n}};\n",
+        constant(f"{prefix}_curve_t {name}_model_curve", parts.splitlines()),
         table("int32_t", f"{name}_model_start", list(numbers.start)),
         table("int32_t", f"{name}_model_zero", list(numbers.zero)),
     ]
@@ -394,7 +394,7 @@ def _curves(
                 (low, high), (under, over) = numbers.domain[which], numbers.edge[which]
                 ends = [*numbers.argument[which], low - under, high + over, low, high]
                 entries = _lines(list(map(literal, ends)))
-                arrays.append(f"static const {prefix}_ends_t {own}_ends = {{\n{entries}\n}};\n")
+                arrays.append(constant(f"{prefix}_ends_t {own}_ends", entries.splitlines()))
     if options.inverse:
         counts.append(("BELOW", f"{int(numbers.below[INVERSE])}u", "bits of a curve back below a drive code"))
     return arrays, counts

@@ -65,7 +65,10 @@ class Family:
     @property
     def constants(self) -> dict[str, str]:
         """What `hystgen_runtime.h` defines and emitted code names directly."""
-        return {} if self.fixed else {"HYSTGEN_REAL_MAX": f"{self.arithmetic.float_h}_MAX"}
+        if self.fixed:
+            low = self.arithmetic.low_bits
+            return {"HYSTGEN_LOW_BITS": str(low), "hystgen_low_t": f"uint{low}_t"}
+        return {"HYSTGEN_REAL_MAX": f"{self.arithmetic.float_h}_MAX"}
 
     @property
     def types(self) -> dict[str, str]:
@@ -87,7 +90,9 @@ class Family:
     @property
     def states(self) -> tuple[str, ...]:
         """The headers of the run time that have the types of its memory."""
-        return ("hystgen_corners_fixed_state.h",) if self.fixed else ("hystgen_corners_state.h",)
+        if self.fixed:
+            return ("hystgen_corners_fixed_state.h", f"hystgen_corner_{self.bits}.h")
+        return ("hystgen_corners_state.h",)
 
     @property
     def kernel_files(self) -> tuple[str, ...]:
@@ -110,13 +115,18 @@ class Family:
 
     @property
     def opening(self) -> tuple[str, ...]:
-        """What stands before all code of a file; `closing` behind it."""
+        """What stands before all code of a file; in a header between `opening_apart` and `closing`."""
         double = ("constants_double.h",) if self.real == "double" else ()
         return () if self.fixed else ("rounding_begin.h", *double)
 
     @property
+    def opening_apart(self) -> tuple[str, ...]:
+        """What stands before that where the code of a user follows."""
+        return () if self.fixed else ("rounding_push.h",)
+
+    @property
     def closing(self) -> tuple[str, ...]:
-        """What stands behind all code of a file."""
+        """What stands behind all code of a header, so that the code of its user is compiled as before."""
         return () if self.fixed else ("rounding_end.h",)
 
 
@@ -314,9 +324,18 @@ def used(pieces: Iterable[Piece]) -> set[str]:
     return {name for piece in pieces for name in piece.uses}
 
 
+def _joined(pieces: Iterable[Piece]) -> str:
+    """Their text, an empty line between them but where a constant shares the comment of the one before."""
+    text = ""
+    for piece in pieces:
+        shared = piece.text.startswith("#define") and text.rpartition("\n\n")[2].count("#define")
+        text += ("\n" if text and not shared else "") + piece.text
+    return text
+
+
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """Kernels as C text under `prefix`; `static` for files that carry them as their own."""
-    text = "\n".join(piece.text for piece in pieces)
+    text = _joined(pieces)
     text = text.replace("HYSTGEN_FIXED_KERNEL ", "HYSTGEN_KERNEL " if family.fixed else "HYSTGEN_API ")
     text = text.replace("HYSTGEN_API ", "static " if static else "")
     text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
@@ -328,7 +347,7 @@ def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: s
 
     `corners`: how many the corner engine takes, 0 for engine loop.
     """
-    text = "\n".join(piece.text for piece in pieces)
+    text = _joined(pieces)
     apart = corners > 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
@@ -375,7 +394,7 @@ def _named(text: str, prefix: str, family: Family, name: str) -> str:
 
 def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
     """Type definitions."""
-    return _named("\n".join(piece.text for piece in pieces), prefix, family, prefix)
+    return _named(_joined(pieces), prefix, family, prefix)
 
 
 def all_types(files: Iterable[str], prefix: str, family: Family) -> str:

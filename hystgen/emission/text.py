@@ -46,10 +46,18 @@ def _wrapped(values: Sequence[Any], suffix: str, indent: str) -> list[str]:
     return lines
 
 
+def constant(declared: str, lines: Sequence[str]) -> str:
+    """A constant with these lines between its braces, in one line where there is room."""
+    whole = f"static const {declared} = {{{lines[0].strip()}}};"
+    if len(lines) == 1 and len(whole) <= WIDTH:
+        return whole + "\n"
+    return "\n".join([f"static const {declared} = {{", *lines, "};"]) + "\n"
+
+
 def table(kind: str, name: str, values: Sequence[Any]) -> str:
     """A constant array of literals."""
     lines = _wrapped(values, "u" if kind == "uint32_t" else "", "   ")
-    return "\n".join([f"static const {kind} {name}[{len(values)}] = {{", *lines, "};"]) + "\n"
+    return constant(f"{kind} {name}[{len(values)}]", lines)
 
 
 def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Any]]]) -> str:

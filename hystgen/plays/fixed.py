@@ -10,7 +10,16 @@ from typing import Any, Protocol
 
 from hystgen.basics.jit import jit
 from hystgen.plays.loop import PlayTables, State, loop_output
-from hystgen.plays.slots import MARGIN, PLAY_MAX, PLAY_MIN, Reals
+from hystgen.plays.slots import (
+    CODE_MAX,
+    FRACTION,
+    MARGIN,
+    OUTPUT_CLAMPED,
+    PLAY_MAX,
+    PLAY_MIN,
+    SATURATED,
+    Reals,
+)
 
 
 class FixedPlayTables(PlayTables, Protocol):
@@ -39,6 +48,18 @@ def nearest(x: Any, bits: Any) -> Any:
     if x < 0:
         return (x + half - 1) >> bits
     return (x + half) >> bits
+
+
+@jit
+def code(t: FixedPlayTables, total: Any) -> tuple[Any, int]:
+    """Output code of a sum, limited to the type, and its status bits."""
+    found = nearest(total, t.limits[FRACTION])
+    bits = OUTPUT_CLAMPED if found > t.limits[SATURATED] or found < -t.limits[SATURATED] else 0
+    if found > t.limits[CODE_MAX]:
+        return t.limits[CODE_MAX], bits
+    if found < -t.limits[CODE_MAX]:
+        return -t.limits[CODE_MAX], bits
+    return found, bits
 
 
 @jit

@@ -10,21 +10,8 @@ from hystgen.compensator.layout import FixedTables
 from hystgen.front.curve import front_forward
 from hystgen.plays.corners.corners_fixed import plays_step, start
 from hystgen.plays.corners.memory import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS, FixedMemory, Reals
-from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import CODE_MAX, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED, SATURATED
-
-
-@jit
-def code(t: FixedTables, m: FixedMemory) -> Any:
-    """Output code for the memory as it is, limited to the type."""
-    found = nearest(m.real[OUTPUT], t.limits[FRACTION])
-    if found > t.limits[SATURATED] or found < -t.limits[SATURATED]:
-        m.counts[STATUS] |= OUTPUT_CLAMPED
-    if found > t.limits[CODE_MAX]:
-        return t.limits[CODE_MAX]
-    if found < -t.limits[CODE_MAX]:
-        return -t.limits[CODE_MAX]
-    return found
+from hystgen.plays.fixed import code
+from hystgen.plays.slots import INPUT_CLAMPED
 
 
 @jit
@@ -45,7 +32,9 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     if inside != v:
         m.counts[STATUS] |= INPUT_CLAMPED
     forward_arrive(t, m, inside)
-    return code(t, m)
+    found, bits = code(t, m.real[OUTPUT])
+    m.counts[STATUS] |= bits
+    return found
 
 
 @jit

@@ -17,6 +17,7 @@ from hystgen.plays.corners.corners_float import (
 from hystgen.plays.corners.memory import (
     BEFORE,
     BEGIN,
+    BEHIND,
     CAP,
     COMMITTED,
     GAIN,
@@ -33,6 +34,7 @@ from hystgen.plays.corners.memory import (
     UNDO,
     UNDO_INPUT,
     UNDO_OUTPUT,
+    K,
     Memory,
     Start,
     copy_place,
@@ -92,17 +94,20 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     """One sample."""
     rising = m.counts[RISING]
     x = u - t.limits[OFFSET]
-    if x > m.real[INPUT] if rising else x < m.real[INPUT]:
-        if x < m.real[NEXT] if rising else x > m.real[NEXT]:
-            m.real[BEFORE] = m.real[INPUT]
-            m.real[INPUT] = x
-            m.real[OUTPUT] = m.real[START] + (x - m.real[BEGIN]) * m.real[GAIN]
+    at = m.real[INPUT]
+    on = x > at if rising else x < at
+    most = m.real[NEXT] if on else at
+    least = at if on or m.counts[K] > 0 else m.real[BEHIND]
+    if least < x < most if rising else most < x < least:
+        m.real[BEFORE] = m.real[INPUT]
+        m.real[INPUT] = x
+        m.real[OUTPUT] = m.real[START] + (x - m.real[BEGIN]) * m.real[GAIN]
+        return m.real[OUTPUT]
+    if on and (x < m.real[CAP] if rising else x > m.real[CAP]):
+        copy_place(m, UNDO, HERE)
+        m.real[BEFORE] = x
+        if move_in_block(t.inverse, m, x):
             return m.real[OUTPUT]
-        if x < m.real[CAP] if rising else x > m.real[CAP]:
-            copy_place(m, UNDO, HERE)
-            m.real[BEFORE] = x
-            if move_in_block(t.inverse, m, x):
-                return m.real[OUTPUT]
     return inverse_search(t, m, u)
 
 

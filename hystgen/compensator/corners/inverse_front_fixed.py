@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.corners.forward_fixed import code
 from hystgen.compensator.corners.inverse import clamp_drive
 from hystgen.compensator.corners.inverse_fixed import inverse_clamp
 from hystgen.compensator.corners.inverse_front import choosing
@@ -19,6 +18,7 @@ from hystgen.plays.corners.memory import (
     HERE,
     LEVEL,
     NEXT,
+    OUTPUT,
     REFERENCE,
     REPEAT,
     STATUS,
@@ -29,6 +29,7 @@ from hystgen.plays.corners.memory import (
     Reals,
     copy_place,
 )
+from hystgen.plays.fixed import code
 from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
 
 inverse_choose = choosing(front_inverse)
@@ -95,7 +96,7 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
     m.counts[ASCENDING] = t.ascending[first]
     inverse_keep(m)
     m.real[REFERENCE] = 0
-    m.real[LEVEL] = code(t, m)
+    m.real[LEVEL] = code(t, m.real[OUTPUT])[0]
     m.counts[REPEAT] = 0
     m.real[NEXT] = -FAR
     m.counts[BITS] = 0
@@ -120,4 +121,4 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Let the actuator be at drive v, in range or not, before the next sample."""
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
-    m.real[LEVEL] = code(t, m)
+    m.real[LEVEL] = code(t, m.real[OUTPUT])[0]

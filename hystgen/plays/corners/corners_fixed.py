@@ -12,7 +12,8 @@ from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
 Kink = tuple[Any, Any, int, int]
-"""`hystgen_kink_t`: output, input, plays that follow from there on, corners that hold the others."""
+"""`hystgen_kink_t`: output and input as the present move sees them, plays that follow from there on, corners that hold
+the others."""
 
 FAR = 1 << 62
 
@@ -35,6 +36,14 @@ def leave_corner(m: FixedMemory) -> None:
 
 
 @jit
+def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) -> Any:
+    """Where play k of a corner's block begins to follow, as the present move sees it."""
+    if by_output:
+        return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k])
+    return along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[k])
+
+
+@jit
 def turn_back(m: FixedMemory) -> None:
     """Turn; a corner stays where plays have followed."""
     if m.counts[K] > 0:
@@ -44,42 +53,43 @@ def turn_back(m: FixedMemory) -> None:
 
 
 @jit
-def find(t: FixedPlayTables, m: FixedMemory, x: Any, by_output: bool) -> Kink:
-    """The last place on the present move where another play begins to follow before the output, or the input, is x; or
-    the present one."""
-    rising = m.counts[RISING]
-    held, whole = (m.output, t.reach) if by_output else (m.input, t.way)
-    to = along(m, x)
+def count_from(t: FixedPlayTables, m: FixedMemory, c: int, k: int, left: int) -> Kink:
+    """The kink where play k began to follow that corner c held; `left` corners hold others."""
+    return begins(t, m, c, k, True), begins(t, m, c, k, False), k, left
+
+
+@jit
+def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
+    """The last place where another play begins to follow before the output, or the input, `to`, as the present move
+    sees it; or the present place."""
     c = -1
     low = 0
     left = m.counts[DEPTH]
     k = m.counts[K]
     while low < left:
         middle = (low + left) // 2
-        if to - along(m, held[middle]) >= (0 if m.rose[middle] == rising else whole[m.top[middle]]):
+        if to >= begins(t, m, middle, m.top[middle], by_output):
             left = middle
         else:
             low = middle + 1
     if left < m.counts[DEPTH]:
         c = left
         k = m.top[c]
-    if left > 0 and m.rose[left - 1] != rising:
+    if left > 0 and m.rose[left - 1] != m.counts[RISING]:
         top = left - 1
-        on = to - along(m, held[top])
+        on = to - begins(t, m, top, 0, by_output)
         before = k
         last = m.top[top] - 1
         while k < last:
             middle = (k + last) // 2 + 1
-            if on >= whole[middle]:
+            if on >= (t.reach[middle] if by_output else t.way[middle]):
                 k = middle
             else:
                 last = middle - 1
         c = top if k > before else c
     if c < 0:
-        return m.real[OUTPUT], m.real[INPUT], k, left
-    if m.rose[c] == rising:
-        return m.output[c], m.input[c], k, left
-    return m.output[c] + along(m, t.reach[k]), m.input[c] + along(m, t.way[k]), k, left
+        return along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), k, left
+    return count_from(t, m, c, k, left)
 
 
 @jit
@@ -87,13 +97,13 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
     """The same for any move to an input; turns, moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
-    return find(t, m, to, False)
+    return find(t, m, along(m, to), False)
 
 
 @jit
 def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
     """Move the plays on from a kink to an input at which the same ones follow; `moved` is the output between."""
-    m.real[OUTPUT] = kink[0] + along(m, moved)
+    m.real[OUTPUT] = along(m, kink[0] + moved)
     m.real[INPUT] = to
     m.counts[K] = kink[2]
     m.counts[DEPTH] = kink[3]
@@ -102,7 +112,7 @@ def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
 @jit
 def gained(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """Output that is gained from a kink on until the input comes to `to`, which may lie before it."""
-    way = along(m, to - kink[1])
+    way = along(m, to) - kink[1]
     return -1 if way < 0 else t.slope[kink[2] + 1] * way
 
 
@@ -117,10 +127,9 @@ def move_to_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> None:
 def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
     """Input at which another play begins to follow the present move, or the last one there is."""
     x = INPUT_MOST
-    c = m.counts[DEPTH] - 1
-    if c >= 0:
-        begins = along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[m.counts[K] + 1])
-        x = begins if begins < x else x
+    if m.counts[DEPTH] > 0:
+        following = begins(t, m, m.counts[DEPTH] - 1, m.counts[K] + 1, False)
+        x = following if following < x else x
     return along(m, x)
 
 
@@ -138,39 +147,43 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
 
 
 @jit
+def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
+    """The input, near the range, that gives an output behind a kink, `to` as the present move sees it."""
+    x = kink[1] + over_slope(t, to - kink[0], kink[2] + 1)
+    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
+    return along(m, most if x > most else x)
+
+
+@jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
     """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing.
     Short of `following`, an output as the present move sees it, the same plays are known to follow."""
     if along(m, output - m.real[OUTPUT]) < 0:
         turn_back(m)
-        kink = find(t, m, output, True)
-    elif along(m, output) < following:
-        kink = (m.real[OUTPUT], m.real[INPUT], m.counts[K], m.counts[DEPTH])
+        following = -FAR
+    to = along(m, output)
+    if to < following:
+        kink = (along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), m.counts[K], m.counts[DEPTH])
     else:
-        kink = find(t, m, output, True)
-    x = along(m, kink[1]) + over_slope(t, along(m, output - kink[0]), kink[2] + 1)
-    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
-    return along(m, most if x > most else x), kink
+        kink = find(t, m, to, True)
+    return solved(t, m, kink, to), kink
 
 
 @jit
-def next_output(t: FixedPlayTables, m: FixedMemory, depth: int, k: int) -> Any:
-    """Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners are left."""
-    if depth == 0:
-        return FAR
-    c = depth - 1
-    return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k + 1])
+def next_output(t: FixedPlayTables, m: FixedMemory, kink: Kink) -> Any:
+    """Output, as the present move sees it, at which another play begins to follow behind a kink."""
+    return begins(t, m, kink[3] - 1, kink[2] + 1, True) if kink[3] > 0 else FAR
 
 
 @jit
 def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
     at which another one begins to follow."""
-    following = next_output(t, m, kink[3], kink[2])
+    following = next_output(t, m, kink)
     moved = gained(t, m, kink, to)
-    if moved < 0 or along(m, kink[0]) + moved > following:  # by rounding, or it was limited
+    if moved < 0 or kink[0] + moved > following:  # by rounding, or it was limited
         kink = find_input(t, m, to)
-        following = next_output(t, m, kink[3], kink[2])
+        following = next_output(t, m, kink)
         moved = gained(t, m, kink, to)
     go_on(m, kink, to, moved)
     return following

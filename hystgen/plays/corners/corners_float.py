@@ -8,6 +8,7 @@ from hystgen.basics.jit import jit
 from hystgen.plays.corners.memory import (
     BASE,
     BEGIN,
+    BEHIND,
     BOTTOM,
     CAP,
     DEPTH,
@@ -44,6 +45,7 @@ def forget_line(t: Curve, m: Memory) -> None:
     m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
     m.real[NEXT] = m.real[INPUT]
     m.real[CAP] = m.real[INPUT]
+    m.real[BEHIND] = m.real[INPUT]
 
 
 @jit
@@ -146,21 +148,26 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     k = m.counts[K]
     cap = m.passed[c, rising]
     after = cap
-    if m.rose[c] == rising:
-        m.real[BEGIN] = along(m, cap)
-        m.real[START] = m.output[c]
-    else:
+    begin = cap
+    y = along(m, m.output[c])
+    m.real[BEHIND] = to
+    if m.rose[c] != rising:
         top = m.top[c]
-        k = find_segment(t.way, k, top - 1, x + m.passed[c, 1 - rising])
-        m.real[FROM] = -along(m, m.passed[c, 1 - rising])
-        m.real[BASE] = m.output[c]
-        m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
-        m.real[START] = m.real[BASE] + along(m, t.reach[k])
-        after = t.way[k + 1] - m.passed[c, 1 - rising]
-        cap = t.way[top] - m.passed[c, 1 - rising]
-        room = t.inside[rising] - along(m, m.real[BASE])
+        origin = m.passed[c, 1 - rising]
+        room = t.inside[rising] - y
+        k = find_segment(t.way, k, top - 1, x + origin)
+        begin = t.way[k] - origin
+        y = y + t.reach[k]
+        after = t.way[k + 1] - origin
+        cap = t.way[top] - origin
         if t.reach[top] > room:
-            cap = along(m, m.real[BEGIN]) + (room - t.reach[k]) * t.slope[k]
+            cap = begin + (room - t.reach[k]) * t.slope[k]
+        m.real[FROM] = -along(m, origin)
+        m.real[BASE] = m.output[c]
+        if k == 0 and origin <= t.range[1 - rising]:
+            m.real[BEHIND] = m.real[FROM]
+    m.real[BEGIN] = along(m, begin)
+    m.real[START] = along(m, y)
     m.real[GAIN] = t.gain[k]
     output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
     if along(m, output) > t.limit[rising]:
@@ -203,13 +210,16 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
 def plays_step(t: Curve, m: Memory, to: Any) -> Any:
     """The sum of the plays for the next input; a NaN moves nothing."""
     rising = m.counts[RISING]
-    if to > m.real[INPUT] if rising else to < m.real[INPUT]:
-        if to < m.real[NEXT] if rising else to > m.real[NEXT]:
-            m.real[INPUT] = to
-            m.real[OUTPUT] = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
-            return m.real[OUTPUT]
-        if (to < m.real[CAP] if rising else to > m.real[CAP]) and move_in_block(t, m, to):
-            return m.real[OUTPUT]
+    at = m.real[INPUT]
+    on = to > at if rising else to < at
+    most = m.real[NEXT] if on else at
+    least = at if on or m.counts[K] > 0 else m.real[BEHIND]
+    if least < to < most if rising else most < to < least:
+        m.real[INPUT] = to
+        m.real[OUTPUT] = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
+        return m.real[OUTPUT]
+    if on and (to < m.real[CAP] if rising else to > m.real[CAP]) and move_in_block(t, m, to):
+        return m.real[OUTPUT]
     if to < m.real[INPUT] or to > m.real[INPUT]:
         move_to_input(t, m, to)
     return m.real[OUTPUT]

@@ -13,8 +13,8 @@ Reals = NDArray[Any]
 Counts = NDArray[np.int64]
 
 # places in `Memory.real`: the plays, then what an operator keeps beside them
-(INPUT, OUTPUT, NEXT, CAP, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED, DRIVE,
- UNDO_DRIVE, REFERENCE, LEVEL) = range(18)  # fmt: skip  (FROM .. SIGN: in floating point)
+(INPUT, OUTPUT, NEXT, CAP, BEHIND, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED,
+ DRIVE, UNDO_DRIVE, REFERENCE, LEVEL) = range(19)  # fmt: skip  (CAP .. SIGN: in floating point)
 # and in `Memory.counts`
 (K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
  ASCENDING, UNDO_ASCENDING, ON) = range(15)  # fmt: skip  (ON: in fixed point)
@@ -62,7 +62,7 @@ class Memory(NamedTuple):
 def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     return Memory(
-        real=np.zeros(18, dtype),
+        real=np.zeros(LEVEL + 1, dtype),
         counts=np.zeros(15, np.int64),
         output=np.zeros(plays + 1, dtype),
         passed=np.zeros((plays + 1, 2), dtype),
@@ -95,7 +95,7 @@ def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     corners = max(plays, 1)
     return FixedMemory(
-        real=np.zeros(18, dtype),
+        real=np.zeros(LEVEL + 1, dtype),
         counts=np.zeros(15, np.int64),
         output=np.zeros(corners, dtype),
         input=np.zeros(corners, dtype),

@@ -5,14 +5,13 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 e24fa4278cc1ddc968e6f932878b87b60ebbe251a72984ef71259876c0195b11, without this line
+ * Text: sha256 363760282401c0623a18df9e9250716c784aed8ee52a2f5d2158cd738b6a840f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
 
 /* Products are rounded before they are added, whatever the compiler's default is. */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
 #else
 #pragma STDC FP_CONTRACT OFF
@@ -160,36 +159,20 @@ static const struct {
         0.0, 0.0, 0.27, 0.702, 1.188, 1.62, 1.8900000000000001, 1.9224
     }
 };
-
 static const bent_tables_t bent_model_tables = {
     bent_play.threshold, bent_play.weight, bent_play.lift, bent_play.reciprocal, 6
 };
-
-static const bent_real_t bent_stage_1_break_x[4] = {
-    -1.0, -0.4, 0.4, 1.0
-};
-
-static const bent_real_t bent_stage_1_break_y[4] = {
-    -4.26, -1.92, 1.92, 4.14
-};
-
-static const bent_real_t bent_stage_1_anchor_x[5] = {
-    -1.0, -0.4, 0.0, 0.4, 1.0
-};
-
-static const bent_real_t bent_stage_1_anchor_y[5] = {
-    -4.26, -1.92, 0.0, 1.92, 4.14
-};
-
+static const bent_real_t bent_stage_1_break_x[4] = {-1.0, -0.4, 0.4, 1.0};
+static const bent_real_t bent_stage_1_break_y[4] = {-4.26, -1.92, 1.92, 4.14};
+static const bent_real_t bent_stage_1_anchor_x[5] = {-1.0, -0.4, 0.0, 0.4, 1.0};
+static const bent_real_t bent_stage_1_anchor_y[5] = {-4.26, -1.92, 0.0, 1.92, 4.14};
 static const bent_real_t bent_stage_1_slope[5] = {
     2.8, 3.9, 4.8, 3.6999999999999997, 2.5999999999999996
 };
-
 static const bent_real_t bent_stage_1_inverse_slope[5] = {
     0.35714285714285715, 0.25641025641025644, 0.20833333333333334, 0.2702702702702703,
     0.3846153846153847
 };
-
 /* the straight pieces of the dead-zone sum */
 static const bent_dead_zone_t bent_stage_1 = {
     bent_stage_1_break_x, bent_stage_1_break_y, bent_stage_1_anchor_x, bent_stage_1_anchor_y,
@@ -222,22 +205,18 @@ static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limit
 
 static bent_real_t bent_clamp_drive(bent_real_t v)
 {
-    return (bent_real_t)(v < BENT_DRIVE_MIN   ? BENT_DRIVE_MIN
-                         : v > BENT_DRIVE_MAX ? BENT_DRIVE_MAX
-                                              : v);
+    return (bent_real_t)(v < BENT_DRIVE_MIN ? BENT_DRIVE_MIN : v > BENT_DRIVE_MAX ? BENT_DRIVE_MAX
+                         : v);
 }
 
 static bent_real_t bent_inverse_clamp(bent_real_t u)
 {
-    return (bent_real_t)(u < BENT_OUTPUT_MIN   ? BENT_OUTPUT_MIN
-                         : u > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX
-                                               : u);
+    return (bent_real_t)(u < BENT_OUTPUT_MIN ? BENT_OUTPUT_MIN : u > BENT_OUTPUT_MAX
+                         ? BENT_OUTPUT_MAX : u);
 }
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */
-static bent_real_t bent_inverse_choose(const bent_inverse_t *self,
-                                       bent_real_t level,
-                                       bent_real_t w,
+static bent_real_t bent_inverse_choose(const bent_inverse_t *self, bent_real_t level, bent_real_t w,
                                        bool *limited)
 {
     (void)self;
@@ -327,8 +306,7 @@ static void bent_inverse_take(bent_inverse_t *self)
 }
 
 /* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
-static bent_real_t bent_inverse_search(bent_inverse_t *self,
-                                       bent_real_t u, bent_real_t level,
+static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent_real_t level,
                                        unsigned int bits)
 {
     if (self->repeat && u >= self->reference && u <= self->reference) {
@@ -458,9 +436,3 @@ unsigned int bent_inverse_status(bent_inverse_t *self)
     self->status = 0;
     return status;
 }
-
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC pop_options
-#else
-#pragma STDC FP_CONTRACT DEFAULT
-#endif

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 92595d84cb5a4413ef9fae53519a827c2b3b83688c8a03e72edefd8c1aab300d, without this line
+ * Text: sha256 8e9650b31b5a163a5416e9075638bfb6c1577756cdcbac8cff8142ddd38b4a47, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -16,14 +16,11 @@
 #define CURVED_APART static
 #endif
 
-/* An output that none reaches. */
-#define CURVED_FAR ((int64_t)1 << 62)
+#define CURVED_FAR ((int64_t)1 << 62) /* an output that none reaches */
+#define CURVED_LARGEST 2147483647     /* the largest input of the plays */
+#define CURVED_MOST_PLAYS 0x7fffu     /* the largest number of plays that a corner can name */
 
-/* The largest input of the plays. */
-#define CURVED_LARGEST 2147483647
-
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
- * line. */
+/* Play k begins to follow this far from a turning point; from there to the next is a line. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -58,13 +55,10 @@ typedef struct {
 
 /* Bits of a word and of half of one, and the lower half. */
 #define CURVED_WORD 32u
-
 #define CURVED_HALF_WORD 16u
-
 #define CURVED_LOW_HALF 0xffffu
 
-/* a times b. Cores without a long multiplication take half words, which is what they can do without
- * a call. */
+/* a times b; with half words, and no call, on cores without a long multiplication. */
 static uint64_t curved_wide(uint32_t a, uint32_t b)
 {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
@@ -74,9 +68,8 @@ static uint64_t curved_wide(uint32_t a, uint32_t b)
     const uint32_t other =
         (a & CURVED_LOW_HALF) * (b >> CURVED_HALF_WORD) + (one & CURVED_LOW_HALF);
     return (uint64_t)((a >> CURVED_HALF_WORD) * (b >> CURVED_HALF_WORD) +
-                      (one >> CURVED_HALF_WORD) + (other >> CURVED_HALF_WORD))
-               << CURVED_WORD |
-           (other << CURVED_HALF_WORD | (low & CURVED_LOW_HALF));
+                      (one >> CURVED_HALF_WORD) + (other >> CURVED_HALF_WORD)) << CURVED_WORD |
+        (other << CURVED_HALF_WORD | (low & CURVED_LOW_HALF));
 #else
     return (uint64_t)a * b;
 #endif
@@ -95,8 +88,7 @@ static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int sh
                      ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
 
-/* One by one, since a copy of all may become a call of memcpy, which a freestanding target need not
- * have. */
+/* Field by field: for a whole structure a compiler may call memcpy. */
 static void curved_copy_place(curved_place_t *to, const curved_place_t *from)
 {
     to->output = from->output;
@@ -112,14 +104,26 @@ static inline int64_t curved_along(const curved_place_t *here, int64_t x)
     return here->rising ? x : -x;
 }
 
-static void curved_leave_corner(curved_place_t *here, curved_corner_t *corner)
+CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *corner)
 {
     curved_corner_t *c = &corner[here->depth];
-    c->output = here->output;
+    c->high = (int32_t)(here->output >> 16);
+    c->low = (uint16_t)here->output;
     c->input = here->input;
-    c->top = here->k;
+    c->top = here->k & CURVED_MOST_PLAYS;
     c->rose = here->rising;
     here->depth = (uint_least16_t)(here->depth + 1u);
+}
+
+/* Where the play of a segment, of a corner's block, begins to follow, as the present move sees it.
+ */
+static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
+                                    const curved_segment_t *s, bool by_output)
+{
+    const int64_t output = (int64_t)c->high * ((int64_t)1 << 16) + (int64_t)c->low;
+    const int64_t whole = by_output ? s->reach : (int64_t)s->way;
+    return curved_along(here, by_output ? output : c->input) +
+           (c->rose == here->rising ? 0 : whole);
 }
 
 /* A corner stays where plays have followed. */
@@ -132,26 +136,29 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
     here->rising = !here->rising;
 }
 
-/* The last place on the present move where another play begins to follow before the output, or the
-   input, is x; or the present one. */
+/* Puts a kink where the play of a segment began to follow that corner c held. */
+CURVED_APART void curved_count_from(const curved_place_t *here, const curved_corner_t *c,
+                                    const curved_segment_t *s, curved_kink_t *kink)
+{
+    kink->input = curved_begins(here, c, s, false);
+    kink->output = curved_begins(here, c, s, true);
+}
+
+/* The last place where another play begins to follow before the output, or input, `to`; or here. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
-                              const curved_corner_t *corner, int64_t x, bool by_output,
+                              const curved_corner_t *corner, int64_t to, bool by_output,
                               curved_kink_t *kink)
 {
-    const int64_t to = curved_along(here, x);
     const curved_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    kink->input = here->input;
-    kink->output = here->output;
+    kink->input = curved_along(here, here->input);
+    kink->output = curved_along(here, here->output);
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
-        const curved_segment_t *s = &t->segment[corner[middle].top];
-        const int64_t on =
-            to - curved_along(here, by_output ? corner[middle].output : corner[middle].input);
-        const int64_t whole = by_output ? s->reach : (int64_t)s->way;
-        const bool passed = on >= (corner[middle].rose == here->rising ? 0 : whole);
+        const curved_corner_t *at = &corner[middle];
+        const bool passed = to >= curved_begins(here, at, &t->segment[at->top], by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -161,7 +168,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const curved_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - curved_along(here, by_output ? top->output : top->input);
+        const int64_t on = to - curved_begins(here, top, t->segment, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -176,30 +183,24 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        kink->input = c->input;
-        kink->output = c->output;
-        if (c->rose != here->rising) {
-            kink->input += curved_along(here, t->segment[k].way);
-            kink->output += curved_along(here, t->segment[k].reach);
-        }
+        curved_count_from(here, c, &t->segment[k], kink);
     }
 }
 
 /* The same for any move to an input; turns, moves nothing. */
-static void curved_find_input(const curved_curve_t *t, curved_place_t *here,
-                              curved_corner_t *corner, int32_t to, curved_kink_t *kink)
+static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
+                                     curved_corner_t *corner, int32_t to, curved_kink_t *kink)
 {
     if (here->rising ? to < here->input : to > here->input) {
         curved_turn_back(here, corner);
     }
-    curved_find(t, here, corner, to, false, kink);
+    curved_find(t, here, corner, curved_along(here, to), false, kink);
 }
 
-/* Moves the plays on from a kink to an input at which the same ones follow; `moved` is the output
- * between. */
+/* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
 static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to, int64_t moved)
 {
-    here->output = kink->output + curved_along(here, moved);
+    here->output = curved_along(here, kink->output + moved);
     here->input = to;
     here->k = kink->k;
     here->depth = kink->depth;
@@ -209,78 +210,77 @@ static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_
 CURVED_APART int64_t curved_gained(const curved_curve_t *t, const curved_place_t *here,
                                    const curved_kink_t *kink, int32_t to)
 {
-    const int64_t way = curved_along(here, to - kink->input);
+    const int64_t way = curved_along(here, to) - kink->input;
     return way < 0 ? -1 : (int64_t)curved_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
 
 /* Moves the plays to any input. */
 CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *here,
-                                       curved_corner_t *corner, curved_kink_t *kink,
-                                       int32_t to)
+                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to)
 {
     curved_find_input(t, here, corner, to, kink);
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
 
-/* The input that gives `output`, kept near the range, and the kink that it was counted from. Turns,
-   moves nothing. Short of `next`, an output as the present move sees it, the same plays are known
-   to follow. */
-static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here,
-                            curved_corner_t *corner, int64_t output, int64_t next,
-                            curved_kink_t *kink)
+/* The input, near the range, that gives an output behind a kink, `to` as the present move sees it.
+ */
+CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
+                                   const curved_kink_t *kink, int64_t to)
 {
-    if (here->rising ? output < here->output : output > here->output) {
-        curved_turn_back(here, corner);
-        curved_find(t, here, corner, output, true, kink);
-    } else if (curved_along(here, output) < next) {
-        kink->output = here->output;
-        kink->input = here->input;
-        kink->k = here->k;
-        kink->depth = here->depth;
-    } else {
-        curved_find(t, here, corner, output, true, kink);
-    }
     const curved_segment_t *s = &t->segment[kink->k];
-    const int64_t on = curved_along(here, output - kink->output);
-    const int64_t x =
-        curved_along(here, kink->input) + curved_over_slope(on, s->reciprocal, s->shift);
+    const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
     const int64_t most = t->range[here->rising];
     return curved_along(here, x > most ? most : x);
 }
 
-/* Output, as the present move sees it, at which play k + 1 begins to follow while `depth` corners
- * are left. */
-static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t *here,
-                                  const curved_corner_t *corner, unsigned int depth,
-                                  unsigned int k)
+/* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
+   moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
+static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
+                            int64_t output, int64_t next, curved_kink_t *kink)
 {
-    if (depth == 0) {
-        return CURVED_FAR;
+    if (here->rising ? output < here->output : output > here->output) {
+        curved_turn_back(here, corner);
+        next = -CURVED_FAR;
     }
-    const curved_corner_t *c = &corner[depth - 1u];
-    return curved_along(here, c->output) + (c->rose == here->rising ? 0 : t->segment[k + 1u].reach);
+    const int64_t to = curved_along(here, output);
+    if (to < next) {
+        kink->output = curved_along(here, here->output);
+        kink->input = curved_along(here, here->input);
+        kink->k = here->k;
+        kink->depth = here->depth;
+    } else {
+        curved_find(t, here, corner, to, true, kink);
+    }
+    return curved_solved(t, here, kink, to);
+}
+
+/* Output, as the present move sees it, at which another play begins to follow behind a kink. */
+static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t *here,
+                                  const curved_corner_t *corner, const curved_kink_t *kink)
+{
+    return kink->depth > 0
+               ? curved_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
+               : CURVED_FAR;
 }
 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
    the move sees it, at which another one begins to follow. */
 static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *here,
-                                       curved_corner_t *corner, curved_kink_t *kink,
-                                       int32_t to)
+                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to)
 {
-    int64_t next = curved_next_output(t, here, corner, kink->depth, kink->k);
+    int64_t next = curved_next_output(t, here, corner, kink);
     int64_t moved = curved_gained(t, here, kink, to);
-    if (moved < 0 || curved_along(here, kink->output) + moved > next) {
-        /* by rounding, or it was limited */
+    if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
         curved_find_input(t, here, corner, to, kink);
-        next = curved_next_output(t, here, corner, kink->depth, kink->k);
+        next = curved_next_output(t, here, corner, kink);
         moved = curved_gained(t, here, kink, to);
     }
     curved_go_on(here, kink, to, moved);
     return next;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each play is a block of its
-   own, as if left by a move that ended where the play begins to follow. */
+/* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
+   left by a move to where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
                                curved_corner_t *corner, const int32_t *play, unsigned int step)
 {
@@ -315,9 +315,8 @@ static int64_t curved_nearest(int64_t x, unsigned int bits)
 /* Value at x of a function that is given as polynomials c_0 + c_1 h + c_2 h^2 + ... on pieces, h =
    0 .. 1 along each: where the pieces begin, the left shifts that stretch them to 2^31, and their
    coefficients from degree 0. */
-static int64_t curved_curve(const int32_t *knot, const uint8_t *scale,
-                            const int32_t *coefficient, unsigned int pieces,
-                            unsigned int degree, int32_t x)
+static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
+                            unsigned int pieces, unsigned int degree, int32_t x)
 {
     unsigned int low = 0;
     unsigned int high = pieces - 1u;
@@ -356,30 +355,19 @@ static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w,
 }
 
 static const curved_segment_t curved_model_segment[8] = {
-    {0, 0, 483367913, 1192592096, 27},
-    {29194444575279914LL, 60397978, 886174507, 1301009559, 28},
-    {82717592953226760LL, 120795956, 1208419783, 1908147352, 29},
-    {155703702004785968LL, 181193932, 1450103739, 1590122794, 29},
-    {243287035730625710LL, 241591910, 1611226377, 1431110514, 29},
-    {340601851001691416LL, 301989888, 1691787696, 1362962395, 29},
-    {442782407045370104LL, 362387866, 1699843828, 1356502857, 29},
+    {0, 0, 944078, 1192592039, 18},
+    {3563775496172LL, 3774874, 1730810, 1301009246, 19},
+    {10097365164112LL, 7549748, 2360195, 1908147262, 20},
+    {19006799184152LL, 11324620, 2832234, 1590122718, 20},
+    {29698125672668LL, 15099494, 3146927, 1431110295, 20},
+    {41577378584866LL, 18874368, 3304273, 1362962330, 20},
+    {54050592821468LL, 22649242, 3320007, 1356503052, 20},
     {4611686018427387904LL, 4294967295LL, 0, 0, 1}
 };
-
-static const curved_curve_t curved_model_curve = {
-    curved_model_segment, 0, {389231414, 428259574}, 6
-};
-
-static const int32_t curved_model_start[1] = {
-    0
-};
-
-static const int32_t curved_model_zero[1] = {
-    0
-};
-
+static const curved_curve_t curved_model_curve = {curved_model_segment, 0, {24326966, 26766226}, 6};
+static const int32_t curved_model_start[1] = {0};
+static const int32_t curved_model_zero[1] = {0};
 static const curved_drive_t curved_inverse_drive[2] = {{-2731, true}, {-2731, true}};
-
 /* w = G[v] */
 static const int32_t curved_front_knot[42] = {
     -32767, -30719, -28671, -26623, -24575, -22527, -20479, -18431, -16383, -15359, -14335, -13311,
@@ -387,95 +375,82 @@ static const int32_t curved_front_knot[42] = {
     6145, 7169, 8193, 9217, 10241, 11265, 12289, 14337, 16385, 18432, 20480, 22528, 24576, 26624,
     28672, 30720
 };
-
 static const uint8_t curved_front_scale[42] = {
     19, 19, 19, 19, 19, 19, 19, 19, 20, 20, 20, 20, 20, 20, 20, 20, 20, 20, 19, 19, 19, 19, 20, 20,
     20, 20, 20, 20, 20, 20, 20, 20, 19, 19, 20, 19, 19, 19, 19, 19, 19, 19
 };
-
 static const int32_t curved_front_coefficient[168] = {
-    -351039061, 14553352, 2629691, 298665, -343067628, 17407935, 3078269, 327352, -333553173,
-    20732382, 3570389, 348768, -322250785, 24564620, 4095288, 357698, -308899937, 28927861, 4634355,
-    347719, -293233947, 33821869, 5159275, 311616, -274994235, 39212682, 5630776, 242278,
-    -253949908, 45021783, 5998721, 134176, -229922595, 25559373, 1546265, 3333, -216755925,
-    27107809, 1551389, -7195, -202815073, 28653437, 1540704, -18827, -188105531, 30179628, 1512546,
-    -31387, -172641504, 31668218, 1465516, -44634, -156446595, 33099833, 1398579, -58264,
-    -139554317, 34454287, 1311154, -71918, -122008375, 35711088, 1203201, -85193, -103862680,
-    36850004, 1075287, -97662, -85181065, 37851694, 928623, -108888, -66036645, 77394980, 3075087,
-    -979351, -26692817, 79732979, 1597216, -1062099, 13440197, 80533619, -5540, -1062081, 53572846,
-    79734091, -1607444, -979300, 92915648, 38697250, -765596, -108879, 112059264, 37850346, -929070,
-    -97651, 130739962, 36848427, -1075654, -85182, 148884614, 35709301, -1203484, -71906, 166429406,
-    34452315, -1311352, -58252, 183320444, 33097700, -1398696, -44623, 199514042, 31665951,
-    -1465559, -31376, 214976706, 30177253, -1512522, -18817, 229684850, 28650982, -1540623, -7185,
-    243624288, 27105299, -1551262, 3342, 256789509, 51115468, -6199842, 134231, 280814070, 45019684,
-    -5993888, 242315, 301855737, 19604853, -1406570, 38953, 320084723, 33820803, -5155710, 347718,
-    335749666, 28926202, -4631605, 357698, 349099581, 24562598, -4093318, 348769, 360401149,
-    20730193, -3569088, 327353, 369914893, 17405727, -3077498, 298667, 377885716, 14551230,
-    -2629313, 266645, 384537333, 12120884, -2229414, 234059
+    -21939941, 909585, 164356, 18667, -21441727, 1087996, 192392, 20459, -20847073, 1295774, 223149,
+    21798, -20140674, 1535289, 255955, 22356, -19306246, 1807991, 289647, 21732, -18327122, 2113867,
+    322455, 19476, -17187140, 2450793, 351923, 15142, -15871869, 2813861, 374920, 8386, -14370162,
+    1597461, 96642, 208, -13547245, 1694238, 96962, -450, -12675942, 1790840, 96294, -1177,
+    -11756596, 1886227, 94534, -1962, -10790094, 1979264, 91595, -2790, -9777912, 2068740, 87411,
+    -3641, -8722145, 2153393, 81947, -4495, -7625523, 2231943, 75200, -5325, -6491418, 2303125,
+    67205, -6104, -5323817, 2365731, 58039, -6805, -4127290, 4837186, 192193, -61209, -1668301,
+    4983311, 99826, -66381, 840012, 5033351, -346, -66380, 3348303, 4983381, -100465, -61206,
+    5807228, 2418578, -47850, -6805, 7003704, 2365647, -58067, -6103, 8171248, 2303027, -67228,
+    -5324, 9305288, 2231831, -75218, -4494, 10401838, 2153270, -81960, -3641, 11457528, 2068606,
+    -87419, -2789, 12469628, 1979122, -91597, -1961, 13436044, 1886078, -94533, -1176, 14355303,
+    1790686, -96289, -449, 15226518, 1694081, -96954, 209, 16049344, 3194717, -387490, 8389,
+    17550879, 2813730, -374618, 15145, 18865984, 1225303, -87911, 2435, 20005295, 2113800, -322232,
+    21732, 20984354, 1807888, -289475, 22356, 21818724, 1535162, -255832, 21798, 22525072, 1295637,
+    -223068, 20460, 23119681, 1087858, -192344, 18667, 23617857, 909452, -164332, 16665, 24033583,
+    757555, -139338, 14629
 };
-
 /* v = G^-1[w] */
 static const int32_t curved_back_knot[44] = {
-    -351039061, -345249169, -339459276, -333669383, -327879490, -322089598, -316299705, -304719919,
-    -293140134, -281560348, -269980562, -258400776, -235241205, -212081633, -188922062, -165762490,
-    -142602919, -119443348, -73124205, -26805062, 19514081, 65833223, 112152366, 158471509,
-    181631080, 204790652, 227950223, 251109794, 274269365, 285849151, 297428937, 309008722,
-    320588508, 332168293, 343748079, 349537971, 355327864, 361117757, 366907650, 372697543,
-    378487436, 381382382, 384277329, 387172275
+    -21939941, -21578073, -21216205, -20854337, -20492468, -20130600, -19768732, -19044995,
+    -18321259, -17597522, -16873785, -16150048, -14702575, -13255102, -11807629, -10360155,
+    -8912682, -7465209, -4570262, -1675316, 1219631, 4114577, 7009524, 9904470, 11351943, 12799417,
+    14246890, 15694363, 17141836, 17865572, 18589309, 19313045, 20036782, 20760518, 21484255,
+    21846123, 22207991, 22569859, 22931728, 23293596, 23655465, 23836399, 24017333, 24198267
 };
-
 static const uint8_t curved_back_scale[44] = {
-    8, 8, 8, 8, 8, 8, 7, 7, 7, 7, 7, 6, 6, 6, 6, 6, 6, 5, 5, 5, 5, 5, 5, 6, 6, 6, 6, 6, 7, 7, 7, 7,
-    7, 7, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9
+    12, 12, 12, 12, 12, 12, 11, 11, 11, 11, 11, 10, 10, 10, 10, 10, 10, 9, 9, 9, 9, 9, 9, 10, 10,
+    10, 10, 10, 11, 11, 11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 13, 13, 13, 13
 };
-
 static const int32_t curved_back_coefficient[176] = {
-    -1073708850, 77353430, -7978867, 954829, -1023805993, 67685042, -6027308, 642536, -979749280,
-    60271728, -4710557, 452902, -940244353, 54409155, -3780648, 331149, -904382851, 49658650,
-    -3099752, 249426, -871502691, 45732763, -2586332, 192543, -841106017, 84857463, -8677260,
-    1087566, -786312880, 74411380, -6456561, 720504, -737792456, 66515197, -4981032, 501939,
-    -694090962, 60348348, -3950940, 363767, -654200578, 55408792, -3203244, 272186, -617392977,
-    102724756, -10450410, 1483320, -550982319, 90386451, -7429030, 949819, -491823653, 81470541,
-    -5487013, 648011, -437992876, 74811292, -4158564, 465182, -388185609, 69728564, -3203076,
-    348646, -341469613, 65800632, -2485912, 271552, -297148038, 125492168, -7608433, 1601269,
-    -213630434, 117253677, -4341502, 1202504, -134373838, 112969887, -1881589, 1048929, -56952561,
-    111872936, 264355, 1071057, 20741144, 113781109, 2448977, 1278439, 100860725, 119018507,
-    5038393, 1768088, 185990400, 64263718, 2200994, 308286, 231495671, 67748324, 2833243, 403729,
-    279738616, 72245202, 3658996, 550620, 331526996, 78097295, 4780858, 786880, 387966612, 85845809,
-    6374836, 1190154, 450646722, 48183323, 2230037, 211888, 485035310, 51568378, 2665223, 276148,
-    521988733, 55647766, 3231351, 369623, 562058202, 60645120, 3987201, 510966, 605983422, 66892870,
-    5028327, 735169, 654790539, 74907546, 6518191, 1113045, 709963880, 42757328, 2224616, 197617,
-    740600117, 46114187, 2630619, 256606, 773766100, 50117370, 3156919, 341649, 809973791, 54971148,
-    3856021, 468884, 849906462, 60976162, 4812334, 668097, 894504885, 68593931, 6168334, 998351,
-    945116090, 39275813, 2075314, 175022, 973270802, 42393732, 2435135, 224875, 1003765341,
-    46080857, 2896766, 295618, 1037047925, 50508319, 3502422, 399452
+    -67106800, 4834589, -498679, 59677, -63987874, 4230315, -376707, 40159, -61234332, 3766983,
+    -294410, 28306, -58765276, 3400573, -236291, 20697, -56523927, 3103666, -193735, 15589,
+    -54468919, 2858298, -161646, 12034, -52569128, 5303592, -542329, 67973, -49144555, 4650711,
+    -403535, 45032, -46112031, 4157200, -311315, 31371, -43380686, 3771772, -246934, 22735,
+    -40887536, 3463049, -200203, 17012, -38587060, 6420297, -653151, 92708, -34436394, 5649153,
+    -464314, 59364, -30738978, 5091909, -342938, 40501, -27374555, 4675706, -259910, 29074,
+    -24261599, 4358035, -200192, 21790, -21341850, 4112539, -155369, 16972, -18571752, 7843260,
+    -475527, 100079, -13351901, 7328355, -271344, 75157, -8398364, 7060618, -117599, 65558,
+    -3559534, 6992059, 16522, 66941, 1296322, 7111319, 153061, 79902, 6303797, 7438657, 314900,
+    110506, 11624401, 4016482, 137562, 19268, 14468480, 4234270, 177078, 25233, 17483666, 4515325,
+    228687, 34414, 20720440, 4881081, 298804, 49180, 24247916, 5365363, 398427, 74385, 28165422,
+    3011458, 139377, 13243, 30314707, 3223024, 166576, 17259, 32624297, 3477986, 201959, 23101,
+    35128637, 3790320, 249200, 31935, 37873965, 4180804, 314270, 45948, 40924407, 4681721, 407387,
+    69565, 44372743, 2672333, 139039, 12351, 46287506, 2882137, 164414, 16038, 48360378, 3132335,
+    197307, 21353, 50623357, 3435696, 241001, 29305, 53119153, 3811010, 300771, 41756, 55906552,
+    4287120, 385521, 62397, 59069758, 2454739, 129707, 10939, 60829426, 2649608, 152196, 14055,
+    62735333, 2880053, 181048, 18476, 64815493, 3156770, 218901, 24966
 };
-
 static const curved_ends_t curved_back_ends = {
-    -389231412, 416074956, -351040837, 390068450, -351039061, 390067221
+    -24326964, 26004684, -21940052, 24379278, -21939941, 24379201
 };
 
 #define CURVED_START 0        /* what each play holds after init */
 #define CURVED_START_STEP 0   /* entries from play to play; reset takes 0 for each */
 #define CURVED_CODE_MAX 32767 /* the largest code of either sign */
-#define CURVED_FRACTION 44u   /* bits of a sum below an output code */
+#define CURVED_FRACTION 31u   /* bits of a sum below an output code */
 #define CURVED_DEGREE 3u      /* of the polynomials of every curve */
 #define CURVED_FRONT_PIECES 42u
 #define CURVED_BACK_PIECES 44u
-#define CURVED_BELOW 15u /* bits of a curve back below a drive code */
+#define CURVED_BELOW 11u /* bits of a curve back below a drive code */
 
 static curved_real_t curved_clamp_drive(curved_reach_t v)
 {
-    return (curved_real_t)(v < CURVED_DRIVE_MIN   ? CURVED_DRIVE_MIN
-                           : v > CURVED_DRIVE_MAX ? CURVED_DRIVE_MAX
-                                                  : v);
+    return (curved_real_t)(v < CURVED_DRIVE_MIN ? CURVED_DRIVE_MIN : v > CURVED_DRIVE_MAX
+                           ? CURVED_DRIVE_MAX : v);
 }
 
 static curved_real_t curved_inverse_clamp(curved_reach_t u)
 {
-    return (curved_real_t)(u < CURVED_OUTPUT_MIN   ? CURVED_OUTPUT_MIN
-                           : u > CURVED_OUTPUT_MAX ? CURVED_OUTPUT_MAX
-                                                   : u);
+    return (curved_real_t)(u < CURVED_OUTPUT_MIN ? CURVED_OUTPUT_MIN : u > CURVED_OUTPUT_MAX
+                           ? CURVED_OUTPUT_MAX : u);
 }
 
 /* Output code of a sum. */
@@ -483,9 +458,8 @@ static curved_real_t curved_code(curved_sum_t sum, unsigned int *status)
 {
     const curved_sum_t code = curved_nearest(sum, CURVED_FRACTION);
     (void)status;
-    return (curved_real_t)(code > CURVED_CODE_MAX    ? CURVED_CODE_MAX
-                           : code < -CURVED_CODE_MAX ? -CURVED_CODE_MAX
-                                                     : code);
+    return (curved_real_t)(code > CURVED_CODE_MAX ? CURVED_CODE_MAX : code < -CURVED_CODE_MAX
+                           ? -CURVED_CODE_MAX : code);
 }
 
 /* Input of the plays: w = G[v]. */
@@ -513,10 +487,8 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascendin
 }
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */
-static curved_reach_t curved_inverse_choose(const curved_inverse_t *self,
-                                            curved_real_t level,
-                                            curved_reach_t w,
-                                            bool *limited)
+static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved_real_t level,
+                                            curved_reach_t w, bool *limited)
 {
     (void)self;
     (void)level;

@@ -5,26 +5,26 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 87e43ea362937821a03c04f531a1a9325633e96ccaab2a6cecad54ca695e23b1, without this line
+ * Text: sha256 1f6b6472d1651f0984dd6fbe6ceb3906ec9d2ae91ef83a7d8088fdef90245c7f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
  * self-contained
  *
  * Precision: a drive code is 0.000122074 V, an output code 0.000390476 um; against the exact model
- *     forward within 0.5048 output codes = 0.0001971 um
- *     inverse within 48.23 drive codes = 0.005888 V
- * Range: every sum of products stays below 2^61 in magnitude (64 bits hold 2^63),
- *     inputs of plays between -351039069 and 390067229, 44 fraction bits of an output code
+ *     forward within 0.5167 output codes = 0.0002018 um
+ *     inverse within 48.63 drive codes = 0.005937 V
+ * Range: every sum of products stays below 2^48 in magnitude (64 bits hold 2^63),
+ *     inputs of plays between -21939949 and 24379209, 31 fraction bits of an output code
  *
  * Cost (32-bit target):
- *     code at -O2       about 3357 bytes on a Cortex-M0+, 3225 on a Cortex-M4F, as measured for
+ *     code at -O2       about 3157 bytes on a Cortex-M0+, 2897 on a Cortex-M4F, as measured for
  *         such a model
  *     constant tables   2094 bytes
- *     inverse instance  200 bytes of RAM
+ *     inverse instance  176 bytes of RAM
  *     inverse step, worst case: 11 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
  *         3 the bits of n)
- * On an 8-bit AVR constants lie in RAM too: at most 2219 bytes of RAM in all, 36 of them for each
+ * On an 8-bit AVR constants lie in RAM too: at most 2201 bytes of RAM in all, 33 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
@@ -59,7 +59,7 @@ typedef int64_t curved_sum_t;
 #define CURVED_DRIVE_MAX 32767
 #define CURVED_OUTPUT_MIN (-28995) /* output codes, over every drive history in range */
 #define CURVED_OUTPUT_MAX 32767
-#define CURVED_INVERSE_MAX_ERROR_LSB 48.232 /* against the double model, drive codes */
+#define CURVED_INVERSE_MAX_ERROR_LSB 48.632 /* against the double model, drive codes */
 
 /* Sticky bits of the status functions */
 #define CURVED_STATUS_INPUT_CLAMPED 1u  /* the input was out of range and was limited */
@@ -76,8 +76,8 @@ typedef struct {
     bool rising; /* direction of the present move */
 } curved_place_t;
 
-/* A place on the present move where another play begins to follow, or where the move is now: from
-   there on plays 0 .. k do and `depth` corners hold the others. */
+/* A place, as the present move sees it, where another play begins to follow, or where the move is
+   now: from there on plays 0 .. k do and `depth` corners hold the others. */
 typedef struct {
     int64_t output;
     int64_t input;
@@ -88,10 +88,11 @@ typedef struct {
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
  * play `top`. */
 typedef struct {
-    int64_t output; /* at the turning point */
+    int32_t high; /* output at the turning point: high 2^16 + low */
     int32_t input;
-    uint_least16_t top;
-    bool rose; /* whether a rising move ended here, or a falling one */
+    unsigned int low : 16;
+    unsigned int top : 15;
+    bool rose : 1; /* whether a rising move ended here, or a falling one */
 } curved_corner_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */

@@ -5,14 +5,13 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 ad3e88a8207ff946893272b6bd63f0accc1f0641782084b6762af6cc65ee730f, without this line
+ * Text: sha256 26c99048d2fb40d22d81fb79e867f468879b59abb5d51af9b53850b6b2e5b379, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
 
 /* Products are rounded before they are added, whatever the compiler's default is. */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC push_options
 #pragma GCC optimize("fp-contract=off")
 #else
 #pragma STDC FP_CONTRACT OFF
@@ -23,9 +22,7 @@
 /* Whether each operation of a number is a call of a library. */
 #if (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) ||    \
     defined(__AVR__)
-#define PLAIN_SOFT_FLOAT 1
-#else
-#define PLAIN_SOFT_FLOAT 0
+#define PLAIN_SOFT_FLOAT
 #endif
 
 #if defined(__GNUC__)
@@ -34,8 +31,7 @@
 #define PLAIN_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
- * line. */
+/* Play k begins to follow this far from a turning point; from there to the next is a line. */
 typedef struct {
     plain_real_t way;   /* of the input: 2 r_k of the drive, or 2 z_k of the output */
     plain_real_t reach; /* of the output, the other one of them */
@@ -51,20 +47,18 @@ typedef struct {
     plain_real_t range[2];  /* of the input */
 } plain_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does,
-   one for each play (step 1), or one for all where they hold the same (step 0). Plays up to `risen`
-   are left by rising moves, the others by falling ones. */
+/* A start memory. `center`: input and output of the sum while plays 0 .. k do what play k does. */
 typedef struct {
     const plain_real_t (*center)[2];
-    uint_least16_t step;
-    uint_least16_t risen;
+    uint_least16_t step;  /* 1: a center for each play, 0: one for all, which hold the same */
+    uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
     plain_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } plain_start_t;
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x)
 {
-#if PLAIN_SOFT_FLOAT
+#ifdef PLAIN_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
     return m->sign * x;
@@ -87,6 +81,7 @@ static void plain_forget_line(plain_plays_t *m)
     m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
+    m->behind = m->here.input;
 }
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
@@ -115,8 +110,7 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of
- * segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
                                        unsigned int last, plain_real_t x)
 {
@@ -130,8 +124,7 @@ static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
     return k;
 }
 
-/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if
- * that comes first. */
+/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
                                      const plain_corner_t *corner, plain_real_t output,
                                      plain_real_t input)
@@ -173,8 +166,7 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
     plain_stop_in_block(t, m, corner, output, plain_along(m, FLT_MAX));
 }
 
-/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop
- * them there. */
+/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
                                      plain_corner_t *corner, plain_real_t input)
 {
@@ -200,35 +192,41 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     }
     plain_real_t cap = c->pass[rising];
     plain_real_t next = cap;
+    plain_real_t begin = cap;
+    plain_real_t start = plain_along(m, c->output);
     unsigned int k = m->here.k;
-    if (c->rose == rising) {
-        /* no play follows before the input is back at the corner, then all of its block do */
-        m->begin = plain_along(m, cap);
-        m->start = c->output;
-    } else {
-        k = plain_find_segment(&t->segment[1].way, k, c->top - 1u, x + c->pass[!rising]);
-        m->from = -plain_along(m, c->pass[!rising]);
-        m->base = c->output;
+    m->behind = input;
+    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
+        const plain_real_t from = c->pass[!rising];
+        const plain_real_t room = t->inside[rising] - start;
+        k = plain_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
         const plain_segment_t *s = &t->segment[k];
-        m->begin = m->from + plain_along(m, s->way);
-        m->start = m->base + plain_along(m, s->reach);
-        next = s[1].way - c->pass[!rising];
-        cap = t->segment[c->top].way - c->pass[!rising];
-        const plain_real_t room = t->inside[rising] - plain_along(m, m->base);
+        begin = s->way - from;
+        start = start + s->reach;
+        next = s[1].way - from;
+        cap = t->segment[c->top].way - from;
         if (t->segment[c->top].reach > room) {
             /* gains fall from segment to segment: the limit lies here or beyond */
-            cap = plain_along(m, m->begin) + (room - s->reach) * s->slope;
+            cap = begin + (room - s->reach) * s->slope;
+        }
+        m->from = -plain_along(m, from);
+        m->base = c->output;
+        if (k == 0 && from <= t->range[!rising]) {
+            m->behind = m->from; /* back to the corner it is the same line */
         }
     }
+    m->begin = plain_along(m, begin);
+    m->start = plain_along(m, start);
     m->gain = t->segment[k].gain;
     const plain_real_t output = m->start + (input - m->begin) * m->gain;
     if (plain_along(m, output) > t->limit[rising]) {
         return false;
     }
-    const bool back = plain_along(m, output) <
-                      plain_along(m, m->here.output); /* by rounding: no move leads back */
-    cap = back ? x : cap;
-    m->here.output = back ? m->here.output : output;
+    if (plain_along(m, output) < plain_along(m, m->here.output)) {
+        cap = x; /* by rounding: no move leads back */
+    } else {
+        m->here.output = output;
+    }
     cap = t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = plain_along(m, cap);
     m->next = plain_along(m, next < cap ? next : cap);
@@ -237,8 +235,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     return true;
 }
 
-/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a
- * search is faster. */
+/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
 PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input)
 {
     const plain_real_t way = plain_along(m, input - m->from);
@@ -263,8 +260,7 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     return true;
 }
 
-/* Start memory. Each play is a block of its own, as if left by a move that ended where the play
- * begins to follow. */
+/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
                              plain_corner_t *corner, const plain_start_t *start)
 {
@@ -298,13 +294,10 @@ static const plain_segment_t plain_inverse_segment[8] = {
     {5.399993f, 3.599997f, 0.41666666f, 2.4f}, {7.559993f, 4.499997f, 0.3968254f, 2.52f},
     {9.827992f, 5.399997f, 0.3949447f, 2.532f}, {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
 };
-
 static const plain_curve_t plain_inverse_curve = {
     plain_inverse_segment, {4.0f, 4.0f}, {3.9999723f, 3.9999723f}, {8.2056f, 8.2056f}
 };
-
 static const plain_real_t plain_inverse_init_center[1][2] = {{0.0f, 0.0f}};
-
 static const plain_start_t plain_inverse_start[2] = {
     {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}},
     {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}}
@@ -314,9 +307,8 @@ static const plain_start_t plain_inverse_start[2] = {
 
 static plain_real_t plain_clamp_drive(plain_real_t v)
 {
-    return (plain_real_t)(v < PLAIN_DRIVE_MIN   ? PLAIN_DRIVE_MIN
-                          : v > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX
-                                                : v);
+    return (plain_real_t)(v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v > PLAIN_DRIVE_MAX
+                          ? PLAIN_DRIVE_MAX : v);
 }
 
 /* Any other sample than a usual one. */
@@ -364,20 +356,21 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
 {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;
-    if (m->here.rising ? x > m->here.input : x < m->here.input) {
-        if (m->here.rising ? x < m->next : x > m->next) {
-            /* the usual sample: the same plays follow */
-            self->before = m->here.input;
-            m->here.input = x;
-            m->here.output = m->start + (x - m->begin) * m->gain;
+    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
+    if (on ? (m->here.rising ? x < m->next : x > m->next)
+        : m->here.k == 0 && (m->here.rising ? x > m->behind && x < m->here.input
+                             : x < m->behind && x > m->here.input)) {
+        /* the usual sample: the same plays follow */
+        self->before = m->here.input;
+        m->here.input = x;
+        m->here.output = m->start + (x - m->begin) * m->gain;
+        return m->here.output;
+    }
+    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
+        plain_copy_place(&self->undo, &m->here);
+        self->before = x;
+        if (plain_move_in_block(&plain_inverse_curve, m, x)) {
             return m->here.output;
-        }
-        if (m->here.rising ? x < m->cap : x > m->cap) {
-            plain_copy_place(&self->undo, &m->here);
-            self->before = x;
-            if (plain_move_in_block(&plain_inverse_curve, m, x)) {
-                return m->here.output;
-            }
         }
     }
     return plain_inverse_search(self, u);
@@ -437,9 +430,3 @@ unsigned int plain_inverse_status(plain_inverse_t *self)
     self->status = 0;
     return status;
 }
-
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC pop_options
-#else
-#pragma STDC FP_CONTRACT DEFAULT
-#endif

@@ -5,18 +5,18 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 ce611df2bb471467ac8bfc4aa584b7c929a68773245d91085e46db86b4d0aceb, without this line
+ * Text: sha256 e0c0556860fb71ec6a637728f04ff66faa61b1b2fc700ffab1a381363dcb8be5, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
  *
  * Cost (32-bit target):
- *     code at -O2       about 3544 bytes on a Cortex-M0+, 3060 on a Cortex-M4F, as measured for
+ *     code at -O2       about 3548 bytes on a Cortex-M0+, 3148 on a Cortex-M4F, as measured for
  *         such a model
  *     constant tables   212 bytes
- *     inverse instance  196 bytes of RAM
+ *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 16 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
- * On an 8-bit AVR constants lie in RAM too: at most 380 bytes of RAM in all, 31 of them for each
+ * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
@@ -100,9 +100,10 @@ typedef struct {
 /* The place of the play sum, and the line that its next outputs lie on. */
 typedef struct {
     plain_place_t here;
-    plain_real_t next; /* input up to which the same plays follow and nothing is limited */
-    plain_real_t cap;  /* input up to which the same corner counts and nothing is limited */
-    plain_real_t from; /* input and output that the top corner's block counts from */
+    plain_real_t next;   /* input up to which the same plays follow and nothing is limited */
+    plain_real_t cap;    /* input up to which the same corner counts and nothing is limited */
+    plain_real_t behind; /* while no play follows: input on the other side, likewise */
+    plain_real_t from;   /* input and output that the top corner's block counts from */
     plain_real_t base;
     plain_real_t begin; /* output = start + (input - begin) gain */
     plain_real_t start;

@@ -5,20 +5,20 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 4b462d3e6e9c1e4a03172e9ad25947ed3876d5bd1942b24d28ea8e5fcbd70ace, without this line
+ * Text: sha256 c397a6ec1a9f26b8e9903e25fe5d107b841717dd744180c83f78a9ea8148ee56, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
  * single-header
  *
  * Cost (32-bit target):
- *     code at -O2       about 5176 bytes on a Cortex-M0+, 4400 on a Cortex-M4F, as measured for
+ *     code at -O2       about 5148 bytes on a Cortex-M0+, 4468 on a Cortex-M4F, as measured for
  *         such a model
  *     constant tables   832 bytes
- *     inverse instance  216 bytes of RAM
+ *     inverse instance  220 bytes of RAM
  *     inverse step, worst case: 31 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
  *         1 tanh, 2 atanh
- * On an 8-bit AVR constants lie in RAM too: at most 1012 bytes of RAM in all, 31 of them for each
+ * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in all, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
@@ -108,8 +108,10 @@ typedef struct {
 typedef struct {
     two_branches_place_t here;
     two_branches_real_t next; /* input up to which the same plays follow and nothing is limited */
-    two_branches_real_t cap;  /* input up to which the same corner counts and nothing is limited */
-    two_branches_real_t from; /* input and output that the top corner's block counts from */
+    /* input up to which the same corner counts and nothing is limited */
+    two_branches_real_t cap;
+    two_branches_real_t behind; /* while no play follows: input on the other side, likewise */
+    two_branches_real_t from;   /* input and output that the top corner's block counts from */
     two_branches_real_t base;
     two_branches_real_t begin; /* output = start + (input - begin) gain */
     two_branches_real_t start;
@@ -159,9 +161,12 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #if defined(TWO_BRANCHES_IMPLEMENTATION) && !defined(TWO_BRANCHES_IMPLEMENTED)
 #define TWO_BRANCHES_IMPLEMENTED
 
-/* Products are rounded before they are added, whatever the compiler's default is. */
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
+#endif
+
+/* Products are rounded before they are added, whatever the compiler's default is. */
+#if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC optimize("fp-contract=off")
 #else
 #pragma STDC FP_CONTRACT OFF
@@ -172,9 +177,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 /* Whether each operation of a number is a call of a library. */
 #if (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) ||    \
     defined(__AVR__)
-#define TWO_BRANCHES_SOFT_FLOAT 1
-#else
-#define TWO_BRANCHES_SOFT_FLOAT 0
+#define TWO_BRANCHES_SOFT_FLOAT
 #endif
 
 #if defined(__GNUC__)
@@ -184,8 +187,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; until play k + 1 does, outputs lie on a
- * line. */
+/* Play k begins to follow this far from a turning point; from there to the next is a line. */
 typedef struct {
     two_branches_real_t way;   /* of the input: 2 r_k of the drive, or 2 z_k of the output */
     two_branches_real_t reach; /* of the output, the other one of them */
@@ -202,13 +204,11 @@ typedef struct {
     two_branches_real_t range[2]; /* of the input */
 } two_branches_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k hold what play k does,
-   one for each play (step 1), or one for all where they hold the same (step 0). Plays up to `risen`
-   are left by rising moves, the others by falling ones. */
+/* A start memory. `center`: input and output of the sum while plays 0 .. k do what play k does. */
 typedef struct {
     const two_branches_real_t (*center)[2];
-    uint_least16_t step;
-    uint_least16_t risen;
+    uint_least16_t step;  /* 1: a center for each play, 0: one for all, which hold the same */
+    uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
     two_branches_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } two_branches_start_t;
 
@@ -394,7 +394,7 @@ static two_branches_real_t two_branches_envelope_inverse(const two_branches_enve
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
                                                      two_branches_real_t x)
 {
-#if TWO_BRANCHES_SOFT_FLOAT
+#ifdef TWO_BRANCHES_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
     return m->sign * x;
@@ -417,6 +417,7 @@ static void two_branches_forget_line(two_branches_plays_t *m)
     m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
+    m->behind = m->here.input;
 }
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
@@ -448,8 +449,7 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x; `step` is the way, or the reach, of
- * segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int two_branches_find_segment(const two_branches_real_t *step, unsigned int k,
                                               unsigned int last, two_branches_real_t x)
 {
@@ -463,8 +463,7 @@ static unsigned int two_branches_find_segment(const two_branches_real_t *step, u
     return k;
 }
 
-/* Stops the present move inside the top corner's block: where the sum is `output`, or at `input` if
- * that comes first. */
+/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    const two_branches_corner_t *corner,
@@ -510,8 +509,7 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
     two_branches_stop_in_block(t, m, corner, output, two_branches_along(m, FLT_MAX));
 }
 
-/* Moves the plays to any input. Returns false where the limit comes first, for the caller to stop
- * them there. */
+/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_corner_t *corner,
@@ -539,35 +537,41 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     }
     two_branches_real_t cap = c->pass[rising];
     two_branches_real_t next = cap;
+    two_branches_real_t begin = cap;
+    two_branches_real_t start = two_branches_along(m, c->output);
     unsigned int k = m->here.k;
-    if (c->rose == rising) {
-        /* no play follows before the input is back at the corner, then all of its block do */
-        m->begin = two_branches_along(m, cap);
-        m->start = c->output;
-    } else {
-        k = two_branches_find_segment(&t->segment[1].way, k, c->top - 1u, x + c->pass[!rising]);
-        m->from = -two_branches_along(m, c->pass[!rising]);
-        m->base = c->output;
+    m->behind = input;
+    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
+        const two_branches_real_t from = c->pass[!rising];
+        const two_branches_real_t room = t->inside[rising] - start;
+        k = two_branches_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
         const two_branches_segment_t *s = &t->segment[k];
-        m->begin = m->from + two_branches_along(m, s->way);
-        m->start = m->base + two_branches_along(m, s->reach);
-        next = s[1].way - c->pass[!rising];
-        cap = t->segment[c->top].way - c->pass[!rising];
-        const two_branches_real_t room = t->inside[rising] - two_branches_along(m, m->base);
+        begin = s->way - from;
+        start = start + s->reach;
+        next = s[1].way - from;
+        cap = t->segment[c->top].way - from;
         if (t->segment[c->top].reach > room) {
             /* gains fall from segment to segment: the limit lies here or beyond */
-            cap = two_branches_along(m, m->begin) + (room - s->reach) * s->slope;
+            cap = begin + (room - s->reach) * s->slope;
+        }
+        m->from = -two_branches_along(m, from);
+        m->base = c->output;
+        if (k == 0 && from <= t->range[!rising]) {
+            m->behind = m->from; /* back to the corner it is the same line */
         }
     }
+    m->begin = two_branches_along(m, begin);
+    m->start = two_branches_along(m, start);
     m->gain = t->segment[k].gain;
     const two_branches_real_t output = m->start + (input - m->begin) * m->gain;
     if (two_branches_along(m, output) > t->limit[rising]) {
         return false;
     }
-    const bool back = two_branches_along(m, output) <
-                      two_branches_along(m, m->here.output); /* by rounding: no move leads back */
-    cap = back ? x : cap;
-    m->here.output = back ? m->here.output : output;
+    if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
+        cap = x; /* by rounding: no move leads back */
+    } else {
+        m->here.output = output;
+    }
     cap = t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = two_branches_along(m, cap);
     m->next = two_branches_along(m, next < cap ? next : cap);
@@ -576,8 +580,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     return true;
 }
 
-/* Moves on to an input short of `cap`: more plays of the same block follow. Returns false where a
- * search is faster. */
+/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
 TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_real_t input)
@@ -610,16 +613,16 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
                                                    two_branches_corner_t *corner,
                                                    two_branches_real_t input)
 {
-    if (m->here.rising ? input > m->here.input : input < m->here.input) {
-        if (m->here.rising ? input < m->next : input > m->next) {
-            m->here.input = input;
-            m->here.output = m->start + (input - m->begin) * m->gain;
-            return m->here.output;
-        }
-        if ((m->here.rising ? input < m->cap : input > m->cap) &&
-            two_branches_move_in_block(t, m, input)) {
-            return m->here.output;
-        }
+    const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
+    if (on ? (m->here.rising ? input < m->next : input > m->next)
+        : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
+        m->here.input = input;
+        m->here.output = m->start + (input - m->begin) * m->gain;
+        return m->here.output;
+    }
+    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
+        two_branches_move_in_block(t, m, input)) {
+        return m->here.output;
     }
     if (input < m->here.input || input > m->here.input) {
         (void)two_branches_move_to_input(t, m, corner, input);
@@ -627,8 +630,7 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, as if left by a move that ended where the play
- * begins to follow. */
+/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_branches_plays_t *m,
                                            two_branches_corner_t *corner,
                                            const two_branches_start_t *start)
@@ -663,27 +665,21 @@ static const two_branches_segment_t two_branches_inverse_segment[8] = {
     {5.3999896f, 3.5999956f, 0.41666666f, 2.4f}, {7.5599895f, 4.4999957f, 0.3968254f, 2.52f},
     {9.82799f, 5.399996f, 0.3949447f, 2.532f}, {1.7014117e+38f, 1.7014117e+38f, 0.0f, 0.0f}
 };
-
 static const two_branches_curve_t two_branches_inverse_curve = {
     two_branches_inverse_segment, {3.4028235e+38f, 3.4028235e+38f},
     {3.4028235e+38f, 3.4028235e+38f}, {3.4028235e+38f, 3.4028235e+38f}
 };
-
 static const two_branches_real_t two_branches_inverse_init_center[1][2] = {{0.0f, 0.0f}};
-
 static const two_branches_start_t two_branches_inverse_start[2] = {
     {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}},
     {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}}
 };
-
 static const two_branches_drive_t two_branches_inverse_drive[2] = {{-0.33336422f, 0.0f, true},
                                                                    {-0.33336422f, 0.0f, true}};
-
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
 static const two_branches_envelope_t two_branches_stage_1_ascending = {
     6.0f, 0.4f, 0.1f, 0.2f, 0.16666667f, 2.5f, 0.99999994f
 };
-
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
 static const two_branches_envelope_t two_branches_stage_1_descending = {
     6.0f, 0.4f, 0.1f, 0.5f, 0.16666667f, 2.5f, 0.99999994f
@@ -715,9 +711,8 @@ static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, boo
 
 static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v)
 {
-    return (two_branches_real_t)(v < TWO_BRANCHES_DRIVE_MIN   ? TWO_BRANCHES_DRIVE_MIN
-                                 : v > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX
-                                                              : v);
+    return (two_branches_real_t)(v < TWO_BRANCHES_DRIVE_MIN ? TWO_BRANCHES_DRIVE_MIN
+                                 : v > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX : v);
 }
 
 /* Whether going to v is a move of the branch that v was computed on. */
@@ -725,9 +720,8 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
                                       bool ascending)
 {
     const two_branches_real_t inside = two_branches_clamp_drive(v);
-    return inside > self->drive   ? ascending
-           : inside < self->drive ? !ascending
-                                  : self->ascending == ascending;
+    return inside > self->drive ? ascending : inside < self->drive ? !ascending
+        : self->ascending == ascending;
 }
 
 /* The drive that gives w on the branch of its own move: that of the reference's move is tried
@@ -809,9 +803,8 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
     }
     two_branches_inverse_keep(self);
     if (!self->repeat || u < self->reference || u > self->reference) {
-        const two_branches_real_t level = u < TWO_BRANCHES_OUTPUT_MIN   ? TWO_BRANCHES_OUTPUT_MIN
-                                     : u > TWO_BRANCHES_OUTPUT_MAX ? TWO_BRANCHES_OUTPUT_MAX
-                                                              : u;
+        const two_branches_real_t level = u < TWO_BRANCHES_OUTPUT_MIN ? TWO_BRANCHES_OUTPUT_MIN
+            : u > TWO_BRANCHES_OUTPUT_MAX ? TWO_BRANCHES_OUTPUT_MAX : u;
         const two_branches_real_t w = two_branches_plays_step(&two_branches_inverse_curve,
                                                               &self->plays, self->corner,
                                                               level - TWO_BRANCHES_OFFSET);
