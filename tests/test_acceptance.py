@@ -20,23 +20,10 @@ from scipy.signal import lfilter
 from scipy.stats import wilcoxon
 
 from hystgen.diagnosis import Diagnosis
-from hystgen.diagnosis.data import (
-    bad_samples,
-    channels,
-    disturbances,
-    drives,
-    held_out,
-    lines,
-    periodic,
-    ripple,
-    spectra,
-    starts,
-    stick_slip,
-    thinning,
-)
-from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.data.noise_floor import noise_floor
+from hystgen.diagnosis.data import claims, disturbances, preparing, signals
+from hystgen.diagnosis.data.items import Item, needed
 from hystgen.diagnosis.data.preparing import Prepared, prepare
+from hystgen.diagnosis.data.signals import noise_floor
 from hystgen.diagnosis.findings import content, residual, stretches
 from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
 from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
@@ -344,11 +331,11 @@ def test_plays_of_a_fit() -> None:
 class TestHeldOut:
     @pytest.mark.parametrize(("samples", "enough"), [(120, True), (80, False)])
     def test_enough_to_compare(self, samples: int, enough: bool) -> None:
-        assert held_out.enough([SimpleNamespace(used=samples)]) is enough  # type: ignore[list-item]
+        assert preparing.enough([SimpleNamespace(used=samples)]) is enough  # type: ignore[list-item]
 
     def test_the_end_of_a_record(self) -> None:
         """A little less than a third of it."""
-        (beginning,), (end,) = held_out.parted([sine(1000)])
+        (beginning,), (end,) = preparing.parted([sine(1000)])
         assert 200 < np.count_nonzero(end.known) < 334
         assert np.count_nonzero(beginning.known) + np.count_nonzero(end.known) == 1000
 
@@ -358,7 +345,7 @@ class TestHeldOut:
         v = np.linspace(0.0, 100.0, 101)
         rates = [1.0, rate, 0.1, 0.1, 0.1, 0.1]
         given = [Record(f"r{k}", np.arange(101) / rate, v, v) for k, rate in enumerate(rates)]
-        assert held_out.set_aside(given) == aside
+        assert preparing.set_aside(given) == aside
 
 
 class TestNominal:
@@ -437,7 +424,7 @@ def test_what_limits_the_start_of_an_effect() -> None:
 def needed(v: Array, y: Array, noise: float, column: Array | None = None) -> NDArray[np.bool_]:
     """Samples that are needed of a record that a model predicts exactly."""
     run = Run(np.arange(len(v)) * 1e-3, v, {} if column is None else {"temperature": column})
-    return thinning.needed([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
+    return needed([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
 
 
 class TestThinning:
@@ -469,7 +456,7 @@ class TestThinning:
         left = np.zeros(65)
         left[1::2] = np.sqrt(2.0) * rms * 0.01
         item = Item("r", Run(np.arange(65) * 1e-3, self.v), 0.1 * self.v + left, None, 10.0)
-        (mask,) = thinning.needed([item], [left], 0.01)
+        (mask,) = needed([item], [left], 0.01)
         assert (np.count_nonzero(mask) > 60) == seen
 
     def test_the_longest_stretch(self) -> None:
@@ -571,8 +558,8 @@ def good(width: float = 100.0) -> list[Record]:
     return [record(f"good{k}", width * smooth(k), 0.1 * width * smooth(k)) for k in range(3)]
 
 
-def kinds_of(records: Sequence[Record], predict: channels.Predict = straight) -> list[tuple[str, str]]:
-    return [(each.kind, str(each.entry()["record"])) for each in channels.checked(records, predict)[1]]
+def kinds_of(records: Sequence[Record], predict: claims.Predict = straight) -> list[tuple[str, str]]:
+    return [(each.kind, str(each.entry()["record"])) for each in claims.checked(records, predict)[1]]
 
 
 class TestWholeRecords:
@@ -632,7 +619,7 @@ class TestWholeRecords:
         area = 0.5 * abs(float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1])))
         noise = area / sigmas / (0.5 * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))))
         y = y + np.random.default_rng(1).normal(0.0, noise, len(y))
-        assert (channels._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
+        assert (claims._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
 
     @pytest.mark.parametrize(
         ("share", "scatters", "left_out"),
@@ -642,16 +629,16 @@ class TestWholeRecords:
         random = np.random.default_rng(4)
         x = random.uniform(-1.0, 1.0, 4000)
         y = x + random.normal(0.0, 0.05, 4000)
-        without = channels._line(x, y)[1]
+        without = claims._line(x, y)[1]
         y[: int(4000 * share)] = x[: int(4000 * share)] + 0.05 * scatters
-        assert (channels._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
+        assert (claims._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
 
     @pytest.mark.parametrize(("share", "kind"), [(0.007, "saturated"), (0.014, "held_samples")])
     def test_a_converter_ends_at_its_end(self, share: float, kind: str) -> None:
         """Another record goes beyond it by a share of the range."""
         items = [Item(name, Run(np.arange(3.0), np.arange(3.0)), np.array([0.0, 1.0, top]), None, 10.0)
                  for name, top in (("a", 10.0 * (1.0 - share)), ("b", 10.0))]  # fmt: skip
-        (each,) = bad_samples.not_at_the_end([Saturated("a", None, "largest", 10.0 * (1.0 - share), 5)], items)
+        (each,) = preparing.not_at_the_end([Saturated("a", None, "largest", 10.0 * (1.0 - share), 5)], items)
         assert each.kind == kind
 
     @pytest.mark.parametrize(("rest", "foreign"), [(0.14, False), (0.16, True)])
@@ -663,7 +650,7 @@ class TestWholeRecords:
             error = np.where(np.arange(400) < settled(v, 10.0), start, rest) * np.resize([1.0, -1.0], 400)
             return SimpleNamespace(reach=10.0, errors=lambda _: [error])
 
-        assert (starts.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
+        assert (claims.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
 
 
 def _orthogonal(x: Array, to: Array) -> Array:
@@ -700,7 +687,7 @@ def of_share(share: float) -> float:
 
 
 def heard(item: Item, error: Array) -> list[float]:
-    return sorted(frequency for _, frequency in spectra.peaks(item, error))
+    return sorted(frequency for _, frequency in signals.peaks(item, error))
 
 
 class TestSpectra:
@@ -779,45 +766,45 @@ class TestSpectra:
     @pytest.mark.parametrize(("apart", "number"), [(0.013, 1), (0.03, 2)])
     def test_ringing_at_nearly_the_same_frequency(self, apart: float, number: int) -> None:
         errors = [tone(f, 20_000) + 0.3 * hiss(20_000) for f in (100.0, 100.0 * (1.0 + apart))]
-        found = spectra.ringing([ramp(20_000), ramp(20_000)], errors, 5)
+        found = signals.ringing([ramp(20_000), ramp(20_000)], errors, 5)
         assert len([f for f in found if 99.0 < f < 104.0]) == number
 
     @pytest.mark.parametrize(("samples", "repeats"), [(80, True), (50, False)])
     def test_a_short_drive_does_not_repeat(self, samples: int, repeats: bool) -> None:
         v = np.cos(2.0 * np.pi * np.arange(samples) / 20.0)
-        assert (spectra.repetition(v) == 20) is repeats
+        assert (signals.repetition(v) == 20) is repeats
 
     @pytest.mark.parametrize(("noise", "repeats"), [(0.7, True), (1.4, False)])
     def test_a_noisy_drive_repeats(self, noise: float, repeats: bool) -> None:
         """Of a range of 100, rms between periods."""
         v = np.tile(np.interp(np.arange(500), [0, 100, 250, 400, 500], [0.0, 100.0, 20.0, 70.0, 0.0]), 6)
-        assert (spectra.repetition(v + noise / np.sqrt(2.0) * hiss(3000)) is not None) is repeats
+        assert (signals.repetition(v + noise / np.sqrt(2.0) * hiss(3000)) is not None) is repeats
 
     @pytest.mark.parametrize(("duty", "repeats"), [(0.05, True), (0.015, False)])
     def test_a_drive_that_mostly_rests(self, duty: float, repeats: bool) -> None:
         """It differs from itself by the root of twice that, rms."""
         v = np.tile(np.where(np.arange(400) < 400 * duty, 1.0, 0.0), 6)
-        assert (spectra.repetition(v) is not None) is repeats
+        assert (signals.repetition(v) is not None) is repeats
 
 
 class TestLines:
     @pytest.mark.parametrize(("share", "ruled"), [(0.4, True), (0.2, False)])
     def test_a_line_rules(self, share: float, ruled: bool) -> None:
         error = tone(130.0, 4000, of_share(share)) + hiss(4000)
-        assert bool(periodic.ruling([ramp(4000)], [error])[0]) is ruled
+        assert bool(disturbances.ruling([ramp(4000)], [error])[0]) is ruled
 
     @pytest.mark.parametrize(("share", "rules"), [(0.4, True), (0.2, False)])
     def test_a_line_in_a_few_records(self, share: float, rules: bool) -> None:
         """In one of ten, unless it rules that one."""
         items = [ramp(2000, name=f"r{k}") for k in range(10)]
         errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(share)) if k == 0 else 0.0) for k in range(10)]
-        assert bool(periodic.lines(items, errors)[0]) is rules
+        assert bool(disturbances.lines(items, errors)[0]) is rules
 
     @pytest.mark.parametrize(("having", "seen"), [(5, True), (3, False)])
     def test_a_line_in_many_records(self, having: int, seen: bool) -> None:
         items = [ramp(2000, name=f"r{k}") for k in range(10)]
         errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(0.15)) if k < having else 0.0) for k in range(10)]
-        assert bool(periodic.lines(items, errors)[0]) is seen
+        assert bool(disturbances.lines(items, errors)[0]) is seen
 
     @pytest.mark.parametrize(("steady", "seen"), [(7, True), (5, False)])
     def test_steady_in_most_records(self, steady: int, seen: bool) -> None:
@@ -825,31 +812,31 @@ class TestLines:
         items = [ramp(2000, name=f"r{k}") for k in range(10)]
         fading = np.where(np.arange(2000) < 1000, 1.0, 0.0)
         errors = [3.0 * tone(130.0, 2000) * (1.0 if k < steady else fading) + hiss(2000, k) for k in range(10)]
-        assert (lines.steady(items, errors) is not None) is seen
+        assert (disturbances.steady(items, errors) is not None) is seen
 
     @pytest.mark.parametrize(("size", "seen"), [(0.46, True), (0.38, False)])
     def test_a_line_that_fades(self, size: float, seen: bool) -> None:
         """To this share of its amplitude: what one half predicts of the other is 0.58 or 0.39 of what that has."""
         error = tone(130.0, 4000) * np.where(np.arange(4000) < 2000, 1.0, size) + 0.05 * hiss(4000)
-        assert (lines.steady([ramp(4000)], [error]) is not None) is seen
+        assert (disturbances.steady([ramp(4000)], [error]) is not None) is seen
 
     def test_four_lines(self) -> None:
         error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(6)) + 0.1 * hiss(4000)
-        assert len(periodic.lines([ramp(4000)], [error])[0]) == 4
+        assert len(disturbances.lines([ramp(4000)], [error])[0]) == 4
 
     @pytest.mark.parametrize(("rate", "size"), [(1080.0, 1.5), (945.0, 1.0)])
     def test_two_samples_a_period_do_not_show_an_amplitude(self, rate: float, size: float) -> None:
         """A line of 450 Hz, twice as large in the record with the other sampling rate."""
         items = [ramp(4000, 1.0 / 2000.0, "a"), ramp(4000, 1.0 / rate, "b")]
         errors = [tone(450.0, 4000, 1.0, 1.0 / 2000.0), tone(450.0, 4000, 2.0, 1.0 / rate)]
-        (line, *_), _ = periodic.lines(items, [e + 0.1 * hiss(4000, k) for k, e in enumerate(errors)])
+        (line, *_), _ = disturbances.lines(items, [e + 0.1 * hiss(4000, k) for k, e in enumerate(errors)])
         assert line.amplitude == pytest.approx(size, rel=0.1)
 
     @pytest.mark.parametrize(
         ("frequency", "mains"), [(50.08, 50.0), (50.15, None), (149.8, "3 x 50 Hz"), (59.97, 60.0)]
     )
     def test_mains(self, frequency: float, mains: object) -> None:
-        assert lines._mains(frequency, 1e-3) == mains
+        assert disturbances._mains(frequency, 1e-3) == mains
 
     @pytest.mark.parametrize(("frequency", "known"), [(103.0, True), (108.0, False)])
     def test_the_rest_of_a_line(self, frequency: float, known: bool) -> None:
@@ -877,7 +864,7 @@ def there_and_back(low: float, high: float, samples: int) -> Array:
 
 
 def pitches(made: Sequence[tuple[Item, Array]]) -> list[float]:
-    found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+    found = disturbances.in_position([item for item, _ in made], [error for _, error in made])
     return [] if found is None else [found.finding.place]
 
 
@@ -917,7 +904,7 @@ class TestRipple:
     @pytest.mark.parametrize(("beside", "step"), [(0.014, True), (0.03, False)])
     def test_a_pitch_of_the_converter(self, beside: float, step: bool) -> None:
         made = [rippled(there_and_back(0.0, 40.0, 2000), 1.0, k, 1.0 + beside) for k in range(3)]
-        found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+        found = disturbances.in_position([item for item, _ in made], [error for _, error in made])
         assert found is not None
         assert found.finding.place == pytest.approx(1.0, rel=0.005)
         assert found.finding.entry()["converter_step"] is step
@@ -944,7 +931,7 @@ def slips(moves: Array, change: Array, noise: float) -> bool:
     """Whether stick-slip is seen where the prediction moves so from sample to sample, and the error changes so."""
     predicted, error = (np.concatenate([[0.0], np.cumsum(x)]) for x in (moves, change))
     item = Item("r", Run(np.arange(len(error)) * 1e-3, predicted), predicted + error, None, 10.0)
-    return bool(stick_slip.stick_slip([item], [error], noise))
+    return bool(disturbances.stick_slip([item], [error], noise))
 
 
 def pattern(pairs: int, stretches: int, stands: float = 0.0, leaps: float = 2.2) -> list[float]:
@@ -1010,22 +997,22 @@ class TestDrives:
     @pytest.mark.parametrize(("turn", "number"), [(1.4, 0), (3.0, 2)])
     def test_a_small_turn(self, turn: float, number: int) -> None:
         v = np.interp(np.arange(300), [0, 100, 130, 299], [0.0, 50.0, 50.0 - turn, 100.0])
-        assert len(drives.reversals(v)) == number
+        assert len(signals.reversals(v)) == number
 
     @pytest.mark.parametrize(("top", "one"), [(93.0, True), (86.0, False)])
     def test_ends_of_loops(self, top: float, one: bool) -> None:
-        assert drives.one_loop([sweep(0, 100, 0, 100, 0), sweep(0, top, 0, top, 0)]) is one
+        assert signals.one_loop([sweep(0, 100, 0, 100, 0), sweep(0, top, 0, top, 0)]) is one
 
     @pytest.mark.parametrize(("slower", "one"), [(1.35, True), (1.8, False)])
     def test_speeds_of_loops(self, slower: float, one: bool) -> None:
-        assert drives.one_speed([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=slower)]) is one
+        assert signals.one_speed([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=slower)]) is one
 
     @pytest.mark.parametrize(("hold", "one"), [(50, True), (160, False)])
     def test_a_loop_that_stands_is_none(self, hold: int, one: bool) -> None:
         """Samples beside 200 of each move."""
         move = np.linspace(0.0, 100.0, 200)
         v = np.concatenate([move, np.full(hold, 100.0), move[::-1], np.zeros(hold)] * 3)
-        assert drives.one_loop([driven(v)]) is one
+        assert signals.one_loop([driven(v)]) is one
 
 
 def scattered(samples: int, seed: int = 0) -> Item:
@@ -1179,5 +1166,5 @@ def test_surroundings_of_ringing_that_fades(first: int, last: int, seen: bool) -
     for k in range(8 * first, 8 * last):
         spectrum[[1024 - k, 1024 + k]] *= 30.0
     spectrum[1020:1028] *= 40.0
-    found = spectra._fading(ramp(4096), np.fft.irfft(spectrum, 4096))
+    found = signals._fading(ramp(4096), np.fft.irfft(spectrum, 4096))
     assert any(abs(frequency - 250.0) < 3.0 for _, frequency in found) is seen

@@ -27,9 +27,9 @@ import hystgen
 from hystgen.basics import parallel
 from hystgen.diagnosis import Diagnosis
 from hystgen.diagnosis.data import preparing
-from hystgen.diagnosis.data.held_out import set_aside
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.noise_floor import noise_floor
+from hystgen.diagnosis.data.preparing import set_aside
+from hystgen.diagnosis.data.signals import noise_floor
 from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import Line
 from hystgen.diagnosis.findings.result import Errors, Gap, Result

@@ -16,9 +16,9 @@ from recordings import brute_output, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.diagnosis.data import bad_samples, channels, periodic, spectra, stick_slip
-from hystgen.diagnosis.data.drives import one_loop, one_speed, reversals
+from hystgen.diagnosis.data import claims, disturbances, preparing, signals
 from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.data.signals import one_loop, one_speed, reversals
 from hystgen.diagnosis.findings import intervals, residual
 from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, Saturated
 from hystgen.diagnosis.findings.kinds import Structure as Remaining
@@ -97,17 +97,17 @@ class TestSilence:
         items = session(colour)
         if grain:
             items = [changed(item, grain * np.round(item.y / grain)) for item in items]
-        same, told = bad_samples.without_faults(items, [])
+        same, told = preparing.without_faults(items, [])
         assert told == []
         assert same == items
         assert [stretches.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
-        assert periodic.lines(items, errors(items))[0] == []
-        assert stick_slip.stick_slip(items, errors(items), NOISE) == []
+        assert disturbances.lines(items, errors(items))[0] == []
+        assert disturbances.stick_slip(items, errors(items), NOISE) == []
 
     def test_without_noise(self) -> None:
         """Holds of a simulation are equal samples, and no fault."""
         items = [changed(item, plant(item.run.v)) for item in session()]
-        assert bad_samples.without_faults(items, [])[1] == []
+        assert preparing.without_faults(items, [])[1] == []
 
     def test_records_as_they_should_be(self) -> None:
         kept, told = check(records())
@@ -125,7 +125,7 @@ class TestWrongSamples:
             for a, b in runs:
                 y[a:b] = -3.0 if constant else -3.0 + noise(b - a, a)
             items[k] = changed(items[k], y)
-        clean, told = bad_samples.without_faults(items, [])
+        clean, told = preparing.without_faults(items, [])
         assert [each.record for each in told] == ["r0.csv", "r2.csv", "r3.csv"]
         for k, runs in places.items():
             each = of_kind(DropOuts, told, f"r{k}.csv")
@@ -144,10 +144,10 @@ class TestWrongSamples:
         v = np.repeat([0.0, 80.0, 20.0, 100.0, 40.0], 4000)
         y = lfilter([sum(down)], down, plant(v)) + noise(len(v), 5)
         item = Item("steps.csv", Run(np.arange(len(v)) * STEP, v), y, HISTORY, float(np.ptp(y)))
-        assert bad_samples.without_faults([item], [])[1] == []
+        assert preparing.without_faults([item], [])[1] == []
         y = y.copy()
         y[6000:6030] = -30.0
-        (each,) = bad_samples.without_faults([changed(item, y)], [])[1]
+        (each,) = preparing.without_faults([changed(item, y)], [])[1]
         assert (each.kind, each.samples) == ("drop_outs", 30)
 
     def test_held_samples(self) -> None:
@@ -157,7 +157,7 @@ class TestWrongSamples:
         for a, b in runs:
             y[a:b] = y[a]
         items[0] = changed(items[0], y)
-        clean, told = bad_samples.without_faults(items, [])
+        clean, told = preparing.without_faults(items, [])
         (each,) = told
         assert (each.kind, each.record, each.count) == ("held_samples", "r0.csv", 3)
         assert each.samples == sum(b - a for a, b in runs)
@@ -169,8 +169,8 @@ class TestWrongSamples:
         found = [stretches.rails(item.y, item.run.v) for item in items]
         assert found[0] == [("largest", 9.0)]
         repaired = [Saturated("r0.csv", None, "largest", 9.0, 1)]
-        assert bad_samples.not_at_the_end(repaired, items) == repaired
-        clean, told = bad_samples.without_faults(items, repaired)
+        assert preparing.not_at_the_end(repaired, items) == repaired
+        clean, told = preparing.without_faults(items, repaired)
         assert {each.kind for each in told} == {"saturated"}
         for item, left in zip(items, clean, strict=True):
             at = np.flatnonzero(item.y == 9.0)
@@ -179,7 +179,7 @@ class TestWrongSamples:
     def test_held_at_the_top_is_no_end_of_the_converter(self) -> None:
         items = session()
         repaired = [Saturated("r2.csv", None, "largest", 6.0, 30)]
-        (each,) = bad_samples.not_at_the_end(repaired, items)
+        (each,) = preparing.not_at_the_end(repaired, items)
         assert each == HeldSamples("r2.csv", None, 1, 30)
 
 
@@ -191,7 +191,7 @@ class TestPeriodic:
         items[:4] = [
             changed(item, item.y + 0.03 * np.sin(2 * np.pi * frequency * item.run.t + 1.0)) for item in humming
         ]
-        (line,), left = periodic.lines(items, errors(items))
+        (line,), left = disturbances.lines(items, errors(items))
         assert line.kind == "line"
         assert line.frequency == pytest.approx(frequency, abs=0.05)
         assert line.amplitude == pytest.approx(0.03, rel=0.06)
@@ -203,7 +203,7 @@ class TestPeriodic:
         items = [
             changed(item, item.y + 0.05 * np.sin(2 * np.pi * plant(item.run.v) / 0.4 + 0.7)) for item in session(0.5)
         ]
-        (ripple,), left = periodic.lines(items, errors(items))
+        (ripple,), left = disturbances.lines(items, errors(items))
         assert ripple.kind == "ripple"
         assert ripple.pitch == pytest.approx(0.4, rel=0.003)
         assert ripple.amplitude == pytest.approx(0.05, rel=0.06)
@@ -216,18 +216,18 @@ class TestPeriodic:
         v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 5000)
         still = Item("still.csv", Run(np.arange(len(v)) * STEP, v), plant(v) + noise(len(v), 7), HISTORY, 10.0)
         items = [*moving, still]
-        (ripple,), left = periodic.ruling(items, errors(items))
+        (ripple,), left = disturbances.ruling(items, errors(items))
         assert (ripple.pitch, ripple.amplitude) == (pytest.approx(0.4, rel=0.003), pytest.approx(0.05, rel=0.06))
         assert ripple.records == tuple(item.name for item in moving)
         assert np.std(np.concatenate(left[:-1])) == pytest.approx(NOISE, rel=0.1)
 
     def test_codes_of_a_converter_are_no_interpolation_error(self) -> None:
         items = [changed(item, 0.1 * np.round(item.y / 0.1)) for item in session(0.5)]
-        (ripple,), _ = periodic.lines(items, errors(items))
+        (ripple,), _ = disturbances.lines(items, errors(items))
         assert (ripple.pitch, ripple.converter_step) == (pytest.approx(0.1, rel=0.003), True)
         assert ripple.sentence("um").endswith("its pitch is the step of the converter")
         finer = [changed(item, item.y + 0.01 * np.sin(2 * np.pi * plant(item.run.v) / 0.1)) for item in session(0.5)]
-        (ripple,), _ = periodic.lines(finer, errors(finer))
+        (ripple,), _ = disturbances.lines(finer, errors(finer))
         assert ripple.converter_step is False
         assert "interpolation error" in ripple.sentence("um")
 
@@ -243,7 +243,7 @@ class TestPeriodic:
                 way = np.sign(np.gradient(v)) if ways == "turned" else 1.0
                 y = plant(v) + way * ripple + noise(len(t), k)
                 items.append(Item(f"r{k}", Run(t, v), y, HISTORY, 10.0))
-            made[ways] = [each for each in periodic.lines(items, errors(items))[0] if each.kind == "ripple"]
+            made[ways] = [each for each in disturbances.lines(items, errors(items))[0] if each.kind == "ripple"]
         assert len(made["both"]) == 1
         assert made["turned"] == []
 
@@ -256,11 +256,11 @@ class TestPeriodic:
         left = np.diff(v, prepend=0.0)[(np.arange(len(t)) // 2500) * 2500] * 0.05
         left = left * np.exp(-damping * omega * since) * np.cos(omega * since) + noise(len(t), 3)
         item = Item("steps.csv", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        (heard, *_) = spectra.ringing([item], [left], 3)
+        (heard, *_) = signals.ringing([item], [left], 3)
         assert heard == pytest.approx(47.0, rel=0.01)
-        assert periodic.ruling([item], [left])[0] == []
+        assert disturbances.ruling([item], [left])[0] == []
         steady = 0.2 * np.sin(2 * np.pi * 47.0 * t) + noise(len(t), 3)
-        (line,), rest = periodic.ruling([item], [steady])
+        (line,), rest = disturbances.ruling([item], [steady])
         assert line.frequency == pytest.approx(47.0, abs=0.01)
         assert np.std(rest[0]) == pytest.approx(NOISE, rel=0.02)
 
@@ -269,17 +269,17 @@ class TestPeriodic:
         v = 50.0 - 50.0 * np.cos(2 * np.pi * 5.0 * t)
         left = 0.05 * np.cos(2 * np.pi * 15.0 * t) + 0.03 * np.sin(2 * np.pi * 25.0 * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        assert [each for each in periodic.lines([item], [left])[0] if each.kind == "line"] == []
+        assert [each for each in disturbances.lines([item], [left])[0] if each.kind == "line"] == []
 
     @pytest.mark.parametrize(("frequency", "seen"), [(10.6, False), (13.0, True), (50.0, True)])
     def test_harmonics_of_a_drive_that_swells_are_no_lines(self, frequency: float, seen: bool) -> None:
         """It never repeats itself."""
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
         v = 50.0 - np.linspace(10.0, 50.0, len(t)) * np.cos(2 * np.pi * 5.3 * t)
-        assert spectra.repetition(v) is None
+        assert signals.repetition(v) is None
         left = 0.05 * np.cos(2 * np.pi * frequency * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        told = [each.frequency for each in periodic.lines([item], [left])[0] if each.kind == "line"]
+        told = [each.frequency for each in disturbances.lines([item], [left])[0] if each.kind == "line"]
         assert told == ([pytest.approx(frequency, abs=0.01)] if seen else [])
 
 
@@ -319,7 +319,7 @@ def test_stick_slip() -> None:
     for k in (0, 1):
         y, jumps[k] = sticking(plant(items[k].run.v), 0.3, k)
         items[k] = changed(items[k], y + noise(len(y), k))
-    found = stick_slip.stick_slip(items, errors(items), NOISE)
+    found = disturbances.stick_slip(items, errors(items), NOISE)
     assert [each.record for each in found] == ["r0.csv", "r1.csv"]
     for k, each in zip((0, 1), found, strict=True):
         assert each.count == pytest.approx(len(jumps[k]), rel=0.15)
@@ -330,9 +330,9 @@ def test_stick_slip() -> None:
 @pytest.mark.parametrize("tau", [5.0, 40.0])
 def test_a_lag_and_ringing_are_no_stick_slip(tau: float) -> None:
     items = [changed(item, lfilter(*_smooth(tau), item.y)) for item in session()]
-    assert stick_slip.stick_slip(items, errors(items), NOISE) == []
+    assert disturbances.stick_slip(items, errors(items), NOISE) == []
     ringing = [changed(item, lfilter([0.15], [1.0, -1.8, 0.95], item.y)) for item in session()]
-    assert stick_slip.stick_slip(ringing, errors(ringing), NOISE) == []
+    assert disturbances.stick_slip(ringing, errors(ringing), NOISE) == []
 
 
 def records() -> list[Record]:
@@ -347,7 +347,7 @@ def check(
 ) -> tuple[list[Record | None], list[Finding]]:
     """Against a nominal model that is 20 % off."""
     model = Actuator(np.array(THRESHOLDS), (), ()), 1.2 * np.array(weights)
-    return channels.checked(given, lambda record: nominal.predicted(record, *model, HISTORY))
+    return claims.checked(given, lambda record: nominal.predicted(record, *model, HISTORY))
 
 
 class TestWholeRecords:

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import arguments, threads
-from hystgen.diagnosis.data import channels, disturbances, preparing, starts
+from hystgen.diagnosis.data import claims, disturbances, preparing
 from hystgen.diagnosis.data.disturbances import Cleaned
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.noise_floor import NoiseFloor, noise_floor
 from hystgen.diagnosis.data.preparing import Prepared
+from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings import intervals
 from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import OtherHistory
@@ -85,7 +85,7 @@ def diagnose(
     before = None if history is None else visited(history)
     with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
         first = nominal.as_given(model.cascade, given)
-        usable, odd = channels.checked(read, lambda record: nominal.predicted(record, *first, before))
+        usable, odd = claims.checked(read, lambda record: nominal.predicted(record, *first, before))
         to_fit, to_hold = (
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
@@ -141,7 +141,7 @@ class _Task:
         wrong = self._foreign(history)
         if wrong is None:
             done = self._searched(history)
-            wrong = starts.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
+            wrong = claims.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
         if wrong is not None or done is None:
             try:
                 done = self._searched(None)
@@ -166,7 +166,7 @@ class _Task:
             others, refit_others = self._begun(None)
         except IdentificationError:  # everything that is compared depends on it
             return None
-        return starts.bends(ready.to_fit, refit(ready), refit_others(others))
+        return claims.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
         ready, refit = self._begun(history)

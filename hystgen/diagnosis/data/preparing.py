@@ -1,27 +1,29 @@
-"""Records made ready for the fits: what is fitted, what is held out, and what was done to them."""
+"""Records made ready for the fits: what is fitted, held out or left out, and a note about each."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.words import counted
 from hystgen.chain import chain
-from hystgen.diagnosis.data import bad_samples, held_out
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.findings.kinds import Finding, IsolatedSamples, Saturated
+from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, IsolatedSamples, Saturated
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
-from hystgen.identification import faults, pi, prepared, thresholds
+from hystgen.identification import faults, pi, prepared, stretches, thresholds
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
+from hystgen.identification.stretches import runs_of
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
-
+Kind = TypeVar("Kind", bound=Finding)
 
 @dataclass(frozen=True)
 class Prepared:
@@ -47,23 +49,23 @@ def prepare(
     """
     notes: list[str] = []
     held_courses, held_rails = _courses(holdout, history)
-    if holdout and len(records) > 2 and not held_out.enough(held_courses):
-        notes.append(held_out.too_little(held_courses, held_out.JUDGE))
+    if holdout and len(records) > 2 and not enough(held_courses):
+        notes.append(too_little(held_courses, JUDGE))
         holdout = []
     if not holdout and len(records) > 2:
-        aside = held_out.set_aside(records)
+        aside = set_aside(records)
         holdout = [records[k] for k in aside]
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
         held_courses, held_rails = _courses(holdout, history)
     fit_courses, fit_rails = _courses(records, history)
-    if not held_out.enough(fit_courses):
-        raise IdentificationError(held_out.too_little(fit_courses, "fit"))
-    if holdout and not held_out.enough(held_courses):
-        raise IdentificationError(held_out.too_little(held_courses, held_out.JUDGE))
-    if not holdout and not held_out.enough(fit_courses, acceptance.SET_ASIDE):
-        raise IdentificationError(held_out.too_little(fit_courses, f"fit and {held_out.JUDGE}", acceptance.SET_ASIDE))
+    if not enough(fit_courses):
+        raise IdentificationError(too_little(fit_courses, "fit"))
+    if holdout and not enough(held_courses):
+        raise IdentificationError(too_little(held_courses, JUDGE))
+    if not holdout and not enough(fit_courses, acceptance.SET_ASIDE):
+        raise IdentificationError(too_little(fit_courses, f"fit and {JUDGE}", acceptance.SET_ASIDE))
     repaired: list[Finding] = [*fit_rails, *held_rails]
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
@@ -78,7 +80,7 @@ def prepare(
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
     if not held:
-        to_fit, held = held_out.parted(to_fit)
+        to_fit, held = parted(to_fit)
         share = f"{100 * acceptance.SET_ASIDE:g} %"
         notes.append(f"no record was given that can judge: the last {share} of each is set aside")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
@@ -88,7 +90,7 @@ def prepare(
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
     places = np.array(thresholds.dense(reach, samples, acceptance.PLAYS).thresholds)
-    notes.extend(held_out.hardly_compared([*to_fit, *held]))
+    notes.extend(hardly_compared([*to_fit, *held]))
     return _without_faults(Prepared(to_fit, held, notes, repaired, drive, places))
 
 
@@ -107,14 +109,14 @@ def _courses(
 
 def _without_faults(ready: Prepared) -> Prepared:
     """The records without samples that are plainly wrong, unless hardly any would be left."""
-    repaired = bad_samples.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
+    repaired = not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
-    items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
+    items, wrong = without_faults([*ready.to_fit, *ready.held], repaired)
     to_fit, held = items[:number], items[number:]
     least = acceptance.COMPARED_SAMPLES
     if any(max(np.count_nonzero(item.known) for item in group) <= least for group in (to_fit, held)):
         return ready
-    return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
+    return replace(ready, to_fit=to_fit, held=held, repaired=merged([*repaired, *wrong]))
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:
@@ -143,3 +145,157 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
         [replace(item, session=whole.run, part=parts[id(item)]) for item in group] for group in (to_fit, held)
     )
     return first, second
+
+
+# Which records judge, and whether there is enough to compare -------------------------------------------------
+
+
+JUDGE = "judge by"
+"""The purpose of held-out records, in words."""
+
+
+def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
+    """Whether a share of any of them is enough to compare."""
+    return any(share * course.used > acceptance.COMPARED_SAMPLES for course in courses)
+
+
+def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
+    """The message where there is not; `what`: the purpose they are too short for."""
+    names = ", ".join(course.name for course in courses)
+    most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
+    return (
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
+        f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
+        "or records that sweep their range again"
+    )
+
+
+def hardly_compared(items: Sequence[Item]) -> list[str]:
+    """Notes on records that show nothing beside others that do, and on those that are mostly not compared."""
+    known: dict[str, NDArray[np.bool_]] = {}
+    for item in items:  # the two ends of a record are two items
+        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
+    notes = []
+    for name, compared in known.items():
+        number = int(np.count_nonzero(compared))
+        if number <= acceptance.COMPARED_SAMPLES:
+            notes.append(
+                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
+                "known give --history, or let it sweep its range again"
+            )
+        elif np.argmax(compared) > len(compared) // 2:
+            notes.append(
+                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
+                "drive, from where its memory is known; more with --history"
+            )
+    return notes
+
+
+def set_aside(records: Sequence[Record]) -> list[int]:
+    """Numbers of the records to hold out: every third one, shifted where that gives both sides fast and wide drives.
+
+    What a fast edge shows cannot be found where none is fitted, nor judged where none is held out.
+    """
+    rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
+    swings = np.array([float(np.ptp(record.v)) for record in records])
+    least = acceptance.FAST_RECORD
+    showing = [{k for k, x in enumerate(found) if x >= least * np.max(found)} for found in (rates, swings)]
+
+    def shared(aside: Sequence[int]) -> int:
+        return sum(bool(some.intersection(aside)) and bool(some.difference(aside)) for some in showing)
+
+    counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
+    others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
+    return max(counts + others, key=shared)
+
+
+def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
+    """Every item twice: its beginning to be fitted, its end to be held out."""
+    beginnings, ends = [], []
+    for item in items:
+        known = np.flatnonzero(item.known)
+        split = int(known[int((1.0 - acceptance.SET_ASIDE) * len(known))])
+        front, end = item.y.copy(), item.y.copy()
+        front[split:], end[:split] = np.nan, np.nan
+        beginnings.append(replace(item, y=front))
+        ends.append(replace(item, y=end))
+    return beginnings, ends
+
+
+# Samples that are plainly wrong: drop-outs, held samples, a converter at its end -----------------------------
+
+
+Runs = Sequence[tuple[int, int]]
+
+
+def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
+    """The items without wrong samples, and these; `repaired`: what is known of the records already.
+
+    A level that is a drop-out or the converter's end in one record is the same in all others.
+    """
+    ends = {each.level for each in repaired if isinstance(each, Saturated) and each.level is not None}
+    dropped = [stretches.drop_outs(item.y, item.run.v) for item in items]
+    lost = {level for item, runs in zip(items, dropped, strict=True) for level in _levels(item.y, runs)} - ends
+    kept: list[Item] = []
+    found: list[Finding] = []
+    for item, away in zip(items, dropped, strict=True):
+        y = item.y.copy()
+        levelled = {level: [run for run in runs_of(y == level) if run[1] - run[0] > 1] for level in ends | lost}
+        full = sorted(run for level in ends for run in levelled[level])
+        away = sorted({*away, *(run for level in lost for run in levelled[level])})
+        for kind, runs in ((Saturated, full), (DropOuts, away), (HeldSamples, None)):
+            if runs is None:
+                runs = stretches.held(y, item.run.v)
+            wrong = np.zeros(len(y), dtype=bool)
+            for a, b in runs:
+                wrong[a:b] = True
+            if np.isfinite(y[wrong]).any():
+                found.append(_finding(kind, item, y, runs))
+            y[wrong] = np.nan
+        changed = np.isfinite(item.y) & ~np.isfinite(y)
+        known = y[np.isfinite(y)]
+        kept.append(replace(item, y=y, output_range=float(np.ptp(known))) if changed.any() and len(known) else item)
+    return kept, found
+
+
+def merged(findings: Sequence[Kind]) -> list[Kind]:
+    """One finding a kind and record: a record whose end is held out was examined in two parts."""
+    found: dict[object, Kind] = {}
+    for each in findings:
+        key = type(each), *(getattr(each, name, None) for name in ("record", "channel", "end"))
+        if key in found:
+            numbers = [name for name in ("count", "samples") if hasattr(each, name)]
+            each = replace(found[key], **{name: getattr(found[key], name) + getattr(each, name) for name in numbers})
+        found[key] = each
+    return list(found.values())
+
+
+def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[Finding]:
+    """What was repaired, with samples as held, not saturated, where another record goes beyond their level."""
+    highest, lowest = (f([float(f(item.y[item.known])) for item in items if item.known.any()]) for f in (max, min))
+    span = highest - lowest
+    found: list[Finding] = []
+    for each in repaired:
+        if isinstance(each, Saturated) and each.level is not None:
+            beyond = highest - each.level if each.end == "largest" else each.level - lowest
+            if beyond > acceptance.RAIL_PASSED * span:
+                each = HeldSamples(each.record, None, 1, each.count)
+        found.append(each)
+    return found
+
+
+def _levels(y: Array, runs: Runs) -> set[float]:
+    """Levels of runs with one value."""
+    return {float(y[a]) for a, b in runs if b - a >= stretches.SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
+
+
+def _finding(kind: type[Finding], item: Item, y: Array, runs: Runs) -> Finding:
+    values = np.concatenate([y[a:b] for a, b in runs])
+    samples = int(np.count_nonzero(np.isfinite(values)))
+    first = float(item.run.t[runs[0][0]])
+    level = float(np.nanmin(values)) if np.nanmax(values) == np.nanmin(values) else None
+    if kind is Saturated:
+        return Saturated(item.name, first, None, level, samples)
+    if kind is DropOuts:
+        return DropOuts(item.name, first, level, len(runs), samples)
+    return HeldSamples(item.name, first, len(runs), samples)

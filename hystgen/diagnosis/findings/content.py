@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.data import bad_samples, disturbances, periodic, stick_slip
+from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.noise_floor import NoiseFloor
 from hystgen.diagnosis.data.preparing import Prepared
+from hystgen.diagnosis.data.signals import NoiseFloor
 from hystgen.diagnosis.findings import intervals, residual, stretches
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure
 from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, rounded
@@ -87,12 +87,12 @@ def _unexplained(
 ) -> list[Finding]:
     """What the model leaves that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
-    lines, errors = periodic.lines(everything, errors)
+    lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
     new = [line for line in lines if not disturbances.is_known(line, known)]
     # a ripple hides jumps as noise does, where the position is not predicted well enough to take it out
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
-    sticking = bad_samples.merged(stick_slip.stick_slip(everything, errors, jumping))
+    sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
     left = [each for each in odd if not isinstance(each, Fault)] + new + sticking
     held = errors[len(ready.to_fit) :]
     share, _ = residual.shares(ready.held, held)

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.data.drives import reversals
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.data.spectra import repetition
+from hystgen.diagnosis.data.signals import repetition, reversals
 from hystgen.diagnosis.findings.kinds import Structure
 from hystgen.diagnosis.search import acceptance
 from hystgen.plays import operators

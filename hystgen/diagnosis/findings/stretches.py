@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.data.noise_floor import still
+from hystgen.diagnosis.data.signals import still
 from hystgen.diagnosis.findings.result import Stretch
 from hystgen.diagnosis.search import acceptance
 

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from hystgen.basics import parallel
 from hystgen.basics.problems import EffectsError
-from hystgen.diagnosis.data import drives, spectra
-from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.thinning import everything, needed, thinned
+from hystgen.diagnosis.data import signals
+from hystgen.diagnosis.data.items import Item, everything, needed, rms, thinned
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, Search
 from hystgen.diagnosis.search.options import Option, about, front_names, options
@@ -105,12 +104,12 @@ class Records:
         known = about(to_fit, structure.thresholds)
         return cls(
             to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
-            drives.one_loop([*to_fit, *held]), drives.one_speed(to_fit),
+            signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit),
         )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """The hypothesis with one effect more, the best shapes first; `worth`: selects the options to try."""
-        rings = spectra.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
+        rings = signals.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
         known = replace(self.known, ringing=rings)
         rough = _rough(now, self.thin)
         roughly = replace(known, thresholds=tuple(rough.structure.thresholds.tolist()))

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.items import Item, everything, rms, thinned
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.data.thinning import everything, thinned
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search import merit as judge
 from hystgen.diagnosis.search.acceptance import apart, is_noise
