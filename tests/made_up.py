@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings.kinds import Finding, Structure
 from hystgen.diagnosis.findings.result import Errors, Gap, Inverse, NamedEffect, Result
-from hystgen.diagnosis.search import merit, screening
+from hystgen.diagnosis.search import screening, selection
 from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ def first_of(best: Made, other: Made, effect: str | None = None) -> str:
         for made in (best, other)
     ]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    first: Any = merit.simplest_first(tried, records)[0].fitted
+    first: Any = selection.simplest_first(tried, records)[0].fitted
     return str(first.name)
 
 

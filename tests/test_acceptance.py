@@ -21,16 +21,16 @@ from scipy.stats import wilcoxon
 
 from hystgen.diagnosis import Diagnosis
 from hystgen.diagnosis.data import claims, disturbances, preparing, signals
-from hystgen.diagnosis.data.items import Item, needed
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.data.items import needed as needed_samples
 from hystgen.diagnosis.data.preparing import Prepared, prepare
 from hystgen.diagnosis.data.signals import noise_floor
-from hystgen.diagnosis.findings import content, residual, stretches
+from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
-from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
-from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search import acceptance, fits, hypothesis, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
-from hystgen.diagnosis.search.options import Option
-from hystgen.diagnosis.search.structure import Structure
+from hystgen.diagnosis.search.hypothesis import Actuator, Structure
+from hystgen.diagnosis.search.screening import Option
 from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.front.dead_zone.model import DeadZone
@@ -88,12 +88,12 @@ def test_chance(held_out: float, fitted: float, named: bool, monkeypatch: pytest
     better = Made("better", 1, (0.5, 0.5))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    monkeypatch.setattr(merit, "difference", lambda _, after: held_out if after is best.errors else fitted)
-    assert (merit.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    monkeypatch.setattr(selection, "difference", lambda _, after: held_out if after is best.errors else fitted)
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
     for p_value, open_ in ((0.015, True), (0.007, False)):
-        monkeypatch.setattr(merit, "difference", lambda *_, p_value=p_value: p_value)
+        monkeypatch.setattr(selection, "difference", lambda *_, p_value=p_value: p_value)
         other: Any = SimpleNamespace(held_out=1.2, errors=[])
-        assert merit.alike(other, SimpleNamespace(held_out=1.0, errors=[]), 0.1) is open_  # type: ignore[arg-type]
+        assert selection.alike(other, SimpleNamespace(held_out=1.0, errors=[]), 0.1) is open_  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("fitted", "named"), [(0.98, False), (0.95, True)])
@@ -102,7 +102,7 @@ def test_an_effect_has_to_show_in_fitted_records(fitted: float, named: bool) -> 
     better = Made("better", 1, (fitted, 0.5))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (merit.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("memory", [1, 30])
@@ -116,7 +116,7 @@ def test_blocks_are_longer_than_errors_remember(memory: int) -> None:
     blocks = [np.mean(gain[k : k + size]) for k in range(0, 600 - size + 1, size)]
     assert size == (2 if memory == 1 else 30)
     expected = wilcoxon(blocks, alternative="greater").pvalue
-    assert merit.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
+    assert selection.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize(("more", "first"), [(1.006, "lag"), (1.015, "delay")])
@@ -181,7 +181,7 @@ class TestForwardSelection:
 
         def step(*_: Any) -> Any:
             seen.append("asked")
-            return selection._Step(now, [], world.tried(now, "c"), merit.Merit(1.0, 1.0, 0.1, 0.0))
+            return selection._Step(now, [], world.tried(now, "c"), selection.Merit(1.0, 1.0, 0.1, 0.0))
 
         monkeypatch.setattr(selection, "_step", step)
         monkeypatch.setattr(selection, "_gives_way", lambda *_: True)
@@ -352,7 +352,7 @@ class TestNominal:
     effect = ExponentialCreep(name="creep", time_constants=(0.1, 1.0, 10.0, 100.0), weights=(0.02,) * 4)
 
     def test_numbers_move_by_up_to_a_factor(self) -> None:
-        low, high = np.exp(nominal._near(self.effect).low), np.exp(nominal._near(self.effect).high)
+        low, high = np.exp(hypothesis._near(self.effect).low), np.exp(hypothesis._near(self.effect).high)
         assert np.all((low > 0.2) & (low < 0.5))
         assert np.all((high > 2.0) & (high < 5.0))
 
@@ -361,17 +361,17 @@ class TestNominal:
         effect = ExponentialCreep(
             name="creep", time_constants=tuple(10.0**k for k in range(number)), weights=(0.02,) * number
         )
-        assert len(nominal._near(effect).start) == factors
+        assert len(hypothesis._near(effect).start) == factors
 
     @pytest.mark.parametrize(("excess", "kept_as_it_is"), [(0.7e-6, False), (1.5e-6, True)])
     def test_a_front_at_its_limit_is_refitted(self, excess: float, kept_as_it_is: bool) -> None:
-        family, shape = nominal.front_of([DeadZone((-1.0, 0.0, 1.0), (0.5, 1.0, 0.5))], (-2.0, 2.0))
+        family, shape = hypothesis.front_of([DeadZone((-1.0, 0.0, 1.0), (0.5, 1.0, 0.5))], (-2.0, 2.0))
 
         class Tight(type(family)):  # type: ignore[misc]
             def slack(self, _: Array) -> Array:
                 return np.array([-excess])
 
-        assert nominal._inside(Tight(family.drive, family.breaks), shape) is not kept_as_it_is
+        assert hypothesis._inside(Tight(family.drive, family.breaks), shape) is not kept_as_it_is
 
 
 def bent(*slopes: tuple[float, float]) -> Any:
@@ -405,7 +405,7 @@ BOTH_NAMES = "saturation", "asymmetry"
 )
 def test_what_a_front_is_called(curve: Any, names: tuple[str, ...]) -> None:
     front: Any = SimpleNamespace(stages=lambda _: [SimpleNamespace(forward=curve)])
-    assert options.front_names(front, np.empty(0), (0.0, 100.0)) == names
+    assert screening.front_names(front, np.empty(0), (0.0, 100.0)) == names
 
 
 def test_what_limits_the_start_of_an_effect() -> None:
@@ -424,7 +424,7 @@ def test_what_limits_the_start_of_an_effect() -> None:
 def needed(v: Array, y: Array, noise: float, column: Array | None = None) -> NDArray[np.bool_]:
     """Samples that are needed of a record that a model predicts exactly."""
     run = Run(np.arange(len(v)) * 1e-3, v, {} if column is None else {"temperature": column})
-    return needed([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
+    return needed_samples([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
 
 
 class TestThinning:
@@ -456,7 +456,7 @@ class TestThinning:
         left = np.zeros(65)
         left[1::2] = np.sqrt(2.0) * rms * 0.01
         item = Item("r", Run(np.arange(65) * 1e-3, self.v), 0.1 * self.v + left, None, 10.0)
-        (mask,) = needed([item], [left], 0.01)
+        (mask,) = needed_samples([item], [left], 0.01)
         assert (np.count_nonzero(mask) > 60) == seen
 
     def test_the_longest_stretch(self) -> None:
@@ -1025,38 +1025,38 @@ class TestDescription:
     def test_a_variable_that_matters(self, share: float, matters: bool) -> None:
         item = scattered(20_000)
         error = of_share(share) * np.sin(2.0 * np.pi * item.run.v / 100.0) + hiss(20_000, 1)
-        assert ("drive" in residual.shares([item], [error])[1]) is matters
+        assert ("drive" in content.shares([item], [error])[1]) is matters
 
     def test_bins_of_a_variable(self) -> None:
         """Eight waves over the range, of which 24 bins see two thirds."""
         item = scattered(20_000)
-        shares = residual.shares([item], [np.sin(2.0 * np.pi * 8.0 * item.run.v / 100.0)])[1]
+        shares = content.shares([item], [np.sin(2.0 * np.pi * 8.0 * item.run.v / 100.0)])[1]
         assert 0.6 < shares["drive"] < 0.8
 
     def test_folds(self) -> None:
         """A drift is seen in half of the blocks of time alone: a bin is two thirds of one."""
         item = scattered(9600)
-        assert 0.25 < residual.shares([item], [np.linspace(-1.0, 1.0, 9600)])[1]["session time"] < 0.45
+        assert 0.25 < content.shares([item], [np.linspace(-1.0, 1.0, 9600)])[1]["session time"] < 0.45
 
     @pytest.mark.parametrize(("samples", "described"), [(300, True), (150, False)])
     def test_samples_of_a_description(self, samples: int, described: bool) -> None:
         item = scattered(samples)
-        assert (residual.shares([item], [item.run.v - 50.0])[0] > 0.0) is described
+        assert (content.shares([item], [item.run.v - 50.0])[0] > 0.0) is described
 
     @pytest.mark.parametrize(("free", "main"), [(0.6, "memory"), (0.45, "drive")])
     def test_memory_in_place_of_one_variable(self, free: float, main: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(residual, "shares", lambda *_: (0.4, {"drive": 0.4}))
-        monkeypatch.setattr(residual, "together", lambda *_: (free, 0.7))
-        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).main_variable == main
+        monkeypatch.setattr(content, "shares", lambda *_: (0.4, {"drive": 0.4}))
+        monkeypatch.setattr(content, "together", lambda *_: (free, 0.7))
+        assert content.described([scattered(500)], [hiss(500)], 1.0, ()).main_variable == main
 
     @pytest.mark.parametrize(("free", "rate_free"), [(0.8, True), (0.6, False)])
     def test_rate_free(self, free: float, rate_free: bool) -> None:
-        assert residual._rate_free(free, 1.0) is rate_free
+        assert content._rate_free(free, 1.0) is rate_free
 
     @pytest.mark.parametrize(("share", "repeatable"), [(0.6, True), (0.4, False)])
     def test_repeatable(self, share: float, repeatable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(residual, "repeatable", lambda *_: share)
-        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).repeatable is repeatable
+        monkeypatch.setattr(content, "repeatable", lambda *_: share)
+        assert content.described([scattered(500)], [hiss(500)], 1.0, ()).repeatable is repeatable
 
     @pytest.mark.parametrize(
         ("share", "waves", "samples", "known"),
@@ -1069,18 +1069,18 @@ class TestDescription:
     def test_parity(self, share: float, waves: int, samples: int, known: bool) -> None:
         item = scattered(samples)
         error = of_share(share) * np.cos(2.0 * np.pi * waves * item.run.v / 100.0) + hiss(samples, 1)
-        assert (residual.even_share([item], [error]) is not None) is known
+        assert (content.even_share([item], [error]) is not None) is known
 
 
 class TestStretches:
     @pytest.mark.parametrize(("times", "listed"), [(1.6, True), (1.4, False)])
     def test_above_the_noise(self, times: float, listed: bool) -> None:
         error = np.where(np.arange(2400) < 300, times, 1.0) * np.resize([1.0, -1.0], 2400)
-        assert bool(stretches.worst([ramp(2400)], [error], 1.0)) is listed
+        assert bool(content.worst([ramp(2400)], [error], 1.0)) is listed
 
     def test_ends_of_the_range(self) -> None:
         """Windows of 4 % of the range: the third one is two fifths within a tenth of it."""
-        found = stretches.worst([ramp(2400)], [np.ones(2400)], 0.1)
+        found = content.worst([ramp(2400)], [np.ones(2400)], 0.1)
         assert {(each.kind, each.interval) for each in found} == {
             ("range_end", (0.0, 0.199)), ("moving", (0.2, 2.199)), ("range_end", (2.2, 2.399)),
         }  # fmt: skip
@@ -1089,7 +1089,7 @@ class TestStretches:
         """A third of the record is twice as fast as most of it, a twelfth ten times."""
         rates = np.repeat([1.0, 2.0, 1.0, 10.0, 1.0], [700, 800, 300, 200, 400])
         item = driven(np.cumsum(np.resize(np.repeat([1.0, -1.0], 25), 2400) * rates))
-        found = stretches.worst([item], [np.ones(2400)], 0.1)
+        found = content.worst([item], [np.ones(2400)], 0.1)
         assert [each.interval for each in found if each.kind == "fast"] == [(1.8, 1.999)]
 
 
@@ -1115,7 +1115,7 @@ def test_held_out_records_that_are_alone() -> None:
 class TestStarts:
     def front(self, label: str) -> Option:
         bare = Structure(np.array([0.0]), Kept())
-        (found,) = [each for each in options._fronts(bare, bare, (0.0, 100.0)) if each.label == label]
+        (found,) = [each for each in screening._fronts(bare, bare, (0.0, 100.0)) if each.label == label]
         return found
 
     def starts(self, label: str) -> list[Array]:

@@ -34,9 +34,9 @@ from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import Line
 from hystgen.diagnosis.findings.result import Errors, Gap, Result
 from hystgen.diagnosis.run import _extended
-from hystgen.diagnosis.search import acceptance, merit, options, screening, selection, structure
-from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search import acceptance, hypothesis, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects.ageing.model import ExponentialAgeing
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep.model import ExponentialCreep
@@ -304,9 +304,9 @@ class TestNoise:
         before = [rng.normal(size=2000) for _ in range(3)]
         same = [rng.normal(size=2000) for _ in range(3)]
         less = [0.8 * e for e in before]
-        assert merit.difference(before, less) < 1e-6
-        assert merit.difference(before, same) > 1e-3
-        assert merit.difference(less, before) > 0.9
+        assert selection.difference(before, less) < 1e-6
+        assert selection.difference(before, same) > 1e-3
+        assert selection.difference(less, before) > 0.9
 
 
     def test_a_hold_that_rings_tells_nothing(self) -> None:
@@ -341,7 +341,7 @@ class TestNoise:
 def test_what_a_front_is_called(points: list[tuple[float, float]], names: tuple[str, ...]) -> None:
     x, y = np.array(points, dtype=np.float64).T
     front = DeadZones((x[0], x[-1]), tuple(x[1:-1].tolist()))
-    assert options.front_names(front, front.shape(np.diff(y) / np.diff(x)), front.drive) == names
+    assert screening.front_names(front, front.shape(np.diff(y) / np.diff(x)), front.drive) == names
 
 
 @pytest.mark.parametrize("drive", [(0.0, 100.0), (-50.0, 50.0), (-10.0, 100.0), (-120.0, -20.0)])
@@ -486,8 +486,8 @@ def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: floa
     assert np.sqrt(np.mean(error**2) / np.mean(ramp**2)) == pytest.approx(left, abs=0.02)
 
 
-def _only(actuator: Actuator) -> structure.Structure:
-    return structure.Structure(actuator.thresholds, Kept(), tuple(map(structure.kept, actuator.effects)))
+def _only(actuator: Actuator) -> hypothesis.Structure:
+    return hypothesis.Structure(actuator.thresholds, Kept(), tuple(map(hypothesis.kept, actuator.effects)))
 
 
 @pytest.mark.parametrize("curve", [None, 0.3])
@@ -706,7 +706,7 @@ def test_no_records_to_judge_by(tmp_path: Path) -> None:
 def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: Effect) -> None:
     """Though the play of the largest threshold has no weight: stretches are measured in it."""
     places, weights = np.array([0.0, 10.0, 20.0, 30.0]), np.array([1.0, 0.5, 0.25, 0.0])
-    form = structure.Structure(places, Kept(), (structure.kept(effect),))
+    form = hypothesis.Structure(places, Kept(), (hypothesis.kept(effect),))
     v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (wander(3, 40) - 40.0)])
     run = Run(np.arange(len(v)) * 1e-3, v)
     item = Item("made", run, v, (0.0,), 100.0)
@@ -994,10 +994,10 @@ def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPat
     def step(*held_out: float) -> object:
         """The first of them is unsure, the second sure."""
         tried = [SimpleNamespace(held_out=left) for left in held_out]
-        worth = merit.Merit(1.0, 1.0, 0.5, 1e-6)
-        monkeypatch.setattr(merit, "simplest_first", lambda found, _: found)
-        monkeypatch.setattr(merit, "merit_of", lambda _, best, *__: None if best is tried[0] else worth)
-        monkeypatch.setattr(merit, "removes", lambda *_: removes)
+        worth = selection.Merit(1.0, 1.0, 0.5, 1e-6)
+        monkeypatch.setattr(selection, "simplest_first", lambda found, _: found)
+        monkeypatch.setattr(selection, "merit_of", lambda _, best, *__: None if best is tried[0] else worth)
+        monkeypatch.setattr(selection, "removes", lambda *_: removes)
         records = SimpleNamespace(extensions=lambda *_: tried, gap=1.0)
         found = selection._step(object(), 1.0, records)  # type: ignore[arg-type]
         assert found is not None

@@ -19,12 +19,11 @@ import hystgen
 from hystgen.diagnosis.data import claims, disturbances, preparing, signals
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.signals import one_loop, one_speed, reversals
-from hystgen.diagnosis.findings import intervals, residual
+from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, Saturated
 from hystgen.diagnosis.findings.kinds import Structure as Remaining
-from hystgen.diagnosis.search import fits, nominal
-from hystgen.diagnosis.search.actuator import Actuator
-from hystgen.diagnosis.search.structure import Part, Structure
+from hystgen.diagnosis.search import fits, hypothesis
+from hystgen.diagnosis.search.hypothesis import Actuator, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
 from hystgen.identification import stretches
@@ -347,7 +346,7 @@ def check(
 ) -> tuple[list[Record | None], list[Finding]]:
     """Against a nominal model that is 20 % off."""
     model = Actuator(np.array(THRESHOLDS), (), ()), 1.2 * np.array(weights)
-    return claims.checked(given, lambda record: nominal.predicted(record, *model, HISTORY))
+    return claims.checked(given, lambda record: hypothesis.predicted(record, *model, HISTORY))
 
 
 class TestWholeRecords:
@@ -439,7 +438,7 @@ class TestDescription:
     def described(self, left: Sequence[Array]) -> Remaining:
         items = session()
         with_noise = [e + noise(len(e), k) for k, e in enumerate(left)]
-        return residual.described(items, with_noise, NOISE, ())
+        return content.described(items, with_noise, NOISE, ())
 
     def test_even_in_the_drive(self) -> None:
         found = self.described([0.1 * (((item.run.v - 50.0) / 50.0) ** 2 - 0.35) for item in session()])
@@ -475,7 +474,7 @@ class TestDescription:
 
     def test_loop_centre(self) -> None:
         v = np.concatenate([np.linspace(0, 100, 101), np.linspace(99, 60, 40), np.linspace(61, 80, 20)])
-        centre = residual.loop_centre(v)
+        centre = content.loop_centre(v)
         assert centre[-1] == pytest.approx(80.0, abs=1.5)
         assert reversals(v) == pytest.approx([100, 140], abs=2)
 
@@ -506,7 +505,7 @@ class TestIntervals:
         (candidate,) = kind.candidates(about)
         form = Structure(np.array(THRESHOLDS), Kept(), (Part("lag", candidate),))
         found = fits.fit(form, items, form.start, np.array(WEIGHTS))
-        (sure,) = intervals.intervals(found, items).parts
+        (sure,) = fits.intervals(found, items).parts
         (effect,) = form.effects(found.shape)
         return effect.time_constant, sure["time_constant"]  # type: ignore[attr-defined]
 

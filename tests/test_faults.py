@@ -22,8 +22,7 @@ from recordings import brute_output, columns, noisy, record, wander, write_csv, 
 
 import hystgen
 from hystgen.basics.problems import RecordError
-from hystgen.diagnosis.findings import intervals
-from hystgen.diagnosis.search import nominal
+from hystgen.diagnosis.search import fits, hypothesis
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import IdentificationError, faults, pi, prepared
 from hystgen.identification.fronts import Tanh
@@ -415,7 +414,7 @@ class TestTanh:
             size, curvature = rng.uniform(5.0, 40.0, 2), 10.0 ** rng.uniform(-2.0, 1.0, 2)
             up, down = ((size[k], curvature[k], rng.uniform(-4.0, 4.0), 0.0) for k in (0, 1))
             stage = TanhEnvelope(up, down if rng.random() < 0.5 else None)
-            front, shape = nominal.front_of([stage], (0.0, 3.6))
+            front, shape = hypothesis.front_of([stage], (0.0, 3.6))
             (made,) = front.stages(shape)
             assert isinstance(made, TanhEnvelope)
             searched += isinstance(front, Tanh)
@@ -436,7 +435,7 @@ class TestTanh:
         low, high = front.bounds
         for _ in range(200):
             drawn = np.clip(shape + rng.normal(0.0, 4.0, len(shape)), low, high)
-            near = intervals._admissible(Found, drawn)  # type: ignore[arg-type]
+            near = fits._admissible(Found, drawn)  # type: ignore[arg-type]
             assert np.all(front.slack(near) >= np.minimum(front.slack(shape), 0.0))
             front.stages(near)
 

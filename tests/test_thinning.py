@@ -8,7 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hystgen.chain import chain
-from hystgen.diagnosis.data.items import Item, needed, thinned
+from hystgen.diagnosis.data.items import Item, thinned
+from hystgen.diagnosis.data.items import needed as needed_samples
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Effect, Run
 from hystgen.effects.delay.model import Delay
@@ -52,7 +53,7 @@ def item(v: Array, left: Array, name: str = "made") -> Item:
 
 def needed(v: Array, left: Array) -> NDArray[np.intp]:
     """Places of the samples that are needed."""
-    (mask,) = needed([item(v, left)], [left], NOISE)
+    (mask,) = needed_samples([item(v, left)], [left], NOISE)
     return np.flatnonzero(mask)
 
 
@@ -133,7 +134,7 @@ def test_a_column_that_changes_is_kept() -> None:
     column[2001:] = 3.0
     made = item(v, left)
     made = Item("made", Run(made.run.t, v, {"temperature": column}), made.y, (0.0,), 1.0)
-    (mask,) = needed([made], [left], NOISE)
+    (mask,) = needed_samples([made], [left], NOISE)
     assert mask[2000]
     assert mask[2001]
     assert np.count_nonzero(mask) < 400
@@ -155,7 +156,7 @@ class TestThinned:
             for each, run, part in zip(made, runs, session.parts, strict=True)
         ]
         errors = [each.y - plays(each.run.v) for each in items]
-        masks = needed(items, errors, NOISE)
+        masks = needed_samples(items, errors, NOISE)
         return [[items[0], items[2]], [items[1]]], [[masks[0], masks[2]], [masks[1]]]
 
     def test_every_so_many_th_is_compared(self) -> None:
@@ -183,7 +184,7 @@ class TestThinned:
         front, end = whole.y.copy(), whole.y.copy()
         front[5600:], end[:5600] = np.nan, np.nan
         groups = [[Item("a", whole.run, y, whole.history, 10.0)] for y in (front, end)]
-        masks = [needed(group, [group[0].y - plays(v)], NOISE) for group in groups]
+        masks = [needed_samples(group, [group[0].y - plays(v)], NOISE) for group in groups]
         (first,), (second,) = thinned(groups, 500, masks)
         assert first.run is second.run
         assert np.array_equal(first.y[first.known], front[np.isfinite(front)][::12])

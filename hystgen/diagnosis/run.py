@@ -16,11 +16,10 @@ from hystgen.diagnosis.data.disturbances import Cleaned
 from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
-from hystgen.diagnosis.findings import intervals
 from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import OtherHistory
 from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
-from hystgen.diagnosis.search import nominal, selection
+from hystgen.diagnosis.search import fits, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
@@ -84,8 +83,8 @@ def diagnose(
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
     with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
-        first = nominal.as_given(model.cascade, given)
-        usable, odd = claims.checked(read, lambda record: nominal.predicted(record, *first, before))
+        first = hypothesis.as_given(model.cascade, given)
+        usable, odd = claims.checked(read, lambda record: hypothesis.predicted(record, *first, before))
         to_fit, to_hold = (
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
@@ -153,8 +152,8 @@ class _Task:
     def _begun(self, history: History) -> tuple[Prepared, Callable[[Prepared], Fitted]]:
         """The records as they are compared, and how the nominal model is refitted to such records."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest)
-        base, start = nominal.structure_of(self.cascade, self.given, ready)
-        weights = nominal.nominal_weights(self.cascade, base)
+        base, start = hypothesis.structure_of(self.cascade, self.given, ready)
+        weights = hypothesis.nominal_weights(self.cascade, base)
         return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
 
     def _foreign(self, history: History) -> OtherHistory | None:
@@ -240,7 +239,7 @@ def _extended(
             "pi": plays,
             "memoryless": [stage_content(stage) for stage in actuator.stages],
             "output_offset": offset,
-            "effects": [{"name": effect.name, **intervals.entry(effect)} for effect in actuator.effects],
+            "effects": [{"name": effect.name, **fits.entry(effect)} for effect in actuator.effects],
         },
     }
     return make_parameters(content, user_effects=user)
