@@ -31,10 +31,19 @@ from ruamel.yaml import YAML
 from hystgen import cli, identify
 from hystgen.basics import extras
 from hystgen.basics.progress import Progress
-from hystgen.records import LARGEST, Record, RecordError, agreed_units, hdf5, parquet, parse_columns, read_record
+from hystgen.records import (
+    LARGEST,
+    Record,
+    RecordError,
+    agreed_units,
+    csv_file,
+    hdf5,
+    parquet,
+    parse_columns,
+    read_record,
+)
 from hystgen.records import headers as with_units
-from hystgen.records import text as record_text
-from hystgen.records.units import split_unit
+from hystgen.records.columns import split_unit
 
 N = 50
 T = np.arange(N) * 0.001
@@ -852,7 +861,7 @@ def test_blocks_of_any_size_give_the_same_numbers(
     cells = awkward(400)
     cells = [row for row in cells if max(map(len, row)) < 25]
     (tmp_path / "a.csv").write_bytes(b"# one" + end.encode() + written(cells, "t,v,y", end))
-    monkeypatch.setattr(record_text, "BLOCK", block)
+    monkeypatch.setattr(csv_file, "BLOCK", block)
     record = read_record(tmp_path / "a.csv")
     check(record, *(np.array([float(row[k]) for row in cells]) for k in range(3)))
     assert len(cells) > 390
@@ -869,7 +878,7 @@ def test_both_ways_through_a_block_round_as_python_does(tmp_path: Path) -> None:
 
 def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The places told are those of the file, whichever blocks they are in."""
-    monkeypatch.setattr(record_text, "BLOCK", 256)
+    monkeypatch.setattr(csv_file, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5)), "ok"] for k in range(2000)]
     header = "t,v,y,state"
     (tmp_path / "good.csv").write_bytes(written(cells, header))
@@ -904,7 +913,7 @@ def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_column_that_turns_out_to_be_text_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record_text, "BLOCK", 256)
+    monkeypatch.setattr(csv_file, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), str(k), repr(float(k % 5))] for k in range(500)]
     cells[300][2] = "fault, \u00b5"
     cells[300][2] = '"' + cells[300][2] + '"'
@@ -946,7 +955,7 @@ def test_a_row_too_long_and_one_too_short_do_not_make_up_for_each_other(tmp_path
 
 
 def test_latin_1_and_binary_parts_far_into_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record_text, "BLOCK", 256)
+    monkeypatch.setattr(csv_file, "BLOCK", 256)
     text = written([[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5))] for k in range(500)], "t,v,y")
     (tmp_path / "a.csv").write_bytes(text + b"# 20 \xb0C\n# 21 \xb0C\n")
     record = read_record(tmp_path / "a.csv")

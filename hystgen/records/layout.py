@@ -11,11 +11,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from hystgen.records import sampling
+from hystgen.records import columns
 from hystgen.records.cells import BLANKS, Dialect, is_comment
-from hystgen.records.columns import STANDARD, column, meaning
+from hystgen.records.columns import STANDARD, column, meaning, unit_alone
 from hystgen.records.reading import Reading
-from hystgen.records.units import unit_alone
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": '"|"', BLANKS: "blanks"}
 """What may separate cells, the less ambiguous first, and in words."""
@@ -48,7 +47,7 @@ class Layout:
     header: int | None = None
     units: list[str] = field(default_factory=list)
     also: list[str] = field(default_factory=list)
-    steps: list[sampling.Step] = field(default_factory=list)
+    steps: list[columns.Step] = field(default_factory=list)
     kind: str = ""
     clocks: frozenset[int] = frozenset()
     rows: int | None = None
@@ -95,7 +94,7 @@ def find(reading: Reading, lines: Sequence[str]) -> Layout:
     if layout is None:
         layout = _headerless(reading, view, seen)
     above = [(line.number, line.text) for line in seen if line.number < layout.first and line.number != layout.header]
-    layout.steps = sampling.from_lines(above, layout.dialect.decimal)
+    layout.steps = columns.from_lines(above, layout.dialect.decimal)
     layout.clocks = _clocks(view, seen)
     return layout
 
