@@ -35,8 +35,8 @@ from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification.fronts import Kept
+from hystgen.identification.quality import correlation_time
 from hystgen.identification.reduction import settled
-from hystgen.identification.uncertainty import correlation_time
 from hystgen.records import Record
 
 pytestmark = pytest.mark.thorough

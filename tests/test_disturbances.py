@@ -26,7 +26,7 @@ from hystgen.diagnosis.search import fits, hypothesis
 from hystgen.diagnosis.search.hypothesis import Actuator, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
-from hystgen.identification import stretches
+from hystgen.identification import faults
 from hystgen.identification.fronts import Kept
 from hystgen.records import Record
 
@@ -99,7 +99,7 @@ class TestSilence:
         same, told = preparing.without_faults(items, [])
         assert told == []
         assert same == items
-        assert [stretches.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
+        assert [faults.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
         assert disturbances.lines(items, errors(items))[0] == []
         assert disturbances.stick_slip(items, errors(items), NOISE) == []
 
@@ -165,7 +165,7 @@ class TestWrongSamples:
 
     def test_a_converter_at_its_end(self) -> None:
         items = [changed(item, np.minimum(item.y, 9.0)) for item in session()]
-        found = [stretches.rails(item.y, item.run.v) for item in items]
+        found = [faults.rails(item.y, item.run.v) for item in items]
         assert found[0] == [("largest", 9.0)]
         repaired = [Saturated("r0.csv", None, "largest", 9.0, 1)]
         assert preparing.not_at_the_end(repaired, items) == repaired

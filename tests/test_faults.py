@@ -24,7 +24,7 @@ import hystgen
 from hystgen.basics.problems import RecordError
 from hystgen.diagnosis.search import fits, hypothesis
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import IdentificationError, faults, pi, prepared
+from hystgen.identification import IdentificationError, faults, prepared
 from hystgen.identification.fronts import Tanh
 from hystgen.records import Record, no_value, read_record
 
@@ -531,4 +531,4 @@ def test_what_a_file_without_values_is_called(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r"2000 of 2000 samples are without a value.*such as .* count as none"):
         read_record(write_csv(tmp_path / "a.csv", v, (y + 10.0) * 1e300))
     with pytest.raises(IdentificationError, match=r"y moves by .* which is no movement in any unit; convert it"):
-        pi.course(record(v, y * 1e-300), None, 0)
+        prepared.course_of(record(v, y * 1e-300), None, 0)

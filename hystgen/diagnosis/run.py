@@ -24,11 +24,9 @@ from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
 from hystgen.effects.base import Place
-from hystgen.identification import P0_FLOOR, remarks, stage_content
+from hystgen.identification import P0_FLOOR, quality, stage_content
 from hystgen.identification.fit import visited
-from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError
-from hystgen.identification.thresholds import rounded
-from hystgen.identification.weights import Weights
+from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError, Weights, rounded
 from hystgen.records import Record, Source, read_records, several
 
 if TYPE_CHECKING:
@@ -107,7 +105,7 @@ def diagnose(
             _inverse(extended, made),
         )
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
-    notes += [*remarks.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
+    notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += done.cleaned.notes(unit)
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
 
@@ -192,7 +190,7 @@ def _inverse(extended: Parameters, made: Weights) -> Inverse:
     from hystgen.model import cascade_of
 
     problems = cascade_of(extended).inverse_problems()
-    warnings = remarks.about_inverse(np.array(extended.model.pi.weights), made)
+    warnings = quality.about_inverse(np.array(extended.model.pi.weights), made)
     if problems and extended.model.pi.weights[0] > 0.0:
         warnings = [*warnings, f"the model has no inverse: {'; '.join(problems)}"]
     return Inverse(not problems, tuple(warnings))

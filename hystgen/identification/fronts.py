@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification.thresholds import rounded
+from hystgen.identification.pi import rounded
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.front.stage import Stage
-from hystgen.identification import constrained, faults, joint, pi, reduction, thresholds, weights
+from hystgen.identification import faults, joint, pi, reduction
 from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
@@ -76,7 +76,7 @@ def solve(
     # What a play sum alone would choose is bent by the front that it lacks: the shape is sought over a dense list
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
-        fine = np.array(thresholds.dense(plain.reach, sum(item.used for item in compared)).thresholds)
+        fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
     best: tuple[float, Front, Array] | None = None
     before: Array | None = None
     for front in fronts_of(kind, compared, breaks):
@@ -95,7 +95,7 @@ def solve(
     if wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
     largest = float(fitted.solution.thresholds[-1])
-    firsts = [pi.resettled(fitted.inner(item), largest).first for item in courses]
+    firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
 
 
@@ -148,8 +148,8 @@ def validation(shaped: joint.Shaped, front: Front) -> float:
         training = reduction.others(shaped.system, fold)
         change, p = joint.solve_linear(training, shaped.weights, shaped.shape, front, 0.0)
         unknowns = np.concatenate([p, change])
-        squares += weights.residual(left_out, np.arange(len(unknowns)), unknowns)
-    return constrained.root_mean_square(squares, shaped.system.samples)
+        squares += pi.residual(left_out, np.arange(len(unknowns)), unknowns)
+    return joint.root_mean_square(squares, shaped.system.samples)
 
 
 def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
@@ -209,8 +209,8 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     bounds.append(np.concatenate([np.zeros(k), -length[:-1] / length[-1]]))
     limits.append(least - (high - low) / length[-1])
     try:
-        solution = constrained.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
-    except constrained.InfeasibleError:
+        solution = joint.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
+    except joint.InfeasibleError:
         return None
     slopes = np.append(solution[k:], ((high - low) - float(length[:-1] @ solution[k:])) / length[-1])
     return front.shape(slopes)

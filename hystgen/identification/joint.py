@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from hystgen.chain.static import directions, through_stages
 from hystgen.front.stage import Stage
-from hystgen.identification import constrained, reduction, weights
-from hystgen.identification.constrained import root_mean_square
+from hystgen.identification import pi, reduction
 from hystgen.identification.fronts import Front
 from hystgen.identification.reduction import Course, Reduced, Source
 from hystgen.plays import operators
@@ -95,7 +94,7 @@ def refine(
     """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
-    p = weights.non_negative(plain.whole, np.arange(len(thresholds)))
+    p = pi.non_negative(plain.whole, np.arange(len(thresholds)))
 
     def linear(s: Array, q: Array) -> Shaped:
         return _linear(courses, front, s, q, thresholds, tick)
@@ -138,7 +137,7 @@ def search(
             break
         try:
             change, p = solve_linear(system, now.weights, now.shape, limits, damping)
-        except constrained.InfeasibleError:
+        except InfeasibleError:
             break
         moved = np.clip(now.shape + change, low, high)
         if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
@@ -172,8 +171,8 @@ def _linear(
     source = linear_source(front, shape, p, every)
     system = reduction.reduce(courses, thresholds, tick, source, len(shape))
     columns = np.arange(len(thresholds))
-    best = weights.non_negative(system.whole, columns)
-    rms = root_mean_square(weights.residual(system.whole, columns, best), system.samples)
+    best = pi.non_negative(system.whole, columns)
+    rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)
     # About the weights that the derivatives were taken with: they are what the next step of the shape refers to
     return Shaped(shape, p, rms, best, system.samples, lambda: system)
 
@@ -234,7 +233,7 @@ def solve_linear(
     size = np.linalg.norm(matrix[:, k:], axis=0)
     tied[:, k:] = np.diag(np.sqrt(damping) * np.maximum(size, 1e-12 * float(np.linalg.norm(target))))
     low, high = limits.bounds
-    bounds, least = constrained.at_least(
+    bounds, least = at_least(
         np.concatenate([np.zeros(k), low - shape]), np.concatenate([np.full(k, np.inf), high - shape])
     )
     slack = limits.slack(shape)
@@ -246,7 +245,79 @@ def solve_linear(
             slope[:, j] = (limits.slack(one) - slack) / DIFFERENCE
         bounds = np.concatenate([bounds, np.concatenate([np.zeros((len(slack), k)), slope], axis=1)])
         least = np.concatenate([least, np.minimum(-slack, 0.0)])
-    solution = constrained.least_squares(
+    solution = least_squares(
         np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least, k
     )
     return solution[k:], solution[:k]
+
+
+# Linear least squares under linear inequalities --------------------------------------------------------------
+
+
+RIDGE = 1e-7
+"""Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
+
+STILL = 1e-9
+"""A column of less than this share of the longest one, in the same unit, is rounding and nothing else."""
+
+INFEASIBLE = 1e-10
+
+
+class InfeasibleError(ValueError):
+    """The inequalities contradict each other."""
+
+
+def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, plays: int = 0) -> Array:
+    """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
+
+    `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: number of leading columns with a unit of their own, the
+    others have that of the target. Where the matrix does not determine x the shortest one, in the measure of its
+    columns, is taken. Raises InfeasibleError.
+
+    Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor makes of the problem
+    the one of the shortest vector under inequalities (LDP), whose dual is a non-negative least-squares problem.
+    """
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
+    k = matrix.shape[1]
+    size = np.linalg.norm(matrix, axis=0)
+    alike, reach = size.copy(), float(np.linalg.norm(target))
+    if reach > 0.0 and np.any(size[:plays]):
+        alike[:plays] *= reach / np.max(size[:plays])
+    idle = alike <= STILL * np.max(alike)
+    size[idle] = 1.0
+    stacked = np.concatenate([np.where(idle, 0.0, matrix / size), RIDGE * np.eye(k)])
+    q, triangle = np.linalg.qr(stacked)
+    free = q.T @ np.concatenate([target, np.zeros(k)])
+    # In the coordinates e = triangle (x size) - free the objective is |e|
+    rows = np.asarray(solve_triangular(triangle, (bounds / size).T, trans="T")).T
+    least = limits - rows @ free
+    if np.all(least <= 0.0):
+        shortest = np.zeros(k)
+    else:
+        length = np.linalg.norm(rows, axis=1)
+        length[length == 0.0] = 1.0
+        scale = float(np.max(np.abs(least / length)))
+        dual_matrix = np.vstack([(rows / length[:, None]).T, least / length / scale])
+        dual_target = np.zeros(k + 1)
+        dual_target[-1] = 1.0
+        multipliers, rest = nnls(dual_matrix, dual_target, maxiter=100 * (k + len(bounds)))
+        if rest < INFEASIBLE:
+            raise InfeasibleError("the inequalities contradict each other")
+        # over the last component of the residual, which is the square of its length, and as that does not cancel to 0
+        shortest = dual_matrix[:k] @ multipliers / rest**2 * scale
+    return np.asarray(solve_triangular(triangle, shortest + free) / size)
+
+
+def at_least(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Bounds on single unknowns, infinite ones left out, as the inequalities of `least_squares`."""
+    k = len(lower)
+    eye = np.eye(k)
+    below, above = np.isfinite(lower), np.isfinite(upper)
+    return np.concatenate([eye[below], -eye[above]]), np.concatenate([lower[below], -upper[above]])
+
+
+def root_mean_square(squares: float, samples: int) -> float:
+    """rms of so many samples from the sum of their squares."""
+    return math.sqrt(squares / max(samples, 1))

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.words import counted
-from hystgen.identification import faults, pi, stretches
+from hystgen.identification import faults, pi
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
-from hystgen.records import SHORTEST, Record
+from hystgen.records import LARGEST, SHORTEST, Record, no_value
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,11 @@ ROUNDS = 4
 
 HALF = 0.25
 """The drive is what is wrong where the output is then missed by less than half as much, squared."""
+
+
+SMALLEST = 1e-20
+"""Drive or output that moves by less is no measurement: squares of it, and ratios to the other one, leave the numbers
+that there are in double precision and in parameter files."""
 
 
 def courses(
@@ -43,14 +48,14 @@ def courses(
     for number, record in enumerate(records):
         pieces = faults.between_gaps(record)
         if len(pieces) == 1:
-            made.append(replace(pi.course(record, history, skip), origin=(number, 0)))
+            made.append(replace(course_of(record, history, skip), origin=(number, 0)))
             continue
         found = []
         for piece in pieces:
             try:
                 before = None if piece.after_gap else history
-                course = pi.course(piece.record, before, max(skip - piece.first, 0))
-                found.append(replace(course, origin=(number, piece.first)))
+                part = course_of(piece.record, before, max(skip - piece.first, 0))
+                found.append(replace(part, origin=(number, piece.first)))
             except IdentificationError as failure:
                 reported.append(f"left out: {failure}")
         if not found:
@@ -66,12 +71,52 @@ def courses(
     return made, reported
 
 
+def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
+    """The record as it takes part: its start ignored as far as the start memory is unknown, isolated faults that show
+    without a model bridged (drive) or left out (output).
+
+    Raises IdentificationError for a record without what a fit needs.
+    """
+    if record.y is None:
+        raise IdentificationError(f"{record.name} has no measured column y; name one with --columns")
+    v = np.ascontiguousarray(record.v, dtype=np.float64)
+    y = np.ascontiguousarray(record.y, dtype=np.float64)
+    if len(v) != len(y):
+        raise IdentificationError(f"{record.name} has {len(v)} samples of v and {len(y)} of y")
+    if not (np.isfinite(v).all() and np.isfinite(y).all()):
+        raise IdentificationError(f"{record.name} has samples without a value; drop them first")
+    if len(v) < skip + SHORTEST:
+        raise IdentificationError(f"{record.name} has {len(v)} samples, at least {skip + SHORTEST} are needed")
+    for name, x in (("v", v), ("y", y)):
+        missing = int(np.count_nonzero(no_value(x)))
+        if missing > faults.most(len(x)):
+            raise IdentificationError(
+                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
+                f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
+                f"convert {name}"
+            )
+    y = np.where(faults.wrong_output(v, y), np.nan, y)
+    v = faults.bridged(v, faults.wrong_drive(v, y))
+    if np.ptp(v[skip:]) == 0.0:
+        raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
+    measured = y[skip:][np.isfinite(y[skip:])]
+    if not len(measured) or np.ptp(measured) == 0.0:
+        raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
+    for name, x in (("v", v), ("y", measured)):
+        if np.ptp(x) < SMALLEST:
+            raise IdentificationError(
+                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
+                "to a smaller unit, or name another column"
+            )
+    return Course(record.name, v, y, history, skip, len(v), skip).resettled(math.inf)
+
+
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
     """The course without the samples at which the converter stood at its end; which end, its level and how many.
 
     Raises IdentificationError where next to nothing is left.
     """
-    levels = stretches.rails(item.y, item.v)
+    levels = faults.rails(item.y, item.v)
     if not levels:
         return item, []
     at = np.isin(item.y, [level for _, level in levels])
@@ -87,7 +132,7 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
 def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
     """The course without drop-outs and held samples, and where these are."""
     found = []
-    for what, find in (("drop-out", stretches.drop_outs), ("run", stretches.held)):
+    for what, find in (("drop-out", faults.drop_outs), ("run", faults.held)):
         runs = find(item.y, item.v)
         if runs:
             wrong = np.zeros(len(item.y), dtype=bool)
@@ -168,7 +213,7 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
             continue
         run = np.zeros(len(item.v), dtype=bool)
         run[first:last] = True
-        other = pi.resettled(replace(item, v=faults.bridged(item.v, run)), math.inf)
+        other = replace(item, v=faults.bridged(item.v, run)).resettled(math.inf)
         less = _errors(other, solution)
         if _size(less[run]) < HALF * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
             item, error = other, less

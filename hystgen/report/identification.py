@@ -16,7 +16,7 @@ from hystgen.emission import files
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import PARSIMONY
 from hystgen.identification.fit import HELD_OUT
-from hystgen.identification.report import LEFT, cells
+from hystgen.identification.quality import LEFT, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.report import drawing, fit_figures, properties

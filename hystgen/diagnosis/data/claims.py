@@ -13,8 +13,8 @@ from hystgen.diagnosis.data.items import Item, Model, rms
 from hystgen.diagnosis.findings.kinds import ExchangedRecords, Finding, OtherHistory, Scale, SwappedChannels
 from hystgen.diagnosis.search import acceptance
 from hystgen.identification import faults
+from hystgen.identification.quality import STARTS, UNLIKE
 from hystgen.identification.reduction import settled
-from hystgen.identification.remarks import STARTS, UNLIKE
 from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]

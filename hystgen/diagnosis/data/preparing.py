@@ -16,10 +16,10 @@ from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, IsolatedSamples, Saturated
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
-from hystgen.identification import faults, pi, prepared, stretches, thresholds
+from hystgen.identification import faults, pi, prepared
+from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
-from hystgen.identification.stretches import runs_of
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -86,10 +86,10 @@ def prepare(
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
-    reach = thresholds.largest(fit_courses)
+    reach = pi.largest(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
-    places = np.array(thresholds.dense(reach, samples, acceptance.PLAYS).thresholds)
+    places = np.array(pi.dense(reach, samples, acceptance.PLAYS).thresholds)
     notes.extend(hardly_compared([*to_fit, *held]))
     return _without_faults(Prepared(to_fit, held, notes, repaired, drive, places))
 
@@ -100,7 +100,7 @@ def _courses(
     """The records as they take part, and what was left out at a converter's end."""
     courses, saturated = [], []
     for record in records:
-        course, ends = prepared.without_rails(pi.course(record, history, 0))
+        course, ends = prepared.without_rails(prepared.course_of(record, history, 0))
         courses.append(course)
         for name, level, number in ends:
             saturated.append(Saturated(course.name, None, name, level, number))
@@ -234,7 +234,7 @@ def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[
     A level that is a drop-out or the converter's end in one record is the same in all others.
     """
     ends = {each.level for each in repaired if isinstance(each, Saturated) and each.level is not None}
-    dropped = [stretches.drop_outs(item.y, item.run.v) for item in items]
+    dropped = [faults.drop_outs(item.y, item.run.v) for item in items]
     lost = {level for item, runs in zip(items, dropped, strict=True) for level in _levels(item.y, runs)} - ends
     kept: list[Item] = []
     found: list[Finding] = []
@@ -245,7 +245,7 @@ def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[
         away = sorted({*away, *(run for level in lost for run in levelled[level])})
         for kind, runs in ((Saturated, full), (DropOuts, away), (HeldSamples, None)):
             if runs is None:
-                runs = stretches.held(y, item.run.v)
+                runs = faults.held(y, item.run.v)
             wrong = np.zeros(len(y), dtype=bool)
             for a, b in runs:
                 wrong[a:b] = True
@@ -286,7 +286,7 @@ def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[F
 
 def _levels(y: Array, runs: Runs) -> set[float]:
     """Levels of runs with one value."""
-    return {float(y[a]) for a, b in runs if b - a >= stretches.SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
+    return {float(y[a]) for a, b in runs if b - a >= faults.SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
 
 
 def _finding(kind: type[Finding], item: Item, y: Array, runs: Runs) -> Finding:

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search.hypothesis import Actuator, NotFiniteError, Structure, Sums
 from hystgen.effects.base import Effect
-from hystgen.identification import joint, reduction, stage_content, weights
-from hystgen.identification.constrained import root_mean_square
-from hystgen.identification.joint import DIFFERENCE, Shaped
+from hystgen.identification import joint, pi, reduction, stage_content
+from hystgen.identification.joint import DIFFERENCE, Shaped, root_mean_square
+from hystgen.identification.quality import correlation_time
 from hystgen.identification.reduction import Reduced
-from hystgen.identification.uncertainty import correlation_time
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -115,8 +114,8 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
     if not np.isfinite(whole).all():  # the numbers are far out
         return Shaped(shape, p, math.inf, p, samples, derived)
     columns = np.arange(n1)
-    best = weights.non_negative(whole, columns)
-    return Shaped(shape, p, root_mean_square(weights.residual(whole, columns, best), samples), best, samples, derived)
+    best = pi.non_negative(whole, columns)
+    return Shaped(shape, p, root_mean_square(pi.residual(whole, columns, best), samples), best, samples, derived)
 
 
 @dataclass(frozen=True)
@@ -187,20 +186,20 @@ def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> 
     return begun(structure, items, start, p).further().found(p)
 
 
-def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, weights.Weights]:
+def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, pi.Weights]:
     """A hypothesis with p_0 raised to a share `floor` of the sum of weights if the records allow it, and its weights.
 
     As in `identify` (`weights.fit`); all other numbers stay.
     """
     p, here = fitted.weights, fitted.actuator
-    kept = weights.Weights(p, fitted.rms)
+    kept = pi.Weights(p, fitted.rms)
     if len(p) < 2 or p[0] >= floor * float(np.sum(p)):
         return fitted, kept
     blocks = [_Block(here, item, p) for item in items if item.known.any()]
     whole = reduction.triangle(*(block.system() for block in blocks))
     samples = sum(block.samples for block in blocks)
     system = Reduced(fitted.structure.thresholds, whole, (), (samples,))
-    made = weights.fit(system, np.arange(len(p)), floor)
+    made = pi.fit_weights(system, np.arange(len(p)), floor)
     if made.free_p0 is None:
         return fitted, kept
     return replace(fitted, weights=made.p, rms=made.rms), replace(made, free_p0=float(p[0]))

@@ -23,8 +23,8 @@ from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
 from hystgen.identification import joint
 from hystgen.identification.fronts import Kept
-from hystgen.identification.uncertainty import correlation_time
-from hystgen.identification.weights import Weights
+from hystgen.identification.pi import Weights
+from hystgen.identification.quality import correlation_time
 
 Array = NDArray[np.float64]
 
