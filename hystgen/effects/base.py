@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from hystgen.basics.jit import jit
 from hystgen.basics.words import counted
 from hystgen.effects import watched
 from hystgen.plays import operators
@@ -350,3 +351,33 @@ def decays(steps: Array, time_constant: float) -> tuple[Array, Array, Array]:
         # 1 - (1 - E)/s loses its digits for short steps
         late = np.where(s < 1e-3, s * (0.5 - s * (1.0 / 6.0 - s / 24.0)), 1.0 - mean)
     return decay, 1.0 - late - decay, late
+
+
+# Recursions of several effects, compiled when first used ------------------------------------------------------
+
+
+@jit
+def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Array) -> None:
+    """First-order filter from the state `x`: `x_(k+1) = decay_k x_k + early_k u_k + late_k u_(k+1)`."""
+    out[0] = x
+    for k in range(len(u) - 1):
+        x = decay[k] * x + early[k] * u[k] + late[k] * u[k + 1]
+        out[k + 1] = x
+
+
+@jit
+def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Array) -> None:
+    """Add `weight` times `scale xi^2 (c_2 + c_3 xi + ..)`, `xi = u/scale`, to `total`."""
+    for k in range(len(u)):
+        xi = u[k] / scale
+        value = 0.0
+        for c in coefficients[::-1]:
+            value = c + value * xi
+        total[k] += weight * (scale * xi * xi * value)
+
+
+def load() -> None:
+    """Have these compiled, or read from the cache, on two samples."""
+    u, step, out = np.arange(2.0), np.ones(1), np.empty(2)
+    follow(u, step, step, step, 0.0, out)
+    curve(u, 1.0, step, 1.0, out)

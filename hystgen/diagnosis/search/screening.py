@@ -20,7 +20,6 @@ from hystgen.diagnosis.data.items import Item, everything, needed, rms, thinned
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, Search
 from hystgen.diagnosis.search.hypothesis import Part, Structure
-from hystgen.effects import recursions
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
 from hystgen.identification.fronts import Bent, DeadZones, Ends, Front, Tanh, even_breaks
@@ -272,7 +271,7 @@ def _jobs(to_fit: Sequence[Item]) -> int:
         return 1
     jobs = parallel.cores()
     if jobs > 1:
-        recursions.load()
+        effects.load_compiled()
     return jobs
 
 
