@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 from scipy.stats import wilcoxon
 
 from hystgen.diagnosis import Diagnosis
-from hystgen.diagnosis.data import claims, disturbances, preparing, signals
+from hystgen.diagnosis.data import disturbances, preparing, signals
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.items import needed as needed_samples
 from hystgen.diagnosis.data.preparing import Prepared, prepare
@@ -34,7 +34,7 @@ from hystgen.diagnosis.search.screening import Option
 from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.front.dead_zone.model import DeadZone
-from hystgen.identification.fronts import Kept
+from hystgen.identification.joint import Kept
 from hystgen.identification.quality import correlation_time
 from hystgen.identification.reduction import settled
 from hystgen.records import Record
@@ -558,8 +558,8 @@ def good(width: float = 100.0) -> list[Record]:
     return [record(f"good{k}", width * smooth(k), 0.1 * width * smooth(k)) for k in range(3)]
 
 
-def kinds_of(records: Sequence[Record], predict: claims.Predict = straight) -> list[tuple[str, str]]:
-    return [(each.kind, str(each.entry()["record"])) for each in claims.checked(records, predict)[1]]
+def kinds_of(records: Sequence[Record], predict: preparing.Predict = straight) -> list[tuple[str, str]]:
+    return [(each.kind, str(each.entry()["record"])) for each in preparing.checked(records, predict)[1]]
 
 
 class TestWholeRecords:
@@ -619,7 +619,7 @@ class TestWholeRecords:
         area = 0.5 * abs(float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1])))
         noise = area / sigmas / (0.5 * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))))
         y = y + np.random.default_rng(1).normal(0.0, noise, len(y))
-        assert (claims._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
+        assert (preparing._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
 
     @pytest.mark.parametrize(
         ("share", "scatters", "left_out"),
@@ -629,9 +629,9 @@ class TestWholeRecords:
         random = np.random.default_rng(4)
         x = random.uniform(-1.0, 1.0, 4000)
         y = x + random.normal(0.0, 0.05, 4000)
-        without = claims._line(x, y)[1]
+        without = preparing._line(x, y)[1]
         y[: int(4000 * share)] = x[: int(4000 * share)] + 0.05 * scatters
-        assert (claims._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
+        assert (preparing._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
 
     @pytest.mark.parametrize(("share", "kind"), [(0.007, "saturated"), (0.014, "held_samples")])
     def test_a_converter_ends_at_its_end(self, share: float, kind: str) -> None:
@@ -650,7 +650,7 @@ class TestWholeRecords:
             error = np.where(np.arange(400) < settled(v, 10.0), start, rest) * np.resize([1.0, -1.0], 400)
             return SimpleNamespace(reach=10.0, errors=lambda _: [error])
 
-        assert (claims.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
+        assert (preparing.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
 
 
 def _orthogonal(x: Array, to: Array) -> Array:

@@ -44,7 +44,7 @@ from hystgen.effects.drift.model import LinearDrift
 from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
-from hystgen.identification.fronts import Bent, DeadZones, Ends, Kept
+from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record
 from hystgen.report import diagnosis as report
 from tests.plants import run as plants_run
@@ -119,7 +119,7 @@ class TestBlindPlants:
         (case, _), *_ = made(tmp_path, "none", 1)
         (tmp_path / "file").touch()
         (tmp_path / "taken" / "report.html").mkdir(parents=True)
-        monkeypatch.setattr("hystgen.report.diagnosed.diagnose", lambda *_, **__: pytest.fail("searched"))
+        monkeypatch.setattr("hystgen.report.diagnosis.diagnose", lambda *_, **__: pytest.fail("searched"))
         data = sorted(case.glob("r*.csv"))[:2]
         code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
         assert (code, out) == (2, "")

@@ -16,7 +16,7 @@ from recordings import brute_output, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.diagnosis.data import claims, disturbances, preparing, signals
+from hystgen.diagnosis.data import disturbances, preparing, signals
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.signals import one_loop, one_speed, reversals
 from hystgen.diagnosis.findings import content
@@ -27,7 +27,7 @@ from hystgen.diagnosis.search.hypothesis import Actuator, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
 from hystgen.identification import faults
-from hystgen.identification.fronts import Kept
+from hystgen.identification.joint import Kept
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -346,7 +346,7 @@ def check(
 ) -> tuple[list[Record | None], list[Finding]]:
     """Against a nominal model that is 20 % off."""
     model = Actuator(np.array(THRESHOLDS), (), ()), 1.2 * np.array(weights)
-    return claims.checked(given, lambda record: hypothesis.predicted(record, *model, HISTORY))
+    return preparing.checked(given, lambda record: hypothesis.predicted(record, *model, HISTORY))
 
 
 class TestWholeRecords:

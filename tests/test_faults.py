@@ -25,7 +25,7 @@ from hystgen.basics.problems import RecordError
 from hystgen.diagnosis.search import fits, hypothesis
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import IdentificationError, faults, prepared
-from hystgen.identification.fronts import Tanh
+from hystgen.identification.joint import Tanh
 from hystgen.records import Record, no_value, read_record
 
 pytestmark = pytest.mark.thorough

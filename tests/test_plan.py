@@ -18,7 +18,7 @@ import hystgen
 from hystgen import effects
 from hystgen.basics.problems import PlanError
 from hystgen.planning import plan as plans
-from hystgen.report.planned import Plan
+from hystgen.report.plan import Plan
 from tests.plants.__main__ import main as plants
 from tests.plants.effects import catalogue
 

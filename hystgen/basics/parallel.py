@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import ForkProcess
 
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -212,3 +213,13 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
         for _ in pool.map(work, items):
             pass
 
+
+# Threads of the linear algebra -------------------------------------------------------------------------------
+
+
+def one_thread() -> Any:
+    """Context in which linear algebra uses a single thread: on small matrices several wait for each other."""
+    import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+    return threadpool_limits(1)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, threads
-from hystgen.diagnosis.data import claims, disturbances, preparing
+from hystgen.basics import arguments, parallel
+from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.disturbances import Cleaned
 from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import Prepared
@@ -80,9 +80,9 @@ def diagnose(
         raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
-    with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
+    with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
         first = hypothesis.as_given(model.cascade, given)
-        usable, odd = claims.checked(read, lambda record: hypothesis.predicted(record, *first, before))
+        usable, odd = preparing.checked(read, lambda record: hypothesis.predicted(record, *first, before))
         to_fit, to_hold = (
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
@@ -138,7 +138,7 @@ class _Task:
         wrong = self._foreign(history)
         if wrong is None:
             done = self._searched(history)
-            wrong = claims.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
+            wrong = preparing.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
         if wrong is not None or done is None:
             try:
                 done = self._searched(None)
@@ -163,7 +163,7 @@ class _Task:
             others, refit_others = self._begun(None)
         except IdentificationError:  # everything that is compared depends on it
             return None
-        return claims.bends(ready.to_fit, refit(ready), refit_others(others))
+        return preparing.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
         ready, refit = self._begun(history)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from hystgen.basics.jit import jit
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 from hystgen.effects import watched
 from hystgen.plays import operators
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, threads
+from hystgen.basics import arguments, parallel
 from hystgen.basics.progress import Progress
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
@@ -114,7 +114,7 @@ def identify(
     kinds = gpi.KINDS if model == "auto" else (model,)
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
-    with threads.alone(), Progress(passes * samples, progress, "fitting") as bar:
+    with parallel.one_thread(), Progress(passes * samples, progress, "fitting") as bar:
         prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         if held:
             tried = [_try(courses, held, kind, how, bar) for kind in kinds]
@@ -147,7 +147,7 @@ def identify(
         largest = float(fitted.solution.thresholds[-1])
         reported += [text for each in errors if (text := quality.about_start(each, largest))]
     reported += quality.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
-    with threads.alone():
+    with parallel.one_thread():
         sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
     return Fit(

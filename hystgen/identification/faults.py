@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]

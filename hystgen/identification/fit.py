@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import arguments
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 from hystgen.identification import faults, joint, quality, reduction
 from hystgen.identification.quality import Intervals, Row, table
 from hystgen.identification.reduction import Course

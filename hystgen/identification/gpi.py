@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hystgen.front.stage import Stage
 from hystgen.identification import faults, joint, pi, reduction
-from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh, even_breaks
+from hystgen.identification.joint import DeadZones, Front, Kept, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
 from hystgen.plays import operators
@@ -149,7 +149,7 @@ def validation(shaped: joint.Shaped, front: Front) -> float:
         change, p = joint.solve_linear(training, shaped.weights, shaped.shape, front, 0.0)
         unknowns = np.concatenate([p, change])
         squares += pi.residual(left_out, np.arange(len(unknowns)), unknowns)
-    return joint.root_mean_square(squares, shaped.system.samples)
+    return pi.root_mean_square(squares, shaped.system.samples)
 
 
 def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
@@ -209,8 +209,8 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     bounds.append(np.concatenate([np.zeros(k), -length[:-1] / length[-1]]))
     limits.append(least - (high - low) / length[-1])
     try:
-        solution = joint.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
-    except joint.InfeasibleError:
+        solution = pi.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
+    except pi.InfeasibleError:
         return None
     slopes = np.append(solution[k:], ((high - low) - float(length[:-1] @ solution[k:])) / length[-1])
     return front.shape(slopes)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 from hystgen.identification import faults, pi
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 from hystgen.identification import joint, pi, reduction
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import Errors, Solution, Weights

@@ -4,9 +4,9 @@ Text tables (`t` time, `v` drive, `y` measured, any further columns) as instrume
 `.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. What is wrong with a file is refused, all of it at once and each
 with its place; small faults of a recording are repaired and counted in `Record.notes`.
 
-Of a text file, `csv_file` makes lines and reads the rows, once `layout`, or `instruments` for some, has found what is
-where in them; `cells` reads single cells. For every format, `columns` finds the columns asked for and sample rates, and
-`reading` makes the record of them.
+Of a text file, `csv_file` makes lines and reads the rows, once `layout` has found what is where in them; `cells` reads
+single cells. For every format, `columns` finds the columns asked for and sample rates, and `reading` makes the record
+of them.
 
 A format is a file of this package and an entry of `FORMATS`.
 """

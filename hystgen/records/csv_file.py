@@ -10,16 +10,15 @@ import io
 import os
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.problems import printable
-from hystgen.basics.words import counted
-from hystgen.records import instruments, layout
+from hystgen.basics.problems import counted, printable
+from hystgen.records import layout
 from hystgen.records.cells import BLANKS, COMMENT, MISSING, Clock, Dialect, is_comment, shape
 from hystgen.records.columns import LISTED, Column, column
 from hystgen.records.layout import Layout
@@ -118,11 +117,6 @@ SAMPLE = 1 << 16
 SAMPLE_LINES = 8
 """Fewest lines that show it, however long they are: a header, units and a few rows."""
 
-INSTRUMENTS: tuple[Callable[[Reading, Sequence[str]], Layout | None], ...] = (
-    instruments.labview, instruments.pi_gcs, instruments.tektronix,
-)  # fmt: skip
-"""Formats whose first lines say themselves what is where."""
-
 SPARE = 1.05
 """Rows are set aside for a file of so many times the rows that its first block makes expect."""
 
@@ -156,8 +150,7 @@ def _layout(reading: Reading, sample: str) -> Layout:
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
-    known = (each(reading, lines) for each in INSTRUMENTS)
-    found = next((each for each in known if each is not None), None) or layout.find(reading, lines)
+    found = layout.find(reading, lines)
     if found.kind:
         reading.understood(found.kind)
     dialect = found.dialect

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.problems import RecordError, printable
-from hystgen.basics.words import counted
+from hystgen.basics.problems import RecordError, counted, printable
 from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
 from hystgen.records.record import Array, Record, no_value
 

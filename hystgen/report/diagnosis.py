@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ParamSpec
 
+from hystgen import diagnosis
 from hystgen.basics import parallel
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
@@ -25,6 +28,21 @@ FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
 
 LONGER = 0.01
 """An error is visibly larger than another from this share on."""
+
+
+P = ParamSpec("P")
+
+
+def _with_page(find: Callable[P, Diagnosis]) -> Callable[P, Diagnosis]:
+    @functools.wraps(find)
+    def found(*given: P.args, **named: P.kwargs) -> Diagnosis:
+        return replace(find(*given, **named), page=html)
+
+    return found
+
+
+diagnose = _with_page(diagnosis.diagnose)
+"""`hystgen.diagnose`: what the search finds, with a page to write."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:

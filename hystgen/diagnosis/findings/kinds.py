@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 
 INTERPOLATION = "the sensor's interpolation error looks like this"
 

@@ -18,7 +18,8 @@ from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search.hypothesis import Actuator, NotFiniteError, Structure, Sums
 from hystgen.effects.base import Effect
 from hystgen.identification import joint, pi, reduction, stage_content
-from hystgen.identification.joint import DIFFERENCE, Shaped, root_mean_square
+from hystgen.identification.joint import DIFFERENCE, Shaped
+from hystgen.identification.pi import root_mean_square
 from hystgen.identification.quality import correlation_time
 from hystgen.identification.reduction import Reduced
 from hystgen.plays import operators

@@ -24,8 +24,7 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import joint, reduction
-from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh
-from hystgen.identification.joint import DIFFERENCE
+from hystgen.identification.joint import DIFFERENCE, DeadZones, Front, Kept, Tanh
 from hystgen.plays import operators
 from hystgen.records import Record
 

@@ -22,7 +22,7 @@ from hystgen.diagnosis.search.fits import Fitted, Search
 from hystgen.diagnosis.search.hypothesis import Part, Structure
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
-from hystgen.identification.fronts import Bent, DeadZones, Ends, Front, Tanh, even_breaks
+from hystgen.identification.joint import Bent, DeadZones, Ends, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
 from hystgen.identification import joint
-from hystgen.identification.fronts import Kept
+from hystgen.identification.joint import Kept
 from hystgen.identification.pi import Weights
 from hystgen.identification.quality import correlation_time
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen.basics.jit import jit
+from hystgen.basics.problems import counted
 from hystgen.basics.quantities import NotNegative, Positive
-from hystgen.basics.words import counted
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
 
 FASTEST = 0.01
