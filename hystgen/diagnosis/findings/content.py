@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure
-from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, Stretch, rounded
+from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, Stretch
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.selection import Found, Outcome
@@ -81,7 +82,23 @@ def result_of(
         ),
         inverse=inverse,
     )
-    return rounded(result)
+    in_digits: Result = _in_digits(result)
+    return in_digits
+
+
+def _in_digits(value: Any) -> Any:
+    """The value with eight digits in all its numbers, so that the same input gives the same text."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return type(value)(**{each.name: _in_digits(getattr(value, each.name)) for each in fields(value)})
+    if isinstance(value, Mapping):
+        return {key: _in_digits(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(map(_in_digits, value))
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and math.isfinite(value):
+        return float(f"{value:.8g}")
+    return value
 
 
 def _unexplained(
