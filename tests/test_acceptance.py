@@ -272,7 +272,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     """Steps that each option gets; `screen`: its held-out and fitted error, `joint`: its held-out error after that."""
     steps: dict[int, list[int]] = {k: [] for k in range(len(screen))}
 
-    class Crew:
+    class Pool:
         def each(self, tasks: Sequence[Any], _: Any) -> Any:
             for task in tasks:
                 steps[task.k].append(task.steps)
@@ -288,7 +288,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     pairs = [screening._Pair(option, option) for _ in screen]
     now: Any = SimpleNamespace(rms=1.0, weights=None)
     searches = screening._Searches(now, now, pairs, SimpleNamespace(tick=None, held=[]))  # type: ignore[arg-type]
-    screening._followed_up(searches, kept_ones, Crew())  # type: ignore[arg-type]
+    screening._followed_up(searches, kept_ones, Pool())  # type: ignore[arg-type]
     return steps
 
 

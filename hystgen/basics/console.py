@@ -61,7 +61,7 @@ def _output() -> Iterator[None]:
 
 
 def _discard(stream: Any) -> None:
-    """Have what is left for a stream thrown away, else the interpreter tries once more when it ends."""
+    """Have the remaining output of a stream thrown away, else the interpreter tries once more when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())

@@ -30,7 +30,7 @@ MOST = 16
 """Processes at most; each has its own results in memory."""
 
 _at_work: Sequence[int] | memoryview[int] = (0,)
-"""How many of the crew that this process is one of are at work."""
+"""Number of busy workers in this process's pool."""
 
 def cores() -> int:
     """How many processes may run here; 1 where they cannot be copied.
@@ -52,13 +52,13 @@ def _cores() -> int:
 def each(
     work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None] = lambda: None
 ) -> list[R]:
-    """`[work(item) for item in items]` by so many processes; results are pickled, `tick` is called for each of them.
+    """`[work(item) for item in items]` by `jobs` processes; results are pickled, `tick` is called for each of them.
 
     What fails in a process, or takes it down, is repeated here: an exception is raised as in a plain loop.
     """
-    crew: Crew[int, R] = Crew(lambda k: work(items[k]), jobs)
-    with crew:
-        return [result for _, result in crew.each(range(len(items)), tick)]
+    pool: Pool[int, R] = Pool(lambda k: work(items[k]), jobs)
+    with pool:
+        return [result for _, result in pool.each(range(len(items)), tick)]
 
 
 @dataclass(eq=False)
@@ -69,24 +69,24 @@ class _Task(Generic[T, R]):
     after: list[_Task[T, R]] = field(default_factory=list)
 
 
-class Crew(Generic[T, R]):
-    """Up to so many processes for the same work on things that come up one after the other; `with` lets them go.
+class Pool(Generic[T, R]):
+    """Up to `jobs` processes for the same work on items that come up one after the other; `with` ends them.
 
     They are made when the first things come, and see what this process had then; things and results are pickled.
     """
 
     def __init__(self, work: Callable[[T], R], jobs: int) -> None:
         self._work, self._jobs = work, jobs
-        self._hands: dict[Connection, ForkProcess] = {}
+        self._workers: dict[Connection, ForkProcess] = {}
         self._at_work = memoryview(mmap.mmap(-1, mmap.PAGESIZE)).cast("i")  # shared with the copies
 
-    def __enter__(self) -> Crew[T, R]:
+    def __enter__(self) -> Pool[T, R]:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for process in self._hands.values():
+        for process in self._workers.values():
             process.kill()
-        for reach, process in self._hands.items():
+        for reach, process in self._workers.items():
             process.join()
             reach.close()
 
@@ -109,7 +109,7 @@ class Crew(Generic[T, R]):
             tick()
             return task.after
 
-        if self._hands or min(self._jobs, len(tasks)) > 1:
+        if self._workers or min(self._jobs, len(tasks)) > 1:
             self._elsewhere(deque(tasks), finish)
         found = []
         for task in tasks:  # which grows
@@ -124,7 +124,7 @@ class Crew(Generic[T, R]):
         from multiprocessing import connection
 
         self._gather(len(waiting))
-        free = list(self._hands)
+        free = list(self._workers)
         busy: dict[Connection, _Task[T, R]] = {}
         failed = False
         while True:
@@ -142,7 +142,7 @@ class Crew(Generic[T, R]):
                 try:
                     result, failing = reach.recv()
                 except (EOFError, ConnectionResetError):
-                    self._hands.pop(reach).join()
+                    self._workers.pop(reach).join()
                     reach.close()
                     continue
                 free.append(reach)
@@ -158,9 +158,9 @@ class Crew(Generic[T, R]):
         # An interrupt is for this process; a copy that got it before it can ignore it would say so
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            while len(self._hands) < min(self._jobs, most):
+            while len(self._workers) < min(self._jobs, most):
                 here, there = fork.Pipe()
-                others = [here, *self._hands]
+                others = [here, *self._workers]
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 try:
                     process.start()
@@ -169,7 +169,7 @@ class Crew(Generic[T, R]):
                     return
                 finally:
                     there.close()
-                self._hands[here] = process
+                self._workers[here] = process
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
@@ -200,7 +200,7 @@ def _serve(
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
     """`work(item)` for all items, in threads that are gone when it is done; compiled work runs side by side there.
 
-    Where other cores have nothing else to do, as when the last of a crew is left with a long task; else a plain loop.
+    Where other cores are idle, as when the last worker of a pool has a long task; else a plain loop.
     """
     room = min(len(items), _cores() // max(1, _at_work[0]))
     if room < 2:

@@ -1,8 +1,8 @@
-"""Files that appear complete or not at all, and folders for what is under way.
+"""Files that appear complete or not at all, and folders for work under way.
 
 Whatever is written is made in a staging folder beside its place and then renamed. The folder goes when the work ends,
 however it ends; what a killed process leaves is removed by the next one that writes to the same place. A lock in it,
-which the system releases with the process, tells the two apart.
+which the system releases with the process, distinguishes the two.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict
 
 from hystgen.basics.jit import jit
 from hystgen.basics.problems import counted
-from hystgen.effects import watched
+from hystgen.effects import guarded
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -220,7 +220,7 @@ class Effect(BaseModel):
     place: ClassVar[Place]
     order: ClassVar[int] = 0
     selector: ClassVar[str] = "shape"
-    """key that tells the shapes of one name apart"""
+    """key that distinguishes the shapes of one name"""
     repeatable: ClassVar[bool] = False
     """whether a model may have several of this name"""
     timed: ClassVar[bool] = True
@@ -232,7 +232,7 @@ class Effect(BaseModel):
     fades: ClassVar[bool] = False
     """whether its start state is at rest behind the pause before a record whose history is known"""
     settled: ClassVar[tuple[str, ...]] = ()
-    """keys of conventions, and of numbers that a fit cannot tell from others: a refit leaves them as they are"""
+    """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"
@@ -242,10 +242,10 @@ class Effect(BaseModel):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """A user's own effect may fail or answer anything, and is watched."""
+        """A user's own effect may fail or answer anything, and is guarded."""
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):
-            watched.watch(cls, Effect, str(words[0]))
+            guarded.guard(cls, Effect, str(words[0]))
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""
@@ -302,7 +302,7 @@ class Effect(BaseModel):
         return y
 
     def added(self, run: Run) -> Array:
-        """ADDED: what is added to the output (N,)."""
+        """ADDED: the term added to the output (N,)."""
         return np.zeros(len(run.t))
 
     def transients(self, run: Run) -> Array:

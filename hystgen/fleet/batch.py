@@ -40,7 +40,7 @@ SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
 """Files that are taken from a folder."""
 
 KEPT_IN = ".hystgen"
-"""Folder, inside the output folder, of what is known of every unit that is done."""
+"""Folder, inside the output folder, with the results of finished units."""
 
 FIGURES = (
     "kind", "plays", "p_0", "width", "gain", "output_low", "output_high", "fit_rms", "fit_rms_percent",
@@ -88,7 +88,7 @@ class Fleet:
         return tuple(unit for unit in self.units if unit.outlier)
 
     def summary(self) -> str:
-        """One CSV row a unit: the same bytes in whatever order and by whatever number of processes they were fitted."""
+        """One CSV row a unit: the same bytes for any order and number of processes."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(COLUMNS)

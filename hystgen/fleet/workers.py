@@ -43,7 +43,7 @@ class SchedulerError(OSError):
 
 @dataclass(frozen=True)
 class Task:
-    """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and what is wanted.
+    """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and the results wanted.
 
     `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
     """

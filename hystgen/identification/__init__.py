@@ -44,7 +44,7 @@ NEAR_ZERO = 0.01
 """Share of the drive range by which a loading curve may miss 0 and fall back."""
 
 PASSES = 60.0
-"""About so many times the search for a front runs through all samples, for the progress bar."""
+"""Approximate number of times that the search for a front runs through all samples, for the progress bar."""
 
 MOST_PLAYS = 1000
 
@@ -93,7 +93,7 @@ def identify(
     comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
-    actuator: no record tells in which state the firmware will find it. Raises RecordError for unusable files,
+    actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
     """
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
@@ -167,7 +167,7 @@ def check_options(
     units: Mapping[str, str] | None = None,
     **_: object,
 ) -> tuple[_How, tuple[float, ...] | None]:
-    """What is asked of a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
+    """The request for a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
     arguments.choice("model", model, MODELS)
     p0_floor = arguments.real("p0_floor", p0_floor, "the sum of weights, as a share")
     how = _How(_checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)

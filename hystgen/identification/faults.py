@@ -22,7 +22,7 @@ LONGEST = 4
 """Most samples in a row that count as an isolated fault; more are something that the actuator or the sensor did."""
 
 FAR = 8.0
-"""An outlier lies so many standard deviations of its surroundings' scatter from their median."""
+"""Standard deviations of its surroundings' scatter by which an outlier is off their median."""
 
 LITTLE = 5e-4
 """Least scatter, as a share of the peak-to-peak output: a model of a simulation leaves next to nothing but at its
@@ -32,32 +32,32 @@ WINDOW = 15
 """Samples of the running median, more than twice `LONGEST`."""
 
 AROUND, CLEAR = 6, 2.5
-"""It jumps away and back by more than so many times what so many samples on either side move in a step."""
+"""An outlier jumps away and back by more than `CLEAR` times the steps of the `AROUND` samples on either side."""
 
 AT_ONCE = 0.7
-"""Each of the two jumps is at least so much of how far the samples lie from the line between their neighbours."""
+"""Least share of an outlier's distance from the line between its neighbours that each of the two jumps makes up."""
 
 TAIL, NORMAL_TAIL = 0.98, 2.326
 """A quantile of the deviations, and what it is for normal ones of standard deviation one."""
 
 STEP, STEP_OF_RANGE = 3.0, 0.02
-"""A step of the drive is so many times nearly all of its moves (`TAIL`), and such a share of its range."""
+"""A step of the drive is `STEP` times the quantile `TAIL` of its moves, and at least this share of its range."""
 
 MOST = 0.01
 """Largest share of samples that is left out as outliers; beyond it they are no outliers."""
 
 FEW = 2
-"""So many samples are left out of a record in any case: its first and its last."""
+"""Number of samples that may be left out of a record of any length: its first and its last."""
 
 LOST = 25.0
-"""After a gap of so many median steps the drive in between, and with it the memory, counts as unknown."""
+"""Median steps of a gap after which the drive in between, and with it the memory, counts as unknown."""
 
 SEEN, SIGMAS = 0.05, 4.0
-"""The output takes notice of a pulse of the drive where it moves by this share of what the drive's range makes it move,
-and by so many standard deviations of its noise."""
+"""The output responds to a pulse of the drive where it moves by this share of the expected motion, and by this number
+of standard deviations of its noise."""
 
 OUT_OF_SCALE = 3.0
-"""Outputs that lie so many ranges of the others beyond them are wrong where the drive does nothing of the kind."""
+"""Outputs this many ranges of the others beyond them are wrong, unless the drive is as far out."""
 
 
 def most(samples: int) -> int:
@@ -107,8 +107,8 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
 
 
 def _scatter(sizes: Array, faulty: int) -> float:
-    """Standard deviation of a normal distribution with the same middle, or tail, as sizes of which the largest may be
-    faulty: a model that misses sharp corners has wide tails, and so has a drive that makes them."""
+    """Standard deviation of a normal distribution with the same median, or tail, as these sizes without the `faulty`
+    largest: a model that misses sharp corners has wide tails, and so has a drive with sharp corners."""
     tail = float(np.quantile(np.sort(sizes)[:-faulty], TAIL)) / NORMAL_TAIL
     return max(1.4826 * float(np.median(sizes)), tail)
 
@@ -196,7 +196,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     # three of them are not small at a sample that stands apart
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
     least = max(STEP_OF_RANGE * span, FAR * usual_bend)
-    # of as many steps around the two jumps at most `LONGEST` + 1 belong to the pulse, and two to another one
+    # at most `LONGEST` + 1 of the steps around the two jumps belong to the pulse, and two to another one
     usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="nearest")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
     n = len(v)
@@ -215,7 +215,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
     """How far the output leaves the line through its surroundings at samples [first, last), and soon after.
 
-    `follows`: what the drive without the pulse makes the output do, about; as much is no notice of the pulse.
+    `follows`: the output's motion expected without the pulse, which is no response to it.
     """
     at_once = _bent(y[max(first - 1, 0) : last + 1])
     near = slice(max(first - 1, 0), last + LONGEST)
@@ -253,14 +253,14 @@ def smooth(record: Record) -> Record:
 
 
 def _beyond(x: Array, times: float) -> Flags:
-    """Samples that lie so many ranges of all but the outermost ones beyond these."""
+    """Samples that lie `times` ranges beyond all but the outermost ones."""
     low, high = _ends(x)
     away = times * (high - low)
     return np.asarray((x < low - away) | (x > high + away))
 
 
 def _ends(x: Array) -> tuple[float, float]:
-    """Least and largest but for as many as may be isolated faults."""
+    """Least and largest sample, not counting as many as may be isolated faults."""
     x = np.sort(x)
     return float(x[min(most(len(x)), len(x) // 2)]), float(x[max(len(x) - 1 - most(len(x)), len(x) // 2)])
 
@@ -292,7 +292,7 @@ class Piece:
 
 
 def between_gaps(record: Record) -> list[Piece]:
-    """The record, cut where so much time is missing that nothing is known of the drive in between."""
+    """The record, cut where the time missing is so long that the drive in between is unknown."""
     steps = np.diff(record.t)
     cuts = [0, *(np.flatnonzero(steps > LOST * record.sample_time) + 1).tolist(), len(record)]
     if len(cuts) == 2:
@@ -325,13 +325,13 @@ RAIL = 12
 """Fewest samples at the very end of the output's range that count as saturated."""
 
 SHARP, USUAL = 8.0, 0.98
-"""A drop-out begins and ends with a step of so many times this quantile of the steps."""
+"""A drop-out begins and ends with a step of `SHARP` times the quantile `USUAL` of the steps."""
 
 SWINGS = 0.4
 """A step beside steps of more than this share of it, but for one, is part of a swing."""
 
 LONGEST_DROP_OUT = 200
-"""Most samples of a drop-out, and of what is masked as one no more than a twentieth of the record."""
+"""Most samples of a drop-out, though never more than a twentieth of the record."""
 
 SHORT = 3
 """Fewer samples are isolated ones, which the fit leaves out by itself."""
@@ -340,14 +340,14 @@ MOVES_ON = 0.01
 """Least share of its range by which the drive goes on outwards while the output stands at a converter's end."""
 
 SUDDEN = 4.0
-"""A converter's end is reached in steps of less than so many times what the drive makes."""
+"""A converter's end is reached in steps of less than this many times the steps that the drive makes."""
 
 GRAINS = 8.0
-"""A coarse output is held where the drive moves it by so many of its steps."""
+"""A coarse output is held where the drive moves it by this many of its steps."""
 
 NEAR = 4
-"""How common equal samples are is asked of so many times the run on either side too: a drive that is slow there alone
-repeats a coarse converter's codes there alone."""
+"""Equal samples are counted over this many lengths of the run on either side too: where the drive is slow for a while,
+a coarse converter repeats its codes."""
 
 ROUNDING = 1e-9
 """Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""

@@ -1,4 +1,4 @@
-"""A fitted model: its figures, its predictions, its parameter file, and what was compared of each record."""
+"""A fitted model: its figures, its predictions, its parameter file, and the samples compared."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Fit:
         return joint.through_front(course, cascade_of(self.parameters).stages)
 
     def text(self) -> str:
-        """The parameter file: what was fitted on what as comments, then the parameters."""
+        """The parameter file: models and records of the fit as comments, then the parameters."""
         from hystgen.parameters.files import dump_parameters
 
         lines = ["Identified by hystgen; errors have a free offset a record."]
@@ -163,7 +163,7 @@ def _read(source: Source) -> Record:
 
 
 def visited(values: Sequence[float]) -> tuple[float, ...]:
-    """A history as plain numbers. Raises ValueError unless all are finite, TypeError for what is no list of numbers."""
+    """A history as plain numbers. Raises ValueError unless all are finite, TypeError unless they are a list."""
     return arguments.numbers("history", values, "[100, -100]")
 
 

@@ -129,7 +129,7 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
 def _shaped(
     courses: Sequence[Course], front: Front, thresholds: Array, before: Array | None, tick: Tick
 ) -> joint.Shaped:
-    """The best of what is found from several starts; `before`: the shape of the front tried before this one."""
+    """The best result of several starts; `before`: the shape of the front tried before this one."""
     starts = [front.straight]
     if isinstance(front, Tanh) and front.branches == 2 and before is not None:
         starts = [front.doubled(before)]

@@ -342,7 +342,8 @@ LEAST_CHANGE = 1e-8
 """It ends too when no shape number changes by more than this."""
 
 COMPARED = 200_000
-"""Samples that are compared while the shape is sought; of longer records each so many-th, all run through the plays."""
+"""Samples that are compared while the shape is sought; of longer records an even selection, though all run through the
+plays."""
 
 Tick = Callable[[int], None] | None
 
@@ -493,7 +494,7 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 def _rows_with_derivatives(
     course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and by how much each other version changes their weighted sum."""
+    """The plays behind the first version of a front, and the change of their weighted sum with every other version."""
     carried = []
     for stages in versions:
         rising, history = _session(course, stages)
@@ -515,7 +516,7 @@ def _rows_with_derivatives(
             found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
         found[:, 0] = 1.0
         found[:, -1] = course.y[start:stop]
-        # every so many-th sample stands for all of them
+        # one sample in `every` stands for all of them
         found = found[-start % every :: every]
         return found[np.isfinite(found[:, -1])] * math.sqrt(every) if compared else found[:0]
 

@@ -1,4 +1,4 @@
-"""Fitting a PI model to records: where the plays are put and how many there are, and their weights.
+"""Fitting a PI model to records: places, number and weights of the plays.
 
 The weights are non-negative least squares on the triangular system of `reduction`, whose offsets are projected out and
 hence free, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974, chapter 23) as scipy
@@ -20,7 +20,8 @@ from hystgen.identification.reduction import Course, Reduced, others, travel
 Array = NDArray[np.float64]
 
 DIGITS = 10
-"""Significant digits of fitted numbers: far below what a record tells, above what depends on the linear algebra."""
+"""Significant digits of fitted numbers: more than a record determines, fewer than depend on the linear algebra
+library."""
 
 DUST = 1e-9
 """A weight of less than this share of their sum is rounding, not a play."""
@@ -29,7 +30,7 @@ FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
     "else check which column is which"
 )
-"""What is said of records from which nothing is left of a model."""
+"""The message where no play is left in the model."""
 
 
 class IdentificationError(ValueError):
@@ -109,7 +110,7 @@ def compare(item: Course, r: Array, p: Array) -> Errors:
     return Errors(item, offset, error - offset)
 
 
-# Where the plays are put and how many there are --------------------------------------------------------------
+# Places and number of the plays ------------------------------------------------------------------------------
 
 
 LEAST_TRAVEL = 0.15
@@ -193,7 +194,7 @@ def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
 
 
 def rounded(x: float, digits: int) -> float:
-    """x to so many significant digits."""
+    """x to a number of significant digits."""
     return float(f"{x:.{digits}g}") if math.isfinite(x) else x
 
 
@@ -277,7 +278,7 @@ def residual(system: Array, columns: Columns, weights: Array) -> float:
 
 @dataclass(frozen=True)
 class Weights:
-    """Result of `fit`: the weights, their rms error, and what was done about p_0.
+    """Result of `fit`: the weights, their rms error, and whether p_0 was raised.
 
     `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None when it was not.
     """
@@ -294,7 +295,7 @@ def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
     p_0 is the slope just after a reversal, and the inverse divides by it. A record shows it only over the first,
     smallest travel, where a slight lag of sensor or amplifier already flattens the loop and drives the least-squares
     p_0 to zero. So when it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`; this is taken when
-    the rms error grows by at most 5 % of itself, that is when the data can hardly tell. Otherwise the smaller p_0 is
+    the rms error grows by at most 5 %, that is when the data hardly determine p_0. Otherwise the smaller p_0 is
     what the actuator does (series backlash for p_0 = 0: no inverse) and stays.
     """
     matrix, target = reduced.whole[:, columns], reduced.whole[:, -1]
@@ -381,5 +382,5 @@ def at_least(lower: Array, upper: Array) -> tuple[Array, Array]:
 
 
 def root_mean_square(squares: float, samples: int) -> float:
-    """rms of so many samples from the sum of their squares."""
+    """rms from the sum of squares of a number of samples."""
     return math.sqrt(squares / max(samples, 1))

@@ -25,10 +25,10 @@ LEFT = 0.1
 """Least share of a record that has to be left of it where its output stood at a converter's end."""
 
 ROUNDS = 4
-"""Most robust fits; there is one where it changes nothing about what is found."""
+"""Most robust fits; the first that finds the same faults is the last."""
 
 HALF = 0.25
-"""The drive is what is wrong where the output is then missed by less than half as much, squared."""
+"""The drive, not the output, is wrong where bridging it reduces the squared error to less than this share."""
 
 
 SMALLEST = 1e-20
@@ -39,7 +39,7 @@ that there are in double precision and in parameter files."""
 def courses(
     records: Sequence[Record], history: tuple[float, ...] | None, skip: int
 ) -> tuple[list[Course], list[str]]:
-    """The courses of the records and what was done to them, one sentence each.
+    """The courses of the records, and a sentence about each change.
 
     `history` precedes every record; behind a gap the memory is unknown again. Raises IdentificationError.
     """
@@ -112,7 +112,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
 
 
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
-    """The course without the samples at which the converter stood at its end; which end, its level and how many.
+    """The course without the samples at a converter's end; name, level and number of samples of each end.
 
     Raises IdentificationError where next to nothing is left.
     """
@@ -170,7 +170,7 @@ def _without_stretches(item: Course) -> tuple[Course, list[str]]:
 def mask_outliers(
     to_fit: list[Course], held: list[Course], wanted: int | tuple[float, ...] | None, floor: float
 ) -> None:
-    """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
+    """Leave out isolated samples of y that lie far from the prediction of a play sum fitted to their neighbours.
 
     Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
     that is bridged. The play sum is one of least trimmed squares (Rousseeuw and Van Driessen, Data Mining and Knowledge

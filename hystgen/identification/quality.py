@@ -120,13 +120,13 @@ TAILS = (0.025, 0.975)
 """Of 95 % intervals."""
 
 BLOCKS, MOST_BLOCKS = 40, 4000
-"""At least so many blocks, whatever the residuals remember; and at most, since more teach nothing."""
+"""Fewest blocks, however long the residuals' memory, and most: more improve nothing."""
 
 MANY = 100
 """Of more weights than this, those that are zero stay so in every redraw: then one factorisation serves all."""
 
 MEMORY = 4.0
-"""Blocks are so many times as long as the residuals' correlation time."""
+"""Length of a block in correlation times of the residuals."""
 
 SEED = 1
 
@@ -276,10 +276,11 @@ AMPLIFIES = 100.0
 """Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""
 
 SMALL_REACH = 0.1
-"""Largest threshold, as a share of the drive range, below which a record is said to show little hysteresis."""
+"""Largest threshold, as a share of the drive range, below which a warning says that a record shows little
+hysteresis."""
 
 STARTS, UNLIKE = 8, 3.0
-"""A start of so many samples whose rms error is so many times that of the rest tells of a wrong history."""
+"""Fewest samples of a start, and times the rms error of the rest above which its error shows a wrong history."""
 
 
 def about_model(

@@ -1,4 +1,4 @@
-"""What a fit takes over from the parameter file that it replaces: whatever no record can tell."""
+"""Settings that a fit takes over from the parameter file it replaces: everything that no record determines."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Settings:
         return replace(fit, parameters=make_parameters(data))
 
     def sentences(self, fit: Fit) -> list[str]:
-        """What was kept of the older file and what was not; `fit` as it was before."""
+        """Sentences about settings kept and left out; `fit` as it was before."""
         said = []
         if self.problem:
             said.append(f"{self.file}: nothing of what was there is kept, it is no parameter file: {self.problem}")

@@ -60,7 +60,7 @@ SLOW = 24.0
 """s of a slow record, at least."""
 
 SLOWER = 1.5
-"""A slow record lasts at least so many times as long as a fast one."""
+"""Least ratio of the lengths of a slow and a fast record."""
 
 FAST_SAMPLES = 1000
 """Samples of a fast record, about."""
@@ -257,7 +257,7 @@ class Grid:
         return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
 
     def rate(self, per_second: float, seconds: float) -> int:
-        """Most codes in so many seconds."""
+        """Most codes by which the drive moves in `seconds`."""
         return math.floor(Decimal(OF_RATE * per_second) * Decimal(seconds) * Decimal(1).scaleb(self.digits))
 
 
@@ -290,11 +290,11 @@ class Tempo:
         return cls(sample_time, max_rate, fast, slow, math.ceil(REST * slow), move)
 
     def seconds(self, ticks: int) -> float:
-        """The double nearest to the decimal of so many sample times."""
+        """The double nearest to the decimal of `ticks` sample times."""
         return float(ticks * Decimal(repr(self.sample_time)))
 
     def every_of(self, share: float, samples: int) -> int:
-        """Sample times between the samples of a record of so many, that lasts a share of a slow one."""
+        """Sample times between the `samples` of a record that lasts this share of a slow one."""
         return max(self.fast, round(share * self.slow / samples))
 
     @property

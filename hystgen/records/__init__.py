@@ -123,7 +123,7 @@ def read_record(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One record or path, or several, as a list. Raises TypeError for what is neither, such as a table or arrays."""
+    """One record or path, or several, as a list. Raises TypeError for anything else, such as a table or arrays."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     # Tables and mappings would give the names of their columns, which are no paths

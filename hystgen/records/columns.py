@@ -1,4 +1,4 @@
-"""What a file offers and which of it is ours: names of columns, their units, and sample rates given beside them."""
+"""Columns of a file: their names, units and sample rates, and which of them are ours."""
 
 from __future__ import annotations
 
@@ -244,13 +244,13 @@ MEANINGS = {
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
 }  # fmt: skip
-"""Words, one of which the name of a column has that may be meant where it is not called as we call it."""
+"""Words in names of columns that may be meant where none has our name."""
 
 DECIDE = {
     "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
     "u": frozenset(("target", "reference", "ref", "setpoint", "desired", "commanded", "command", "soll", "sollwert")),
 }
-"""Words that say which column is meant, whatever other words stand beside them."""
+"""Words that decide which column is meant, despite other words beside them."""
 
 OTHERWISE = frozenset(
     ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
@@ -419,7 +419,7 @@ class Finder:
         return meant[0] if len(meant) == 1 else None
 
     def _name_together(self) -> None:
-        """One question for all columns of which nothing is known."""
+        """One question for all columns that nothing identifies."""
         if len(self._unnamed) > 1:
             *others, last = (f'"{ours}"' for ours in self._unnamed)
             self.problems.append(

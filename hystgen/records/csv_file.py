@@ -118,7 +118,7 @@ SAMPLE_LINES = 8
 """Fewest lines that show it, however long they are: a header, units and a few rows."""
 
 SPARE = 1.05
-"""Rows are set aside for a file of so many times the rows that its first block makes expect."""
+"""Ratio of the rows that room is made for to the number that the first block suggests."""
 
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
@@ -146,7 +146,7 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
 
 
 def _layout(reading: Reading, sample: str) -> Layout:
-    """The layout that the first lines show, and what is said of it."""
+    """The layout that the first lines show; notes how it was understood."""
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
@@ -193,7 +193,7 @@ def _size(stream: IO[bytes]) -> int:
 
 @dataclass
 class _Fault:
-    """Something wrong, in words, where it is first, how many times it is there and where last."""
+    """A fault in words, with its first place, number of occurrences and last line."""
 
     text: str
     line: int
@@ -275,7 +275,7 @@ class _Body:
         return reading.finished(numbers, taken, self.lines)
 
     def _room(self, rows: int, size: int) -> None:
-        """Make room for so many more rows, at once for all that may come when these have `size` bytes."""
+        """Make room for `more` rows, at once for all that may follow if these have `size` bytes."""
         needed = self.rows + rows
         have = min((len(x) for x in self.stored.values()), default=needed)
         if needed <= have:
@@ -345,7 +345,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Line by line: finds what is wrong and where, and takes what is merely missing."""
+        """Line by line: reports wrong cells with their place, and accepts missing ones."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []

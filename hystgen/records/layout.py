@@ -278,7 +278,7 @@ def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequenc
 
 
 def _decided(reading: Reading, view: _View, lines: Sequence[_Line]) -> None:
-    """Refuse decimal commas all of which may be thousands marks."""
+    """Refuse decimal commas if every one of them may be a thousands mark."""
     if view.dialect.decimal == ".":
         return
     place, doubtful = None, ""
@@ -317,7 +317,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
-    """Whether a line may hold names, some of which are numbers, as those of channels."""
+    """Whether a line may hold names, even if some are numbers, such as those of channels."""
     text = {cell for cell in cells if view.dialect.weight(cell) < 0}
     numbers = all(cell in text or cell.isdecimal() for cell in cells if cell)
     return numbers and cells[0] in text and not _are_units(cells)
@@ -480,7 +480,7 @@ def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> i
 
 
 _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
-"""Settings that tell these files from others with a column TIME."""
+"""Settings that distinguish these files from others with a column TIME."""
 
 
 def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:

@@ -61,7 +61,7 @@ class Table:
 
 
 class Reading:
-    """One file being read: what was asked for, and what is found to be wrong or worth a note.
+    """One file being read: the request, and the problems and notes about it.
 
     `delimiter`: what separates cells, None where the file has to show it; `fills`: of each column with numbers that
     stand for no value which ones these are, in words; `read_as`: what was understood that the file does not say in the
@@ -236,7 +236,7 @@ def one_dimension(shape: tuple[int, ...]) -> int:
 
 
 class CountingFile(io.FileIO):
-    """A file that tells how many bytes were read from it."""
+    """A file that reports how many bytes were read from it."""
 
     def __init__(self, file: str, tick: Callable[[float], None]) -> None:
         super().__init__(file)

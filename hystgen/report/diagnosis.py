@@ -1,4 +1,4 @@
-"""The report of a diagnosis: one page on what is missing, how much it explains, and what is left."""
+"""The report of a diagnosis: one page on the missing effects, their share of the error, and the remaining error."""
 
 from __future__ import annotations
 

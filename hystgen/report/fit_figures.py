@@ -102,7 +102,7 @@ class Shown:
 
 
 def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
-    """The records of a fit with what is drawn of them; those held out last, as in `fit.used`."""
+    """The records of a fit as they are drawn; those held out last, as in `fit.used`."""
     if len(records) != len(fit.used):
         raise ValueError(f"the fit compared {len(fit.used)} records, those held out among them, not {len(records)}")
     return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
@@ -177,7 +177,7 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
 
 
 def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
-    """Measured and model along time, what was not compared shaded or marked."""
+    """Measured and model along time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
     low, high = float(good.min()), float(good.max())

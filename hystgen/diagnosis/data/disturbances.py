@@ -394,7 +394,7 @@ class Cleaned:
 
 
 def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Cleaned:
-    """The records without the lines that a model shows, which is refitted to what is left of them each time."""
+    """The records without the lines that a model shows; the model is refitted to them in every round."""
     for _ in range(ROUNDS):
         seen = found.seen_by(fitted)
         if not seen.lines:

@@ -33,7 +33,7 @@ COMPARISONS = 40, 2**23
 
 
 class Recent:
-    """The arrays used last, by key: at most `most` of them and `most_bytes` in all."""
+    """The arrays used last, by key: at most `most` of them, of `most_bytes` together."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self._most, self._most_bytes = most, most_bytes

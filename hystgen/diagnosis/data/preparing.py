@@ -1,4 +1,4 @@
-"""From records to what the fits compare: whether they are what they claim, what is fitted, held out or left out."""
+"""From records to the samples that fits compare: whole records and samples checked, held-out records set aside."""
 
 from __future__ import annotations
 
@@ -252,7 +252,7 @@ def _off(first: Sequence[Array], later: Sequence[Array]) -> OtherHistory | None:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Records to fit and held-out ones, and what was done to them.
+    """Records to fit and held-out ones, with notes on every change to them.
 
     `repaired`: faults that were left out or bridged; `drive`: range of the fitted drives; `thresholds`: of the plays.
     """
@@ -322,7 +322,7 @@ def prepare(
 def _courses(
     records: Sequence[Record], history: tuple[float, ...] | None
 ) -> tuple[list[Course], list[Saturated]]:
-    """The records as they take part, and what was left out at a converter's end."""
+    """The records as they take part, and the samples left out at a converter's end."""
     courses, saturated = [], []
     for record in records:
         course, ends = prepared.without_rails(prepared.course_of(record, history, 0))
@@ -454,7 +454,7 @@ Runs = Sequence[tuple[int, int]]
 
 
 def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
-    """The items without wrong samples, and these; `repaired`: what is known of the records already.
+    """The items without wrong samples, and findings about these; `repaired`: findings so far.
 
     A level that is a drop-out or the converter's end in one record is the same in all others.
     """

@@ -1,4 +1,4 @@
-"""The result of a search put together: what was found and how sure that is, what is left, and where it is."""
+"""The result of a search: the effects found and their certainty, the remaining error, and its place in the records."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def _evidence(each: Found) -> str:
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-    """The entry's keys without the name; for a front its stage. `later`: how many of that name were found after it."""
+    """The entry's keys without the name; for a front its stage. `later`: number of that name found after it."""
     k = fits.place(fitted, name, later)
     if k is None:
         return fits.stage(fitted, fitted.shape)
@@ -253,7 +253,7 @@ def described(items: Sequence[Item], errors: Sequence[Array], noise: float, held
 
 
 def _rate_free(free: float, with_rates: float) -> bool | None:
-    """Whether drive and memory explain as much as they do together with rates; None where nothing explains much."""
+    """Whether drive and memory explain the error without rates; None where nothing explains much of it."""
     if with_rates < acceptance.VARIABLE_SHARE and free < acceptance.VARIABLE_SHARE:
         return None
     return bool(free > acceptance.RATE_FREE_SHARE * with_rates)
@@ -392,7 +392,7 @@ WINDOWS = 24
 """Windows that each record is cut into; neighbours of one kind become one stretch."""
 
 LISTED = 12
-"""Stretches that are listed: as many as a reader looks at."""
+"""Most stretches that are listed: a reader looks at no more."""
 
 
 def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple[Stretch, ...]:

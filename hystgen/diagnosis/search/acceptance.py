@@ -50,7 +50,7 @@ def apart(more: float, less: float) -> float:
 
 
 def above_noise(removed: float) -> float:
-    """An error as a multiple of the noise, if it consists of noise and `removed` times as much of something else."""
+    """An error as a multiple of the noise, if it consists of noise and something else of `removed` times its rms."""
     return math.sqrt(1.0 + removed**2)
 
 

@@ -232,13 +232,13 @@ class Sure:
     parts: tuple[dict[str, Any], ...]
 
     def of(self, fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-        """The intervals of an effect; `later`: how many of its name were found after it."""
+        """The intervals of an effect; `later`: number of effects of its name found after it."""
         k = place(fitted, name, later)
         return self.front if k is None else self.parts[k]
 
 
 def place(fitted: Fitted, name: str, later: int) -> int | None:
-    """The part that an effect is, None for a front; `later`: how many of its name were found after it."""
+    """The part of an effect, None for a front; `later`: number of effects of its name found after it."""
     parts = [k for k, part in enumerate(fitted.structure.parts) if part.name == name]
     return parts[-1 - later] if later < len(parts) else None
 

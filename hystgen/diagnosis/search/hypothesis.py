@@ -244,7 +244,7 @@ class Actuator:
         return level, moved
 
     def added(self, item: Item) -> Array:
-        """The sum of what is added at the end of the chain, at the compared samples."""
+        """Sum of the terms added at the end of the chain, at the compared samples."""
         total = np.zeros(len(item.run.t))
         for effect in self.at(Place.ADDED):
             total = total + effect.added(item.run)

@@ -247,8 +247,8 @@ class Records:
         both = zip(options(now, known, self.user), options(rough, roughly, self.user), strict=True)
         found = [_Pair(*each) for each in both if worth is None or worth(each[0])]
         searches = _Searches(now, rough, found, self)
-        with parallel.Crew(searches, self.jobs) as crew:
-            return _followed_up(searches, _screened(searches, crew), crew)
+        with parallel.Pool(searches, self.jobs) as pool:
+            return _followed_up(searches, _screened(searches, pool), pool)
 
     def residual(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
@@ -375,10 +375,10 @@ class _Searches:
         return (search.further(task.steps, little) if task.steps else search).found(task.weights)
 
 
-_Crew = parallel.Crew[_Task, _Numbers]
+_Pool = parallel.Pool[_Task, _Numbers]
 
 
-def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
+def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     """The options after a few steps on thinned records: the best on fitted records, and on held-out ones.
 
     What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
@@ -406,7 +406,7 @@ def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
         return [_Task(_SCREEN, k, numbers.shape) for k in containing(found[task.k])]
 
     first = sorted((k for k, option in enumerate(found) if not option.beyond), key=cost, reverse=True)
-    done = {task.k: numbers for task, numbers in crew.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
+    done = {task.k: numbers for task, numbers in pool.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
     every = [screened(k, done[k]) for k in sorted(done)]
     tried = [each for each in every if not each.option.beyond]
     simpler = {each.option.label: each for each in tried if helps(each, *without)}
@@ -449,7 +449,7 @@ def _twins(one: _Screened, other: _Screened) -> bool:
     return all(abs(a - b) <= acceptance.TWIN * b for a, b in both)
 
 
-def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) -> list[Tried]:
+def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) -> list[Tried]:
     """The options fitted jointly and judged on held-out records, the best one first."""
     now, records = searches.now, searches.records
     found = {each.k: searches.found[each.k].option for each in kept}
@@ -463,7 +463,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) ->
 
     def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
-        return {task.k: numbers for task, numbers in crew.each(order, records.tick)}
+        return {task.k: numbers for task, numbers in pool.each(order, records.tick)}
 
     done = all_of([join(each) for each in kept])
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)

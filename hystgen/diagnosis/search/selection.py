@@ -175,7 +175,7 @@ def _everywhere(each: Tried, best: Tried, records: Records) -> float:
 def alike(other: Tried, best: Tried, noise: float) -> bool:
     """Whether the records leave open which of two effects it is.
 
-    What one explains more than the other has to be as much as makes an effect worth a name, and no chance.
+    What one explains beyond the other has to be enough to deserve a name, and no chance.
     """
     if no_worse(other.held_out, best.held_out, noise):
         return True

@@ -37,7 +37,7 @@ LARGE, TOGETHER = 10_000, 4
 
 
 MOST_PIECES = 1000
-"""A step of a nonlinear relaxation is cut into at most so many."""
+"""Most pieces into which a step of a nonlinear relaxation is cut."""
 
 CLOSE = 1e-7
 """Error of a piece of a nonlinear relaxation, in largest thresholds."""

@@ -12,7 +12,7 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""Starts below the fastest recorded rate, in decades: a limit that is never met, or always, tells nothing of itself."""
+"""Starts below the fastest recorded rate, in decades: a limit met never, or always, leaves no trace."""
 
 LEAST = 3.0
 """The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
