@@ -56,7 +56,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def taking(options_of: Callable[..., Any], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """The same for a call that passes its `**options` to `options_of`; its signature shows them; `name`: for messages."""
+    """The same for a call that passes its `**options` to `options_of`; shown in its signature; `name`: for messages."""
     handed = [
         each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for each in inspect.signature(options_of).parameters.values()
