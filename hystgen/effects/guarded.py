@@ -28,7 +28,7 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
 
 
 def guard(effect: type[Any], base: type[Any], name: str) -> None:
-    """Make the methods of a class and its bases below `base` raise EffectsError if they fail or return nothing usable."""
+    """Make the methods of a class, and of its bases below `base`, raise EffectsError where they fail."""
     own: dict[str, Any] = {}
     for each in reversed(effect.__mro__[: effect.__mro__.index(base)]):
         own.update(vars(each))

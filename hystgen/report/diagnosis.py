@@ -63,7 +63,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Before and after, on held-out records", [figures["overlay"]]),
         Section("Where model and measurement disagree", [figures["records"], figures["time"], *_where(result)]),
         Section("What the error goes with", [figures["against"], figures["frequency"]]),
-        Section("What cannot be told apart", _rivals(result)),
+        Section("What cannot be separated", _rivals(result)),
         Section("Shapes that were tried", _ranking(result)),
         Section("What was done to the data", [Listing(found.notes) if found.notes else Text("Nothing.")]),
         Section("Parameters", [Details("Parameter file with the effects added", parameters_text)]),

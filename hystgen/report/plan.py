@@ -48,7 +48,7 @@ def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
     figure = Figure("drives", wide, narrow, CAPTION, ALTERNATIVE)
     home = os.fspath(folder).rstrip("/\\")
     lead = [
-        Text(f"Drives that tell all effects apart. {plan.sentence()}"),
+        Text(f"Drives that separate all effects. {plan.sentence()}"),
         Text(f"When the measured records are in {home}/{MEASURED}, run:", plan.command(folder)),
     ]
     sections = [
@@ -120,7 +120,7 @@ def _limits(plan: Plan) -> list[str]:
         f"Cannot be seen: a slew limit above {_rate(plan, fastest)}, since no record is faster.",
         f"Cannot be seen: a resonance above {1.0 / (EDGE * fast):.3g} Hz, and lags and delays far below {fast:.3g} s, "
         "since no record is sampled more often.",
-        f"Cannot be told from drift: creep with time constants far above {lasting(plan.duration)}, the whole session.",
+        f"Not separable from drift: creep with time constants far above {lasting(plan.duration)}, the whole session.",
     ]
     if fast > 1.5 * plan.sample_time:
         said.append(

@@ -25,8 +25,8 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 ONE_LOOP = (
-    "all records pass one loop, which tells little more than of one effect: add smaller loops inside it, other speeds "
-    "and holds"
+    "all records pass one loop, which shows little more than one effect: add smaller loops inside it, other speeds and "
+    "holds"
 )
 """Advice about records of one loop alone."""
 
@@ -148,7 +148,7 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
 
 
 def _advice(one: str, other: str) -> str:
-    return f"{one} and {other} cannot be told apart by these records; hystgen diagnose --plan writes drives that can"
+    return f"{one} and {other} cannot be separated by these records; hystgen diagnose --plan writes drives that can"
 
 
 def _evidence(each: Found) -> str:

@@ -330,10 +330,10 @@ class Structure(Finding):
             advice.append(f"fit {alone} too and hold out others: what is left shows in held-out records alone")
         if self.rate_free is None:
             advice.append(
-                "record the same loops at two rates a decade apart: that tells whether what is left is rate-free"
+                "record the same loops at two rates a decade apart: that shows whether the remaining error is rate-free"
             )
         if self.repeatable is None:
-            advice.append("repeat a record ten times: that tells what of the rest comes back and what is noise")
+            advice.append("repeat a record ten times: that separates the part that comes back from noise")
         return advice
 
 
