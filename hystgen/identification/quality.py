@@ -318,8 +318,8 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
     if made.free_p0 is not None and made.free_rms is not None:
         return [
             f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
-            f"hardly determine it: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the measurement "
-            "lowers p_0: record more slowly if you can"
+            f"hardly determine it: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the "
+            "measurement lowers p_0: record more slowly if you can"
         ]
     if p[0] == 0.0:
         return [
