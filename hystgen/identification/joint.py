@@ -443,8 +443,8 @@ def search(
         if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
             break
         least = 0.5 * ENOUGH / now.samples
-        left = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
-        promised = root_mean_square(float(left @ left), now.samples)
+        residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
+        promised = root_mean_square(float(residual @ residual), now.samples)
         if now.rms - promised < least * now.rms:  # most of these steps fail, and each costs as much as any other
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None

@@ -160,9 +160,9 @@ def _without(error: Array, phase: Array) -> tuple[Array, float]:
     known = np.isfinite(error)
     table = np.column_stack([np.cos(phase[known]), np.sin(phase[known]), np.ones(int(np.count_nonzero(known)))])
     solution = np.linalg.lstsq(table, error[known], rcond=None)[0]
-    left = error.copy()
-    left[known] -= table[:, :2] @ solution[:2]
-    return left, float(np.hypot(solution[0], solution[1]))
+    residual = error.copy()
+    residual[known] -= table[:, :2] @ solution[:2]
+    return residual, float(np.hypot(solution[0], solution[1]))
 
 
 # A ripple with a fixed pitch over the position: interpolation errors and converter steps ---------------------
@@ -179,14 +179,14 @@ FINER = 4
 class _Motion:
     """The motion of a record, at the samples `at` that are compared.
 
-    `places`: predicted positions; `left`: errors; `moves`: how far the prediction moves from the sample before, NaN
+    `places`: predicted positions; `errors`: there; `moves`: how far the prediction moves from the sample before, NaN
     where the drive holds: there one position is measured again and again, and the model has been fitted to it. The
     measured position would not do: a ripple that is large against its pitch is no sine over itself.
     """
 
     at: NDArray[np.bool_]
     places: Array
-    left: Array
+    errors: Array
     moves: Array
 
     @classmethod
@@ -219,7 +219,7 @@ def in_position(items: Sequence[Item], errors: Sequence[Array]) -> Removed | Non
         now = motion.resolves(span / periods)
         if now.any():
             place = np.minimum(((motion.places[now] - low) / span * bins).astype(int), bins - 1)
-            summed += np.bincount(place, motion.left[now] - motion.left[now].mean(), bins)
+            summed += np.bincount(place, motion.errors[now] - motion.errors[now].mean(), bins)
     power = np.abs(np.fft.rfft(summed, FINER * bins)) ** 2
     power[: FINER * periods] = 0.0
     power[2 * bins // FINER :] = 0.0
@@ -253,7 +253,7 @@ def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
         return pitch
     every = max(1, sum(int(np.count_nonzero(now)) for _, now in parts) // MOST_SAMPLES)
     y = np.concatenate([motion.places[now][::every] for motion, now in parts])
-    e = np.concatenate([motion.left[now][::every] - motion.left[now].mean() for motion, now in parts])
+    e = np.concatenate([motion.errors[now][::every] - motion.errors[now].mean() for motion, now in parts])
 
     def removed(waves: float) -> float:
         table = np.column_stack([np.cos(2.0 * np.pi * waves * y), np.sin(2.0 * np.pi * waves * y)])
@@ -284,7 +284,7 @@ def _ripple(
             now = motion.resolves(pitch) & (way * motion.moves > 0.0)
             passed = np.sum(np.abs(motion.moves[now])) / pitch
             if np.count_nonzero(now) > acceptance.PASS_SAMPLES and passed > acceptance.PASS_PITCHES:
-                pieces.append((table[now], motion.left[now] - motion.left[now].mean()))
+                pieces.append((table[now], motion.errors[now] - motion.errors[now].mean()))
                 parts.append(k)
     if len(pieces) < 2:
         return None
@@ -339,15 +339,15 @@ def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | 
 def _strongest_first(
     items: Sequence[Item], errors: Sequence[Array], ways: Sequence[Way], least: float
 ) -> tuple[list[Line | Ripple], list[Array]]:
-    left, found = list(errors), []
+    remaining, found = list(errors), []
     for _ in range(acceptance.MOST_LINES):
-        seen = [line for line in (way(items, left) for way in ways) if line is not None and line.share >= least]
+        seen = [line for line in (way(items, remaining) for way in ways) if line is not None and line.share >= least]
         if not seen:
             break
         best = max(seen, key=lambda line: line.share)
         found.append(best.finding)
-        left = best.errors
-    return found, left
+        remaining = best.errors
+    return found, remaining
 
 
 # Records without the lines and ripples that rule their errors ------------------------------------------------
@@ -375,9 +375,10 @@ class Cleaned:
             error + (item.y - without.y)
             for item, without, error in zip(measured, clean, fitted.errors(clean), strict=True)
         ]
-        found, left = ruling(measured, errors)
+        found, remaining = ruling(measured, errors)
         items = [
-            replace(item, y=item.y - (error - rest)) for item, error, rest in zip(measured, errors, left, strict=True)
+            replace(item, y=item.y - (error - rest))
+            for item, error, rest in zip(measured, errors, remaining, strict=True)
         ]
         number = len(self.measured.to_fit)
         lines = tuple(replace(line, repaired=True) for k, line in enumerate(found) if not is_known(line, found[:k]))

@@ -60,7 +60,7 @@ class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
     `session`: all records of a session on one time axis, if they are of one, and `part` this record's samples of it.
-    `moved`: the last movements of the plays, which most numbers of a search do not change; `left`: the last errors
+    `moved`: the last movements of the plays, which most numbers of a search do not change; `residuals`: the last errors
     before the free offsets are fitted; `errors`: the same behind that.
     """
 
@@ -72,7 +72,7 @@ class Item:
     session: Run | None = None
     part: slice = field(default_factory=lambda: slice(None))
     moved: Recent = field(default_factory=lambda: Recent(*MOVEMENTS), init=False, repr=False, compare=False)
-    left: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
+    residuals: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
     errors: Recent = field(default_factory=lambda: Recent(*COMPARISONS), init=False, repr=False, compare=False)
 
     @cached_property
@@ -122,19 +122,19 @@ def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list
 
     `errors`: errors of a model over the records, NaN where they are not known.
     """
-    return [_needed(item, left, noise) for item, left in zip(items, errors, strict=True)]
+    return [_needed(item, residual, noise) for item, residual in zip(items, errors, strict=True)]
 
 
-def _needed(item: Item, left: Array, noise: float) -> Mask:
-    run, known, number = item.run, np.isfinite(left), len(item.run.t)
+def _needed(item: Item, residual: Array, noise: float) -> Mask:
+    run, known, number = item.run, np.isfinite(residual), len(item.run.t)
     if np.count_nonzero(known) < 2:
         return np.ones(number, dtype=bool)
-    left, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (left, item.y - left))
+    residual, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (residual, item.y - residual))
     as_drive = float(np.ptp(run.v)) / max(float(np.ptp(predicted)), 1e-300)
     bends = [  # signal, how far it may be off a straight line, and whether that is its rms or every sample
         (predicted, acceptance.THIN_STRAIGHT * noise, False),
         (run.v, acceptance.THIN_STRAIGHT * noise * as_drive, False),
-        (left, acceptance.THIN_RESIDUAL * noise, True),
+        (residual, acceptance.THIN_RESIDUAL * noise, True),
         *((column, acceptance.THIN_COLUMN * float(np.ptp(column)), True) for column in run.extra.values()),
     ]
     found, straight = np.zeros(number, dtype=bool), np.zeros(number, dtype=bool)

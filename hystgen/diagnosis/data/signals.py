@@ -76,9 +76,9 @@ def _holds(item: Item) -> list[tuple[float, int]]:
         s = (s - s.mean()) / max(float(np.std(s)), 1e-300)
         basis = np.column_stack([np.ones(len(y)), s, s**2, s**3])
         solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
-        left = y - basis @ solution
-        if not _rings(left):
-            parts.append((float(np.sum(left**2) / max(len(y) - 4, 1)), len(y)))
+        residual = y - basis @ solution
+        if not _rings(residual):
+            parts.append((float(np.sum(residual**2) / max(len(y) - 4, 1)), len(y)))
     return parts
 
 

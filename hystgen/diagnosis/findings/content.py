@@ -58,24 +58,24 @@ def result_of(
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
     gap = Gap(as_given, *(Errors(*map(rms, each)) for each in (before, after)))
-    left = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
+    remaining = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
     everything = [*ready.to_fit, *ready.held]
     rivals = tuple((each.name, rival) for each in found.found for rival in each.rivals)
-    structured = any(isinstance(each, Structure) for each in left)
+    structured = any(isinstance(each, Structure) for each in remaining)
     result = Result(
-        verdict="effects_found" if found.found else "unexplained" if left else "nothing_missing",
+        verdict="effects_found" if found.found else "unexplained" if remaining else "nothing_missing",
         noise_floor=noise.rms,
         output_range=max(float(np.ptp(item.y[item.known])) for item in everything if item.known.any()),
         unit=unit,
         gap=gap,
         effects=_effects(found, ready.to_fit, gap.refitted.holdout),
-        unexplained=(*left, *(each for each in odd if each not in left), *ready.repaired),
+        unexplained=(*remaining, *(each for each in odd if each not in remaining), *ready.repaired),
         where=worst(everything, [*before[0], *before[1]], noise.rms),
         not_separable=rivals,
         advice=(
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
             *([ONE_LOOP] if (rivals or structured) and one_loop else []),
-            *(more for each in left for more in each.advice()),
+            *(more for each in remaining for more in each.advice()),
         ),
         ranking=tuple(
             tuple(Contender(t.name, t.option.label, t.fitted.rms, t.held_out) for t in each) for each in found.rankings
@@ -112,7 +112,7 @@ def _unexplained(
     # a ripple hides jumps as noise does, where the position is not predicted well enough to take it out
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
     sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
-    left = [each for each in odd if not isinstance(each, Fault)] + new + sticking
+    remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
     held = errors[len(ready.to_fit) :]
     share, _ = shares(ready.held, held)
     share = max(share, *together(everything, errors))
@@ -121,8 +121,8 @@ def _unexplained(
             item.name for item, e in zip(ready.held, after[1], strict=True)
             if rms([e]) > acceptance.HELD_OUT_ALONE * usual
         )  # fmt: skip
-        left.append(described(everything, errors, noise, alone))
-    return left
+        remaining.append(described(everything, errors, noise, alone))
+    return remaining
 
 
 def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[NamedEffect, ...]:
@@ -278,13 +278,13 @@ def _share(values: Sequence[Array], errors: Sequence[Array]) -> float:
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, acceptance.VARIABLE_BINS + 1)))
     place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
     fold = _folds(len(e))
-    left = 0.0
+    unexplained = 0.0
     for k in (0, 1):
         train, test = fold != k, fold == k
         count = np.bincount(place[train], minlength=len(edges))
         mean = np.bincount(place[train], e[train], minlength=len(edges)) / np.maximum(count, 1)
-        left += float(np.sum((e[test] - mean[place[test]]) ** 2))
-    return max(0.0, 1.0 - left / max(float(np.sum(e**2)), 1e-300))
+        unexplained += float(np.sum((e[test] - mean[place[test]]) ** 2))
+    return max(0.0, 1.0 - unexplained / max(float(np.sum(e**2)), 1e-300))
 
 
 def _folds(n: int) -> NDArray[np.intp]:
@@ -329,13 +329,13 @@ def _averaged(v: Array, decay: float) -> Array:
 def _regressed(x: Array, e: Array) -> float:
     """Cross-validated share that a slightly ridged linear regression on rows x (k, N) explains of e (N,)."""
     fold = _folds(len(e))
-    left = 0.0
+    unexplained = 0.0
     for k in (0, 1):
         train, test = fold != k, fold == k
         matrix = x[:, train] @ x[:, train].T + 1e-3 * np.count_nonzero(train) * np.eye(len(x))
         solution = np.linalg.solve(matrix, x[:, train] @ e[train])
-        left += float(np.sum((e[test] - solution @ x[:, test]) ** 2))
-    return max(0.0, 1.0 - left / max(float(np.sum(e**2)), 1e-300))
+        unexplained += float(np.sum((e[test] - solution @ x[:, test]) ** 2))
+    return max(0.0, 1.0 - unexplained / max(float(np.sum(e**2)), 1e-300))
 
 
 def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:

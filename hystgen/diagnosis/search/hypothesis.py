@@ -230,12 +230,12 @@ class Actuator:
             if not np.isfinite(bent).all():
                 raise NotFiniteError
             moved = (self.mapped(h, level + step, item) - bent) / step
-            left, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
+            residuals, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
             if not np.any(slopes[0]):
                 break
-            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ left, rcond=1e-12)
+            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ residuals, rcond=1e-12)
             if np.any(np.abs(factors + change) > limits):
-                change = _within(slopes, left, -limits - factors, limits - factors)
+                change = _within(slopes, residuals, -limits - factors, limits - factors)
             factors += change
             shift = change @ free
             level = level + shift
@@ -288,12 +288,12 @@ class Actuator:
         by = self._mark(p), None if like is None else like[0]._mark(like[1])
         whole = item.errors.recalled(by)
         if whole is None:
-            left, offset = self._left(item, p)
-            known = np.isfinite(left)
+            residuals, offset = self._residual(item, p)
+            known = np.isfinite(residuals)
             free = (self.nuisances(item, offset) if like is None else like[0].nuisances(item))[:, known]
             largest = self.largest(item, p) if like is None else like[0].largest(item, like[1])
-            e = np.full(len(left), np.nan)
-            e[known] = left[known] - _within(free, left[known], -largest, largest) @ free
+            e = np.full(len(residuals), np.nan)
+            e[known] = residuals[known] - _within(free, residuals[known], -largest, largest) @ free
             whole = np.full(len(item.y), np.nan)
             whole[item.compared] = e
             whole.setflags(write=False)
@@ -309,19 +309,19 @@ class Actuator:
         effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
         return self.thresholds.tobytes(), self.stages, effects
 
-    def _left(self, item: Item, p: Array) -> Array:
+    def _residual(self, item: Item, p: Array) -> Array:
         """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
         by = self._mark(p)
-        found = item.left.recalled(by)
+        found = item.residuals.recalled(by)
         if found is None:
             rows, constant = self.columns(item, p)
             h, moved = rows[0] + constant, np.ones(rows.shape[1])
             if self.bends:
                 level, moved = self.level(h, item, self.largest(item, p))
                 h = self.mapped(h, level, item)
-            left = item.y[item.compared] - self.compared(h, item) - self.added(item)
-            found = np.stack([left, self.compared(moved, item)])
-            item.left.remember(by, found)
+            residuals = item.y[item.compared] - self.compared(h, item) - self.added(item)
+            found = np.stack([residuals, self.compared(moved, item)])
+            item.residuals.remember(by, found)
         return found
 
 
