@@ -1,4 +1,4 @@
-"""What a user's words may become in C: the model's name and the text of comments."""
+"""A user's words in C: the model's name and the text of comments."""
 
 from __future__ import annotations
 

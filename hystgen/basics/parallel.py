@@ -33,9 +33,9 @@ _at_work: Sequence[int] | memoryview[int] = (0,)
 """Number of busy workers in this process's pool."""
 
 def cores() -> int:
-    """How many processes may run here; 1 where they cannot be copied.
+    """Largest number of processes here; 1 where they cannot be copied.
 
-    A lock that another thread holds would stay locked in a copy, and libraries of other systems do not bear it.
+    A lock that another thread holds would stay locked in a copy, and some system libraries do not survive a fork.
     """
     import multiprocessing
 
@@ -98,7 +98,7 @@ class Pool(Generic[T, R]):
     ) -> list[tuple[T, R]]:
         """All the things with their results, in the order of a plain loop; `tick` is called for each of them.
 
-        `then`: what is to be done too, from a result; it goes first. What fails in a process, or takes it down, is
+        `then`: further tasks that follow from a result; they go first. What fails in a process, or takes it down, is
         repeated here: an exception is raised as in a plain loop.
         """
         tasks = [_Task[T, R](item) for item in items]
@@ -151,7 +151,7 @@ class Pool(Generic[T, R]):
                     waiting.extendleft(finish(task, result))
 
     def _gather(self, most: int) -> None:
-        """Make processes as long as there are fewer than things to do."""
+        """Make processes while there are fewer than tasks."""
         import multiprocessing
 
         fork = multiprocessing.get_context("fork")
@@ -180,9 +180,9 @@ def _serve(
     global _at_work
     _at_work = at_work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for ending in (signal.SIGTERM, signal.SIGHUP):  # what this process does at these is for its original to do
+    for ending in (signal.SIGTERM, signal.SIGHUP):  # the original process answers these signals
         signal.signal(ending, signal.SIG_DFL)
-    gc.freeze()  # looking through what is the parent's would take long, and copy all of it
+    gc.freeze()  # a garbage collection would copy all of the parent's memory
     for each in others:  # its ends, which would keep one copy waiting for the other when the parent is gone
         each.close()
     while True:

@@ -22,7 +22,7 @@ VISIT = 10.0
 VISIT_SAMPLES = 200
 
 GAP = 10.0
-"""Between two records of a session the drive holds if that many median steps lie between them, else it is straight."""
+"""Median steps between two records of a session from which the drive holds in between; else it is straight."""
 
 _BEHIND_OFFSET = 6
 
@@ -173,7 +173,7 @@ class Chain:
 
 
 def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-    """Rows (n+1, N) that the weights sum: the plays as the one effect that moves them says, behind all that bend them.
+    """Rows (n+1, N) that the weights sum: the plays, moved by the one effect that does so, behind all that bend them.
 
     `effects`: those of Place.PLAYS, in order.
     """

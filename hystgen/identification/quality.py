@@ -1,4 +1,4 @@
-"""How good a fit is: the fit table, confidence intervals, and what the user should know."""
+"""How good a fit is: the fit table, confidence intervals, and warnings."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ SEED = 1
 
 @dataclass(frozen=True)
 class Intervals:
-    """95 % intervals, and what they come from.
+    """95 % intervals, and the redraws behind them.
 
     `weights`: low and high of each; `width`: of the widest loop; `held_out`: of the held-out rms error, None
     where nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples in a block.
@@ -269,7 +269,7 @@ def _rms_interval(errors: Sequence[Array], random: np.random.Generator) -> tuple
     return float(low), float(high)
 
 
-# What the user should know, one sentence each ----------------------------------------------------------------
+# Warnings, one sentence each ---------------------------------------------------------------------------------
 
 
 AMPLIFIES = 100.0
@@ -286,7 +286,7 @@ STARTS, UNLIKE = 8, 3.0
 def about_model(
     solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
 ) -> list[str]:
-    """What the user should know about the model itself."""
+    """Warnings about the model itself, one sentence each."""
     reported = about_inverse(solution.weights, solution.fitted)
     low = min(item.drive_range[0] for item in compared)
     high = max(item.drive_range[1] for item in compared)
@@ -314,7 +314,7 @@ def about_model(
 
 
 def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
-    """What the user should know about p_0, which the inverse divides by; `p` as written, `made` as fitted."""
+    """Warnings about p_0, by which the inverse divides; `p` as written, `made` as fitted."""
     if made.free_p0 is not None and made.free_rms is not None:
         return [
             f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
@@ -349,7 +349,7 @@ def about_start(errors: Errors, largest: float) -> str:
 
 
 def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
-    """Of records that were measured once and given twice."""
+    """Warnings about records that were given twice."""
     reported = []
     for k, record in enumerate([*to_fit, *held]):
         for other in to_fit[: min(k, len(to_fit))]:

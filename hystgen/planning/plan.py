@@ -36,7 +36,7 @@ MARGIN = 0.01
 """Share of the input range, at each end, that no record enters."""
 
 OF_RATE = 0.98
-"""Share of the rate limit that is used: what rounding adds stays below the limit."""
+"""Share of the rate limit that is used, so that rounding stays below the limit."""
 
 SAMPLE_TIME = 1e-4
 """s, where neither the caller nor the parameter file gives one."""
@@ -128,7 +128,7 @@ class Plan:
         return (*(drive.name for drive in self.drives), "plan.html")
 
     def sentence(self) -> str:
-        """How much there is to measure, and how long it takes."""
+        """Number of records and samples, and the time they take."""
         held_out = sum(drive.held_out for drive in self.drives)
         return (
             f"{len(self.drives)} records, {held_out} of them held out, {self.samples} samples; the session takes "
@@ -222,7 +222,7 @@ def plan(
 
 
 def lasting(seconds: float) -> str:
-    """A duration as somebody says it."""
+    """A duration in everyday words."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.1f} {unit}"
@@ -495,7 +495,7 @@ def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
 
 @dataclass(frozen=True)
 class Kind:
-    """What a record is: file name, what it is for, which effects it shows, its waveform and time between samples."""
+    """A record: file name, purpose, effects that it shows, waveform and time between samples."""
 
     name: str
     purpose: str

@@ -55,9 +55,9 @@ def report_fit(
 ) -> Path:
     """Write the report of a fit: `report.html`, which needs nothing else, and its pictures; the path of the page.
 
-    `records`, `holdout`: as `identify` was given them, in the same order; what it read with options such as `columns`
-    has to come as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError
-    for other records, RecordError, OSError.
+    `records`, `holdout`: as `identify` was given them, in the same order; records read with options such as `columns`
+    have to be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises
+    ValueError for other records, RecordError, OSError.
     """
     if not isinstance(fit, Fit):
         raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")

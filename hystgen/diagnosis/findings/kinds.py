@@ -44,7 +44,7 @@ class Finding(ABC):
 class Fault(Finding):
     """A fault of the recording that is left out of the comparison or put right: the remaining record is sound.
 
-    `noun`: the thing that is counted of it; `qualifier`: the words behind that.
+    `noun`: for the count in a sentence; `qualifier`: the words behind it.
     """
 
     noun: ClassVar[str]
@@ -305,7 +305,7 @@ class Structure(Finding):
         return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
 
     def words(self) -> str:
-        """What it depends on, a predicate."""
+        """The dependence of the error, as a predicate."""
         parts = []
         if self.main_variable:
             share = 100.0 * self.share_by_variable[self.main_variable]

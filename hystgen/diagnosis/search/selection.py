@@ -29,12 +29,12 @@ from hystgen.identification.quality import correlation_time
 Array = NDArray[np.float64]
 
 
-# What an effect is worth, and which of several similar ones is taken -----------------------------------------
+# Merit of an effect, and the choice among several similar ones -----------------------------------------------
 
 
 @dataclass(frozen=True)
 class Merit:
-    """What an effect is worth: the rms that it removes from held-out and from fitted records, and how sure that is."""
+    """Merit of an effect: the rms that it removes from held-out and from fitted records, and how sure that is."""
 
     removed: float
     fitted: float
@@ -53,7 +53,7 @@ class Merit:
 
 
 def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
-    """What a tried effect is worth, or None.
+    """Merit of a tried effect, or None.
 
     None where chance explains the difference, where too little is removed to stand out of the noise, where hardly any
     of it is in the records that its numbers come from, and where records of one loop alone do not support a name.
