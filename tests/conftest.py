@@ -42,9 +42,9 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         with pytest.raises(SystemExit) as stopped:
             main([str(a) for a in arguments])
         out, err = capfd.readouterr()
-        # Kernels may have to be compiled first, which is told
-        told = [line for line in err.splitlines() if not line.startswith("compiling")]
-        return int(stopped.value.code or 0), out, "\n".join(told)
+        # Kernels may have to be compiled first, which is reported
+        printed = [line for line in err.splitlines() if not line.startswith("compiling")]
+        return int(stopped.value.code or 0), out, "\n".join(printed)
 
     return call
 

@@ -50,7 +50,7 @@ class Hypothesis:
 
 
 class World:
-    """Which hypotheses there are, and how much of what is missing each leaves; those not told leave everything."""
+    """Which hypotheses there are, and how much of what is missing each leaves; those not listed leave everything."""
 
     to_fit, held, noise = (0, 1, 2), (3, 4, 5), NOISE
     one_loop = one_speed = False

@@ -68,13 +68,13 @@ def made(folder: Path, kind: str, seeds: int) -> list[tuple[Path, dict[str, Any]
 
 
 def diagnosed(case: Path) -> dict[str, Any]:
-    told = json.loads((case / "session.json").read_text())
+    spec = json.loads((case / "session.json").read_text())
     found = hystgen.diagnose(
         case / "params.yaml",
-        [case / name for name in told["fit"]],
-        holdout=[case / name for name in told["holdout"]],
-        history=told["history"],
-        rest=told["rest"] or 0.0,
+        [case / name for name in spec["fit"]],
+        holdout=[case / name for name in spec["holdout"]],
+        history=spec["history"],
+        rest=spec["rest"] or 0.0,
     )
     content: dict[str, Any] = found.content
     return content
@@ -129,11 +129,11 @@ class TestBlindPlants:
 
     def test_the_command(self, tmp_path: Path, run: Call) -> None:
         (case, _), *_ = made(tmp_path, "single", 1)
-        told = json.loads((case / "session.json").read_text())
-        words = ["diagnose", case / "params.yaml", *(case / name for name in told["fit"]), "-o", tmp_path / "out"]
-        words += [word for name in told["holdout"] for word in ("--holdout", case / name)]
-        words += [f"--history={','.join(map(str, told['history']))}"] if told["history"] else []
-        words += ["--rest", told["rest"] or 0.0]
+        spec = json.loads((case / "session.json").read_text())
+        words = ["diagnose", case / "params.yaml", *(case / name for name in spec["fit"]), "-o", tmp_path / "out"]
+        words += [word for name in spec["holdout"] for word in ("--holdout", case / name)]
+        words += [f"--history={','.join(map(str, spec['history']))}"] if spec["history"] else []
+        words += ["--rest", spec["rest"] or 0.0]
         code, out, err = run(*words)
         assert code == 0, err
         content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
@@ -671,7 +671,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
 
 @pytest.mark.parametrize("held_out", [True, False])
 def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> None:
-    """Held out alone, others judge in its place; among others, it is told that it is not compared."""
+    """Held out alone, others judge in its place; among others, a note says that it is not compared."""
     rng = np.random.default_rng(1)
     ends = [rng.permutation(np.linspace(0, 100, 11)) for _ in "abcd"]
     drives = [np.concatenate([[50, 100, 0], np.interp(np.arange(900), np.arange(0, 901, 90), x)]) for x in ends]
@@ -682,10 +682,10 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     ]
     held = made[4:] if held_out else made[3:]
     found = hystgen.diagnose(_model(tmp_path), made[: 4 if held_out else 3], holdout=held)
-    told = " ".join(found.notes)
-    assert ("sweep: there is too little to judge by" in told) is held_out
-    assert ("that can judge: c set aside" in told) is held_out
-    assert ("sweep: says next to nothing, 1 sample" in told) is not held_out
+    spec = " ".join(found.notes)
+    assert ("sweep: there is too little to judge by" in spec) is held_out
+    assert ("that can judge: c set aside" in spec) is held_out
+    assert ("sweep: says next to nothing, 1 sample" in spec) is not held_out
     assert found.verdict == "nothing_missing"
 
 

@@ -96,8 +96,8 @@ class TestSilence:
         items = session(colour)
         if grain:
             items = [changed(item, grain * np.round(item.y / grain)) for item in items]
-        same, told = preparing.without_faults(items, [])
-        assert told == []
+        same, reported = preparing.without_faults(items, [])
+        assert reported == []
         assert same == items
         assert [faults.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
         assert disturbances.lines(items, errors(items))[0] == []
@@ -109,8 +109,8 @@ class TestSilence:
         assert preparing.without_faults(items, [])[1] == []
 
     def test_records_as_they_should_be(self) -> None:
-        kept, told = check(records())
-        assert told == []
+        kept, reported = check(records())
+        assert reported == []
         assert [one.name for one in kept if one is not None] == [each.name for each in records()]
 
 
@@ -124,10 +124,10 @@ class TestWrongSamples:
             for a, b in runs:
                 y[a:b] = -3.0 if constant else -3.0 + noise(b - a, a)
             items[k] = changed(items[k], y)
-        clean, told = preparing.without_faults(items, [])
-        assert [each.record for each in told] == ["r0.csv", "r2.csv", "r3.csv"]
+        clean, reported = preparing.without_faults(items, [])
+        assert [each.record for each in reported] == ["r0.csv", "r2.csv", "r3.csv"]
         for k, runs in places.items():
-            each = of_kind(DropOuts, told, f"r{k}.csv")
+            each = of_kind(DropOuts, reported, f"r{k}.csv")
             assert each.count == len(runs)
             assert each.samples == sum(b - a for a, b in runs)
             assert each.first == items[k].run.t[runs[0][0]]
@@ -156,8 +156,8 @@ class TestWrongSamples:
         for a, b in runs:
             y[a:b] = y[a]
         items[0] = changed(items[0], y)
-        clean, told = preparing.without_faults(items, [])
-        (each,) = told
+        clean, reported = preparing.without_faults(items, [])
+        (each,) = reported
         assert (each.kind, each.record, each.count) == ("held_samples", "r0.csv", 3)
         assert each.samples == sum(b - a for a, b in runs)
         assert each.first == items[0].run.t[200]
@@ -169,8 +169,8 @@ class TestWrongSamples:
         assert found[0] == [("largest", 9.0)]
         repaired = [Saturated("r0.csv", None, "largest", 9.0, 1)]
         assert preparing.not_at_the_end(repaired, items) == repaired
-        clean, told = preparing.without_faults(items, repaired)
-        assert {each.kind for each in told} == {"saturated"}
+        clean, reported = preparing.without_faults(items, repaired)
+        assert {each.kind for each in reported} == {"saturated"}
         for item, left in zip(items, clean, strict=True):
             at = np.flatnonzero(item.y == 9.0)
             assert np.count_nonzero(np.isnan(left.y)) >= np.count_nonzero(np.diff(at) == 1)
@@ -278,8 +278,8 @@ class TestPeriodic:
         assert signals.repetition(v) is None
         left = 0.05 * np.cos(2 * np.pi * frequency * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        told = [each.frequency for each in disturbances.lines([item], [left])[0] if each.kind == "line"]
-        assert told == ([pytest.approx(frequency, abs=0.01)] if seen else [])
+        reported = [each.frequency for each in disturbances.lines([item], [left])[0] if each.kind == "line"]
+        assert reported == ([pytest.approx(frequency, abs=0.01)] if seen else [])
 
 
 def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
@@ -390,9 +390,9 @@ class TestWholeRecords:
     def test_exchanged_columns_are_put_right(self, which: set[int]) -> None:
         given = records()
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
-        kept, told = check(wrong)
-        assert {each.record for each in told} == {f"r{k}.csv" for k in which}
-        assert {each.kind for each in told} == {"swapped_channels"}
+        kept, reported = check(wrong)
+        assert {each.record for each in reported} == {f"r{k}.csv" for k in which}
+        assert {each.kind for each in reported} == {"swapped_channels"}
         for one, right in zip(kept, given, strict=True):
             assert one is not None
             np.testing.assert_array_equal(one.v, right.v)
@@ -411,9 +411,9 @@ class TestWholeRecords:
             out = brute_output(np.concatenate([HISTORY, record.v]), THRESHOLDS, tuple(nominal_weights.tolist()), 0.0)
             given.append(replace(record, y=out[len(HISTORY) :] + gain * noise(len(record.v), 30 + k)))
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
-        kept, told = check(wrong, nominal_weights)
-        assert [each.record for each in told] == [f"r{k}.csv" for k in sorted(which)]
-        assert {each.kind for each in told} == {"swapped_channels"}
+        kept, reported = check(wrong, nominal_weights)
+        assert [each.record for each in reported] == [f"r{k}.csv" for k in sorted(which)]
+        assert {each.kind for each in reported} == {"swapped_channels"}
         assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
 
     def test_exchanged_columns_without_a_loop(self) -> None:
@@ -426,8 +426,8 @@ class TestWholeRecords:
     def test_outputs_exchanged_between_records(self) -> None:
         given = records()
         given[1], given[4] = replace(given[1], y=given[4].y), replace(given[4], y=given[1].y)
-        kept, told = check(given)
-        assert [(each.kind, each.record, each.other) for each in told] == [
+        kept, reported = check(given)
+        assert [(each.kind, each.record, each.other) for each in reported] == [
             ("exchanged_records", "r1.csv", "r4.csv"),
             ("exchanged_records", "r4.csv", "r1.csv"),
         ]
@@ -536,7 +536,7 @@ class TestIntervals:
 
 
 def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
-    """Drop-outs do not spoil the fit, hum is told and nothing is named, and the page says so."""
+    """Drop-outs do not spoil the fit, hum is reported and nothing is named, and the page says so."""
     given, hum = records(), records()
     for k, record in enumerate(hum):
         hum[k] = replace(record, y=np.asarray(record.y) + 0.06 * np.sin(2 * np.pi * 50.0 * record.t))

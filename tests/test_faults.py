@@ -187,8 +187,8 @@ class TestNoneInCleanRecords:
         for name, v in drives.items():
             y = output(np.asarray(v), noise)
             y = np.round(y / grain) * grain if grain else y
-            (item,), told = prepared.courses([record(np.asarray(v), y)], [0.0], 0)
-            assert told == [], name
+            (item,), reported = prepared.courses([record(np.asarray(v), y)], [0.0], 0)
+            assert reported == [], name
             assert np.array_equal(item.v, v), name
             assert np.isfinite(item.y).all(), name
             courses = [item]
@@ -201,8 +201,8 @@ class TestNoneInCleanRecords:
         sticks = np.floor(output(v, 0.0) / 0.4) * 0.4 + np.random.default_rng(1).normal(0.0, NOISE, len(v))
         backlash = brute_output(v, (0.0, 8.0), (0.0, 0.2), 0.0)
         for y in (sticks, backlash):
-            (item,), told = prepared.courses([record(v, y)], [0.0], 0)
-            assert told == []
+            (item,), reported = prepared.courses([record(v, y)], [0.0], 0)
+            assert reported == []
             assert np.isfinite(item.y).all()
 
     @pytest.mark.data
@@ -212,8 +212,8 @@ class TestNoneInCleanRecords:
         assert len(files) > 3
         for path in [*files, *EXAMPLES.glob("*.csv")]:
             given = read_record(path)
-            made, told = prepared.courses([given], (0.0,), 0)
-            assert told == [], path.name
+            made, reported = prepared.courses([given], (0.0,), 0)
+            assert reported == [], path.name
             assert all(np.isfinite(each.y).all() for each in made), path.name
             assert np.array_equal(np.concatenate([each.v for each in made]), given.v), path.name
 
