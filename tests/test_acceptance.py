@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import ast
+import csv
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
@@ -44,6 +46,10 @@ pytestmark = pytest.mark.thorough
 Array = NDArray[np.float64]
 
 
+MEASURED = ("tests/test_diagnosis.py::test_flexure_stage_with_its_start",)
+"""Tests in the table that need the measured records."""
+
+
 class TestTheModule:
     def test_every_number_has_a_unit_a_reason_and_a_run(self) -> None:
         texts = threshold_mutants.documented()
@@ -60,6 +66,38 @@ class TestTheModule:
 
     def test_only_the_known_ones_go_unnoticed(self) -> None:
         assert set(threshold_mutants.UNNOTICED) <= set(threshold_mutants.names())
+
+    def test_the_table_of_runs_is_complete(self) -> None:
+        """A row for each number as it is now, with a test that notices it times two or a half, and that there is."""
+        with threshold_mutants.TABLE.open(newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        assert tuple(head) == threshold_mutants.HEAD
+        assert [row[:3] for row in rows] == [
+            [name, str(getattr(acceptance, name)), threshold_mutants.unit(name)] for name in threshold_mutants.names()
+        ], "run python -m tests.threshold_mutants --write"
+        noticing = {row[0]: [test for test in row[3:] if test] for row in rows}
+        assert {name for name, tests in noticing.items() if not tests} == set(threshold_mutants.UNNOTICED)
+        for test in itertools.chain(*noticing.values()):
+            file_name, *path = test.partition("[")[0].split("::")
+            body: Any = ast.parse((threshold_mutants.ROOT / file_name).read_text(encoding="utf-8"))
+            for name in path:
+                found = [each for each in body.body if getattr(each, "name", None) == name]
+                assert found, f"{test} is not there; run python -m tests.threshold_mutants --write"
+                body = found[0]
+
+    @pytest.mark.slow(one_in=20)
+    @pytest.mark.parametrize(
+        ("name", "factor", "test"),
+        [
+            pytest.param(name, factor, test, marks=[pytest.mark.data] * (test.partition("[")[0] in MEASURED))
+            for name, tests in threshold_mutants.recorded().items()
+            for factor, test in tests.items()
+            if test
+        ],
+    )
+    def test_the_table_of_runs_is_right(self, name: str, factor: float, test: str) -> None:
+        assert threshold_mutants.noticed(name, factor, [test]) == test
+        assert not threshold_mutants.noticed(name, 1.0, [test])
 
     @pytest.mark.parametrize("name", ["NOISE", "FAR_ABOVE_NOISE", "P_SURE", "P_DIFFERENT"])
     @pytest.mark.parametrize("factor", threshold_mutants.FACTORS)
