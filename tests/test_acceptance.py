@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import csv
 import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -46,8 +47,22 @@ pytestmark = pytest.mark.thorough
 Array = NDArray[np.float64]
 
 
-MEASURED = ("tests/test_diagnosis.py::test_flexure_stage_with_its_start",)
-"""Tests in the table that need the measured records."""
+NOTICED = [
+    (name, factor, test)
+    for name, tests in threshold_mutants.recorded().items()
+    for factor, test in tests.items()
+    if test
+]
+"""Numbers, factors, and the tests that notice them, of `docs/thresholds.csv`."""
+
+ON_MEASURED = ("tests/test_diagnosis.py::test_flexure_stage_with_its_start",)
+"""Those of the tests that need the measured records."""
+
+
+def short(test: str) -> str:
+    """The name of a test as the texts of the numbers have it, without its case."""
+    file, *path = test.partition("[")[0].split("::")
+    return "::".join([file.removeprefix("tests/test_").removesuffix(".py"), *path])
 
 
 class TestTheModule:
@@ -57,6 +72,13 @@ class TestTheModule:
         for name, text in texts.items():
             assert text.startswith("["), name
             assert any(words in text for words in ("Set by:", "Changed by:", "Derived")), name
+
+    def test_the_tests_it_names_are_those_of_the_table(self) -> None:
+        """Numbers that stand together have one text."""
+        table, texts = threshold_mutants.recorded(), threshold_mutants.documented()
+        for text in set(texts.values()):
+            notice = {short(test) for name in texts if texts[name] == text for test in table[name].values() if test}
+            assert set(re.findall(r"\w+(?:::\w+)+", text)) <= notice, text
 
     def test_every_number_is_read_somewhere(self) -> None:
         sources = "".join(path.read_text() for path in (threshold_mutants.ROOT / "hystgen").rglob("*.py"))
@@ -86,26 +108,16 @@ class TestTheModule:
                 body = found[0]
 
     @pytest.mark.slow(one_in=20)
-    @pytest.mark.parametrize(
-        ("name", "factor", "test"),
-        [
-            pytest.param(name, factor, test, marks=[pytest.mark.data] * (test.partition("[")[0] in MEASURED))
-            for name, tests in threshold_mutants.recorded().items()
-            for factor, test in tests.items()
-            if test
-        ],
-    )
+    @pytest.mark.parametrize(("name", "factor", "test"), [row for row in NOTICED if row[2] not in ON_MEASURED])
     def test_the_table_of_runs_is_right(self, name: str, factor: float, test: str) -> None:
         assert threshold_mutants.noticed(name, factor, [test]) == test
         assert not threshold_mutants.noticed(name, 1.0, [test])
 
-    @pytest.mark.parametrize("name", ["NOISE", "FAR_ABOVE_NOISE", "P_SURE", "P_DIFFERENT"])
-    @pytest.mark.parametrize("factor", threshold_mutants.FACTORS)
-    def test_a_mutant_is_noticed(self, name: str, factor: float) -> None:
-        """The script itself, on tests of a moment."""
-        here = [f"tests/test_acceptance.py::{each}" for each in ("test_noise", "test_chance")]
-        assert threshold_mutants.noticed(name, factor, here)
-        assert not threshold_mutants.noticed(name, 1.0, here)
+    @pytest.mark.data
+    @pytest.mark.slow
+    @pytest.mark.parametrize(("name", "factor", "test"), [row for row in NOTICED if row[2] in ON_MEASURED])
+    def test_it_is_right_about_measured_records(self, name: str, factor: float, test: str) -> None:
+        assert threshold_mutants.noticed(name, factor, [test]) == test
 
 
 @pytest.mark.parametrize(
