@@ -26,6 +26,7 @@ from hystgen.parameters.files import Parameters, load_parameters
 
 if TYPE_CHECKING:
     from hystgen.chain.chain import Chain
+    from hystgen.compensator.chain.tables import ChainTables
     from hystgen.compensator.chained import Compensator
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
@@ -84,6 +85,42 @@ class Model:
                 "the model and its inverse in double precision"
             )
 
+    def need_compensated(self, arithmetic: str, operator: str) -> None:
+        """Raise where an operator in `arithmetic` cannot have all the model's effects, with all reasons.
+
+        Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse`.
+        """
+        if not self.effects:
+            return
+        names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
+        if self.parameters.sample_time is None:
+            raise EffectsError(f"C for a model with effects ({names}) needs sample_time in the parameter file")
+        if ARITHMETICS[arithmetic].fixed:
+            raise UnsupportedEffectsError(
+                f"effects ({names}) are compensated in float32 and float64, not in {arithmetic}"
+            )
+        if refused := self.refusals(operator):
+            raise UnsupportedEffectsError(
+                "not in the C: " + "; ".join(f"{effect.name}: {reason}" for effect, reason in refused)
+                + "; remove it from model.effects, or leave it out with --allow-partial"
+            )
+        if operator != "forward":
+            self.inverse()
+
+    def refusals(self, operator: str) -> list[tuple[Effect, str]]:
+        """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""
+        if not self.effects or self.parameters.sample_time is None:
+            return []
+        from hystgen.compensator.chain import tables as chain_tables
+
+        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time))
+
+    def without(self, effects: Sequence[Effect]) -> Model:
+        """The model with these of its effects left out."""
+        part = self.parameters.model
+        kept = tuple(effect for effect in part.effects if effect not in effects)
+        return Model(self.parameters.model_copy(update={"model": part.model_copy(update={"effects": kept})}))
+
     def engine(
         self,
         engine: str | None = None,
@@ -93,11 +130,19 @@ class Model:
     ) -> str:
         """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
         emit = self.parameters.emit
+        if self.effects:
+            return "loop"
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
         return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
 
-    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables:
+    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables | ChainTables:
         """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
+        if self.effects:
+            from hystgen.compensator.chain import tables as chain_tables
+
+            self.need_compensated(arithmetic, self.parameters.emit.operator)
+            assert self.parameters.sample_time is not None
+            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
 
     @property
@@ -137,8 +182,31 @@ class Model:
         if not self.effects:
             return self.session("forward", arithmetic, engine, clamp).run(v)[0]
         if arithmetic is not None:
-            self.need_static("the bit reference")
+            return self._reference(v, arithmetic, t, extra, inverse=False)
         return self.chain.simulate([self.run(v, t, extra, clamp)])[0]
+
+    def _reference(
+        self,
+        x: ArrayLike,
+        arithmetic: str,
+        t: ArrayLike | None,
+        extra: Mapping[str, ArrayLike] | None,
+        inverse: bool,
+    ) -> NDArray[Any]:
+        """Answers (N,) of the bit reference of a model with effects; see `simulate`."""
+        from hystgen.compensator.chain import run, tables
+
+        check_arithmetic(arithmetic)
+        self.need_compensated(arithmetic, "inverse" if inverse else "forward")
+        seconds = self.parameters.sample_time
+        assert seconds is not None
+        record = self.run(x, t, extra)
+        if np.max(np.abs(record.steps - seconds), initial=0.0) > run.EVEN * seconds:
+            raise EffectsError(
+                f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
+                "in double precision, which takes any times"
+            )
+        return run.answers(tables.build(self.chain, arithmetic, seconds), record, inverse)
 
     def run(
         self,
@@ -211,7 +279,7 @@ class InverseModel:
         if not self.forward.effects:
             return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
         if arithmetic is not None:
-            self.forward.need_static("the bit reference")
+            return self.forward._reference(u, arithmetic, t, extra, inverse=True)
         ends = self.forward.cascade.input_range if clamp else (-math.inf, math.inf)
         return self.forward.compensator.drives(self.forward.run(u, t, extra), ends)
 

@@ -78,7 +78,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *(f'#include "{file}"' for file in values.family.kernel_files),
             *values.arrays,
             *values.beside,
-            values.glue,
+            values.functions,
             *(f'#include "{file}"' for file in values.variant.sources()),
         ]
     )

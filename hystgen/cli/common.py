@@ -90,6 +90,9 @@ optimize_option = click.option(
 effects_option = click.option(
     "--effects", multiple=True, type=click.Path(), metavar="FILE.py", help="effects of your own (user:..); repeatable"
 )
+partial_option = click.option(
+    "--allow-partial", is_flag=True, help="leave out effects that the C cannot have; its banner names them"
+)
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,

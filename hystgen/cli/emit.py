@@ -20,6 +20,7 @@ from hystgen.cli.common import (
     load_model,
     operator_option,
     optimize_option,
+    partial_option,
 )
 
 if TYPE_CHECKING:
@@ -35,8 +36,9 @@ if TYPE_CHECKING:
 @optimize_option
 @layout_option
 @click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
+@partial_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
-def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, **options: str | None) -> None:
+def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, **options: Any) -> None:
     """Write the C files of models.
 
     Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
@@ -59,11 +61,9 @@ def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, 
             console.say(str(path))
 
 
-def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, str | None]) -> None:
+def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, Any]) -> None:
     """Exit code 1 with the differences of files on disk, and the commands that fit."""
-    from dataclasses import asdict
-
-    from hystgen.emission import calls, stale
+    from hystgen.emission import banner, calls, stale
 
     problems, advice = [], []
     for path, model in models:
@@ -71,12 +71,14 @@ def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[st
         if not found:
             continue
         given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
-        wanted = asdict(calls.emit_options(model, **options))  # type: ignore[arg-type]
+        partial_too = {"allow_partial": True} if options["allow_partial"] else {}
+        chosen = calls.emit_options(model, **options)
+        wanted = {key: getattr(chosen, key) for key in banner.OPTIONS} | partial_too
         problems += [f"error: {each.sentence()}" for each in found]
 
         def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
             try:
-                return calls.stale_files(model, output, **other)
+                return calls.stale_files(model, output, **other, allow_partial=options["allow_partial"])
             except ValueError:  # no such model any more
                 return list(found)
 

@@ -19,6 +19,7 @@ from hystgen.cli.common import (
     operator_option,
     optimize_option,
     params_argument,
+    partial_option,
 )
 from hystgen.verification.targets import NAMES as TARGETS
 
@@ -30,6 +31,7 @@ from hystgen.verification.targets import NAMES as TARGETS
 @engine_option
 @optimize_option
 @layout_option
+@partial_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
 @click.option("--target-length", type=click.IntRange(min=1), help="calls of a record on emulated cores")

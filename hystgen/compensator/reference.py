@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from hystgen.basics import jit
 from hystgen.compensator import step, step_fixed, step_float
+from hystgen.compensator.chain import step as chain_step
+from hystgen.compensator.chain.tables import ChainTables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
@@ -29,8 +31,10 @@ from hystgen.plays.corners.memory import new_fixed_memory, new_memory
 from hystgen.plays.slots import LOOP
 
 
-def operations(t: Tables | FixedTables) -> Operations:
+def operations(t: Tables | FixedTables | ChainTables) -> Operations:
     """What the bit reference is made of for the arithmetic and the engine of these tables."""
+    if isinstance(t, ChainTables):
+        return chain_step.OPERATIONS
     return _operations(t.engine == LOOP, t.fixed, t.has_front)
 
 
@@ -45,8 +49,10 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
     return run.made_of(forward_front, inverse_front, *ends) if front else run.made_of(forward, inverse, *ends)
 
 
-def new_state(t: Tables | FixedTables) -> Any:
+def new_state(t: Tables | FixedTables | ChainTables) -> Any:
     """Memory for one instance; `init` of its operations gives it its values."""
+    if isinstance(t, ChainTables):
+        return chain_step.new_state(t)
     if t.engine == LOOP:
         return loop.new_state(t)
     memory = new_fixed_memory if t.fixed else new_memory
@@ -54,7 +60,7 @@ def new_state(t: Tables | FixedTables) -> Any:
 
 
 def answers(
-    t: Tables | FixedTables, inverse: bool, call: Any, x: Any, compiled: bool = True
+    t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
     code, state = operations(t), new_state(t)

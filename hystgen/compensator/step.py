@@ -110,15 +110,20 @@ def inverse_replace(s: State, applied: Any, v: Any) -> None:
     s.counts[HAS_PENDING] = 1
 
 
-def made_of(
-    front_forward: Callable[..., Any],
-    front_inverse: Callable[..., Any],
-    output: Callable[..., Any],
-    inverse_solve: Callable[..., Any],
-    finite: Callable[..., Any],
-) -> Operations:
-    """The operations with the parts in which arithmetics differ: the memoryless part, the output for the memory as it
-    is, the input of the plays that gives an output, and whether an argument is a number."""
+class PlayOperations(NamedTuple):
+    """What plays behind a memoryless part do, in any chain: `init` and `reset` to a start memory, `arrive` at a drive,
+    and the `drive` that gives an input of the plays."""
+
+    init: Callable[..., Any]
+    reset: Callable[..., Any]
+    arrive: Callable[..., Any]
+    drive: Callable[..., Any]
+
+
+def plays_of(
+    front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
+) -> PlayOperations:
+    """The operations of plays, with the memoryless part and the output for the memory as it is."""
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
@@ -162,37 +167,6 @@ def made_of(
         s.real[DRIVE] = v
         return front_forward(t, v, s.counts[ASCENDING])
 
-    @jit(inline=True)
-    def absorb(t: Tables | FixedTables, s: State, v: Any) -> None:
-        """The actuator has seen drive v."""
-        loop_absorb(t, s, arrive(t, s, v))
-
-    @jit
-    def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
-        """Let the actuator be at drive v before the next sample."""
-        absorb(t, s, v)
-        s.real[LEVEL] = output(t, s)
-
-    @jit(inline=True)
-    def forward_step(t: Tables | FixedTables, s: State, v: Any) -> Any:
-        """One sample of the forward operator."""
-        if not finite(t, v):
-            s.counts[STATUS] |= HELD
-            return s.real[ANSWER]
-        inside = clamp_drive(t, v)
-        if inside != v:
-            s.counts[STATUS] |= INPUT_CLAMPED
-        absorb(t, s, inside)
-        s.real[ANSWER] = output(t, s)
-        return s.real[ANSWER]
-
-    @jit
-    def inverse_take(t: Tables | FixedTables, s: State) -> None:
-        """What is pending is what the actuator has seen."""
-        if s.counts[HAS_PENDING]:
-            absorb(t, s, s.real[PENDING])
-            s.counts[HAS_PENDING] = 0
-
     @jit
     def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
         """The drive on the branch of its own move: that of the reference's move first, the other one next, else no
@@ -223,6 +197,51 @@ def made_of(
         if limited:
             s.counts[BITS] |= DOMAIN
         return v
+
+    return PlayOperations(init, reset, arrive, inverse_drive)
+
+
+def made_of(
+    front_forward: Callable[..., Any],
+    front_inverse: Callable[..., Any],
+    output: Callable[..., Any],
+    inverse_solve: Callable[..., Any],
+    finite: Callable[..., Any],
+) -> Operations:
+    """The operations with the parts in which arithmetics differ: the memoryless part, the output for the memory as it
+    is, the input of the plays that gives an output, and whether an argument is a number."""
+    init, reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, output)
+
+    @jit(inline=True)
+    def absorb(t: Tables | FixedTables, s: State, v: Any) -> None:
+        """The actuator has seen drive v."""
+        loop_absorb(t, s, arrive(t, s, v))
+
+    @jit
+    def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
+        """Let the actuator be at drive v before the next sample."""
+        absorb(t, s, v)
+        s.real[LEVEL] = output(t, s)
+
+    @jit(inline=True)
+    def forward_step(t: Tables | FixedTables, s: State, v: Any) -> Any:
+        """One sample of the forward operator."""
+        if not finite(t, v):
+            s.counts[STATUS] |= HELD
+            return s.real[ANSWER]
+        inside = clamp_drive(t, v)
+        if inside != v:
+            s.counts[STATUS] |= INPUT_CLAMPED
+        absorb(t, s, inside)
+        s.real[ANSWER] = output(t, s)
+        return s.real[ANSWER]
+
+    @jit
+    def inverse_take(t: Tables | FixedTables, s: State) -> None:
+        """What is pending is what the actuator has seen."""
+        if s.counts[HAS_PENDING]:
+            absorb(t, s, s.real[PENDING])
+            s.counts[HAS_PENDING] = 0
 
     @jit(inline=True)
     def inverse_search(t: Tables | FixedTables, s: State, u: Any, level: Any, bits: int) -> Any:

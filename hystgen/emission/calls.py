@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hystgen.basics import arguments
 from hystgen.compensator import engines
-from hystgen.emission import files, module
+from hystgen.emission import files, module, worth
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, as_model, check_arithmetic
+from hystgen.parameters.files import parameters_sha256
 
 if TYPE_CHECKING:
     from hystgen.emission.stale import Difference
@@ -33,9 +34,12 @@ def emit_options(
     engine: str | None = None,
     layout: str = "self-contained",
     optimize: str | None = None,
+    allow_partial: bool = False,
 ) -> Options:
-    """What is to be emitted: the arguments given, else the parameter file's `emit` section."""
-    model.need_static("C")
+    """What is to be emitted: the arguments given, else the parameter file's `emit` section.
+
+    `allow_partial`: effects that the C cannot have are left out, and named in its banner.
+    """
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
     check_arithmetic(arithmetic)
@@ -43,11 +47,21 @@ def emit_options(
     arguments.choice("engine", engine or "auto", ("auto", *engines.ENGINES))
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
-    return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout)
+    left_out: tuple[str, ...] = ()
+    if allow_partial and (refused := model.refusals(operator)):
+        left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
+        model = model.without([effect for effect, _ in refused])
+    model.need_compensated(arithmetic, operator)
+    return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout, left_out)
+
+
+def emitted_model(model: Model, options: Options) -> Model:
+    """The model that the C is of: without what `options` leave out."""
+    return model.without([effect for effect, _ in model.refusals(options.operator)]) if options.left_out else model
 
 
 @arguments.taking(emit_options, "emit")
-def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
+def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     """Names and text of the C files of a model, or of several; options as for `emit`. Nothing is written.
 
     Raises what `emit` raises, and ValueError where two models make files of one name.
@@ -56,7 +70,9 @@ def emitted_files(source: Sources, **options: str | None) -> dict[str, str]:
     check_names(models)
     made: dict[str, str] = {}
     for model in models:
-        made |= module.files(model.parameters, model.cascade, emit_options(model, **options))  # type: ignore[arg-type]
+        chosen = emit_options(model, **options)
+        emitted = emitted_model(model, chosen)
+        made |= module.files(emitted.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
     return made
 
 
@@ -69,12 +85,12 @@ def check_names(models: Sequence[Model]) -> None:
 
 
 @arguments.taking(emit_options, "emit")
-def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[Path]:
+def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[Path]:
     """Write the C files of a model (or parameter file), or of several, into folder `output` and return their paths.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `optimize` auto, speed or size, for what `engine` auto chooses; `layout` self-contained, shared-runtime or
-    single-header. What is not given comes from the parameter file.
+    single-header; `allow_partial` leaves out effects that the C cannot have. What is not given comes from the file.
     Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
     FormatError and UnsupportedEffectsError; then nothing is written.
     """
@@ -82,7 +98,7 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: str |
 
 
 @arguments.taking(emit_options, "emit")
-def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: str | None) -> list[str]:
+def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
     """What in folder `output` is missing or other than what `emit` would write, one sentence a file.
 
     The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
@@ -92,7 +108,7 @@ def differences(source: Sources, output: str | os.PathLike[str] = ".", **options
 
 @arguments.taking(emit_options, "emit")
 def stale_files(
-    source: Sources, output: str | os.PathLike[str] = ".", **options: str | None
+    source: Sources, output: str | os.PathLike[str] = ".", **options: Any
 ) -> list[Difference]:
     """The differences behind the sentences of `differences`."""
     from hystgen.emission import stale

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
+from hystgen.compensator.chain.tables import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.emission.chain import STRUCTS, Field
 from hystgen.emission.options import Options
 from hystgen.plays import slots
 
@@ -110,6 +112,13 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
         "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
         **_corner_structs(real, fixed, layout),
+        "creep_term_t": layout.struct(*4 * [reach]),
+        "creep_table_t": layout.struct((layout.pointer, layout.pointer), *4 * [reach], count),
+        "lag_table_t": layout.struct(*4 * [reach]),
+        "lag_exact_table_t": layout.struct(*4 * [reach]),
+        "gain_table_t": layout.struct(*7 * [reach]),
+        "ageing_piece_t": layout.struct(*6 * [reach]),
+        "ageing_table_t": layout.struct((layout.pointer, layout.pointer), *3 * [reach], count, (1, 1)),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
@@ -125,19 +134,29 @@ def _constants(text: str, real: int, fixed: bool, layout: Layout, plays: int = 1
 
 
 def estimate(
-    cascade: StaticModel, options: Options, numbers: Tables | FixedTables, text: str, plays: str
+    cascade: StaticModel,
+    options: Options,
+    numbers: Tables | FixedTables | ChainTables,
+    text: str,
+    plays: str,
+    fields: Mapping[str, Sequence[Field]],
 ) -> Cost:
     """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs.
 
-    `plays`: the part of it that defines the tables with an entry for each play.
+    `plays`: the part of it that defines the tables with an entry for each play; `fields`: of a model with effects, the
+    memory of each operator.
     """
     fixed = isinstance(numbers, FixedTables)
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
+    static = numbers.plays if isinstance(numbers, ChainTables) else numbers
     worst = [
-        (op, worst_case(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
+        (op, worst_case(cascade.pi.n, op, corners, static)) for op in ("forward", "inverse") if getattr(options, op)
     ]
-    memory, avr = (_memory(cascade, options, fixed, text, plays, layout) for layout in (CORE_32, AVR))
+    if isinstance(numbers, ChainTables):
+        products = chain_products(numbers)
+        worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
+    memory, avr = (_memory(cascade, options, fixed, text, plays, layout, fields) for layout in (CORE_32, AVR))
     code = engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine)
     return Cost(code, memory, avr if known else None, worst)
 
@@ -149,7 +168,25 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
     return samples * sample, max(size for _, size in memory.instances)
 
 
-def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, plays: str, layout: Layout) -> Memory:
+def chain_products(t: ChainTables) -> dict[str, int]:
+    """Multiplications of the blocks of a model with effects in one step, of each operator."""
+    lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
+    gains = len(t.gain) + len(t.ageing.turns)
+    envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
+    stages = len(t.behind.stage_kind) + envelopes
+    absorbed = 3 * lags + creeps + 5 * states + gains + sum(4 + 2 * int(n) for n in t.ageing.turns)
+    return {"forward": absorbed + stages, "inverse": absorbed + 2 * lags + creeps + gains + stages + len(t.tap)}
+
+
+def _memory(
+    cascade: StaticModel,
+    options: Options,
+    fixed: bool,
+    text: str,
+    plays: str,
+    layout: Layout,
+    chain: Mapping[str, Sequence[Field]],
+) -> Memory:
     n = cascade.pi.n
     arithmetic = ARITHMETICS[options.arithmetic]
     real = arithmetic.bytes
@@ -160,7 +197,9 @@ def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, play
     for op in ("forward", "inverse"):
         if not getattr(options, op):
             continue
-        if options.engine == "corners":
+        if op in chain:
+            size = layout.struct(*(_field(each, real, layout) for each in chain[op]))[0]
+        elif options.engine == "corners":
             size, a_play = _corner_instance(n, op, real, bool(cascade.stages), fixed, layout)
         else:
             fields = [real] * (1 + branches) + [1] * branches + [layout.integer]
@@ -170,6 +209,14 @@ def _memory(cascade: StaticModel, options: Options, fixed: bool, text: str, play
         sizes.append((op, size))
     more = _constants(plays, reach, fixed, layout, n + 1) + a_play * len(sizes)
     return Memory(_constants(text, reach, fixed, layout), sizes, more)
+
+
+def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
+    """Size and alignment of a field of an instance."""
+    one = {"flag": 1, "status": layout.integer}.get(field.kind, real)
+    reals, flags = STRUCTS.get(field.kind, (0, 0))
+    size, alignment = layout.struct(*reals * [(real, real)], *flags * [(1, 1)]) if reals else (one, one)
+    return size * max(field.count, 1), alignment
 
 
 def _corner_instance(n: int, op: str, real: int, front: bool, fixed: bool, layout: Layout) -> tuple[int, int]:

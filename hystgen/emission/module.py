@@ -14,10 +14,14 @@ import jinja2
 from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.basics.version import __version__
+from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
-from hystgen.emission import banner, cost, layout, numbers, runtime, selftest
+from hystgen.compensator.chain import tables as chain_tables
+from hystgen.compensator.chain.tables import Compiled
+from hystgen.emission import banner, chain, cost, layout, numbers, runtime, selftest
 from hystgen.emission.layout import define
 from hystgen.emission.options import Options
+from hystgen.emission.text import literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
 
@@ -41,11 +45,17 @@ def render(template: str, values: SimpleNamespace, **more: object) -> str:
     return _environment().get_template(template).render({**vars(values), **more})
 
 
-def files(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, str]:
-    """File names and their ASCII text. Raises NotInvertibleError and tables.FormatError."""
+def files(
+    parameters: Parameters, cascade: StaticModel, options: Options, sha256: str | None = None
+) -> dict[str, str]:
+    """File names and their ASCII text; `sha256`: of the parameters that the file has, by default these.
+
+    Raises NotInvertibleError and tables.FormatError.
+    """
     if options.inverse and cascade.inverse_problems():
         raise NotInvertibleError(cascade.inverse_problems())
     values = values_of(parameters, cascade, options)
+    values.sha256 = sha256 or values.sha256
     name, shared = parameters.name, options.layout == "shared-runtime"
     single = options.layout == "single-header"
 
@@ -85,7 +95,8 @@ def _implementation(values: SimpleNamespace) -> str:
         runtime.verbatim(files, values.name, family, values.name)
         for files in (family.opening, (*family.soft(values.kernels), "apart.h"), family.closing)
     )
-    parts = (opening, apart, values.kernels, render("tables.c.j2", values), values.operators, closing)
+    tables = render("tables.c.j2", values)
+    parts = (opening, apart, values.kernels, values.types, tables, values.operators, closing)
     return "\n".join(parts)
 
 
@@ -165,6 +176,15 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
     }
 
 
+def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) -> Compiled | None:
+    """The numbers of a model with effects; None without any."""
+    effects = parameters.model.effects
+    if not effects:
+        return None
+    assert parameters.sample_time is not None, "emit_options asks for it"
+    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time)
+
+
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
     """What the templates are filled with, and what the cost is counted from."""
     name = parameters.name
@@ -173,9 +193,11 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     prefix = "hystgen_" + about["family"].bits if shared else name
     corners = options.engine == "corners"
     n = cascade.pi.n
+    compiled = compiled_of(parameters, cascade, options)
     values = SimpleNamespace(
         **about,
-        **numbers.fields(parameters, cascade, options, prefix),
+        **(numbers.chain_fields(parameters, compiled, options, prefix) if compiled
+           else numbers.fields(parameters, cascade, options, prefix)),
         name=name,
         NAME=name.upper(),
         rt=prefix,
@@ -194,21 +216,35 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     )
     family: runtime.Family = values.family
     values.variant = runtime.Variant(
-        options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list
-    )
+        options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list,
+        compiled is not None, compiled is not None and bool(compiled.tables.slew),
+        compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
+    )  # fmt: skip
+    glue: chain.Glue | None = getattr(values, "glue", None)
+    values.timing = _timing(parameters, compiled) if compiled else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
-    values.glue = render("front.c.j2", values) if values.stages else ""
-    pieces = runtime.operator_pieces(values.variant, operators, values.glue)
+    front = render("front.c.j2", values) if values.stages else ""
+    values.functions = front + "\n" + glue.functions if glue else front
+    calls = glue.calls if glue else {}
+    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
-    states = runtime.state_pieces(values.variant, operators)
+    values.types = ""
+    if glue:
+        types = runtime.chain_types("\n".join(glue.states.values()))
+        states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
+        own = runtime.needed(types, sorted(runtime.used(pieces)))
+        tables = [piece for piece in own if piece not in states]
+        values.types = runtime.render_operators(tables, name, 0, prefix, family)
+    else:
+        states = runtime.state_pieces(values.variant, operators)
     values.states = runtime.render_operators(states, name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
-    values.api = runtime.api(operators, name, prefix, family)
+    values.api = runtime.api(operators, name, prefix, family, calls)
     values.build = runtime.verbatim(family.build, name, family, name)
     values.typedefs = _typedefs(values)
     values.limits = _limits(values)
@@ -242,7 +278,7 @@ def _limits(values: SimpleNamespace) -> list[str]:
     drive, output = ("drive codes", "output codes") if values.fixed else (
         f"drive{values.units.drive}", f"output{values.units.output}"
     )  # fmt: skip
-    found = [("N_PLAYS", str(values.n), "")]
+    found = [("N_PLAYS", str(values.n), ""), *values.timing]
     if values.fixed:
         found += [("DRIVE_LSB", values.drive_lsb, "physical units a code; code 0 is 0"),
                   ("OUTPUT_LSB", values.output_lsb, "")]  # fmt: skip
@@ -256,10 +292,23 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    if values.inverse and values.branches:
-        words = "the same while both take the same branch"
+    apart = values.variant.slew and values.inverse_rounding_error != values.inverse_max_error
+    if values.inverse and (values.branches or apart):
+        words = "the same while " + " and ".join(
+            ["both take the same branch"] * values.branches + ["no slew limit acts"] * values.variant.slew
+        )
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
+
+
+def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
+    """Macros of a model with effects about time."""
+    kind = compiled.tables.threshold.dtype.type
+    return [
+        ("SAMPLE_TIME", literal(kind(parameters.sample_time)), "s, from step to step"),
+        ("PREVIEW", str(compiled.ahead), "samples that the argument of step is ahead of the motion"),
+        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
+    ]
 
 
 def _status(values: SimpleNamespace) -> list[str]:
@@ -272,6 +321,8 @@ def _status(values: SimpleNamespace) -> list[str]:
          else "NaN or infinite input: the last answer was held"),
         ("DOMAIN", 8, "inverse: the argument of an envelope was limited" if values.envelopes
          else "never set: no envelope limits an argument"),
+        *([("SLEW_LIMITED", 16, "the drive was kept within its rate"),
+           ("LIMITED_SETTING", 32, "an offset, gain or temperature was limited")] if values.variant.chain else []),
     ]  # fmt: skip
     return [define(f"{values.NAME}_STATUS_{name}", f"{bit}u", comment) for name, bit, comment in found]
 
@@ -286,7 +337,8 @@ def _macros(values: SimpleNamespace) -> list[str]:
 
 
 def _command(name: str, options: Options) -> str:
-    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}"
+    partial = " --allow-partial" if options.left_out else ""
+    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}{partial}"
 
 
 def _units(parameters: Parameters) -> SimpleNamespace:
@@ -299,6 +351,12 @@ def _units(parameters: Parameters) -> SimpleNamespace:
     )
 
 
+def calls_of(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, list[str]]:
+    """By operator, the functions that a model with effects has beside those of every model."""
+    glue: chain.Glue | None = getattr(values_of(parameters, cascade, options), "glue", None)
+    return glue.calls if glue else {}
+
+
 def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
     """What the emitted model costs, as its banner says."""
     found: cost.Cost = values_of(parameters, cascade, options).cost
@@ -307,7 +365,9 @@ def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> c
 
 def _cost(cascade: StaticModel, options: Options, values: SimpleNamespace, kernels: str) -> cost.Cost:
     text = _implementation(values) + (kernels if values.shared else "")
-    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays))
+    glue: chain.Glue | None = getattr(values, "glue", None)
+    fields = glue.fields if glue else {}
+    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), fields)
 
 
 def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str]:
@@ -323,6 +383,8 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
     about = comment_text(parameters.description)
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in cascade.stages]
     model = f"{cascade.pi.n} plays" + (f" behind {', '.join(kinds)}" if kinds else "")
+    names = dict.fromkeys(effect.name for effect in parameters.model.effects)
+    model += f"; effects {', '.join(names)}" if names else ""
     estimate: cost.Cost = values.cost
     avr = [] if estimate.avr is None else [
         f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in all, "
@@ -343,6 +405,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         *([about] if about else []),
         f"Model: {model}; arithmetic {options.arithmetic}; engine {options.engine}; operator {options.operator}; "
         f"layout {options.layout}",
+        *(f"Not compensated: {words}" for words in options.left_out),
         *([""] if values.precision else []),
         *values.precision,
         "",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import textwrap
 from collections.abc import Sequence
@@ -14,10 +15,14 @@ from hystgen.basics.names import comment_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
+from hystgen.compensator.chain.bounds import chain_bounds
+from hystgen.compensator.chain.tables import Compiled
 from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.emission import chain
 from hystgen.emission.options import Options
 from hystgen.emission.text import WIDTH, literal, operand, structure, table
 from hystgen.front.curve import FORWARD, INVERSE
+from hystgen.front.stage import StageTables
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
@@ -59,13 +64,43 @@ def _limits(numbers: Tables | FixedTables, more: Sequence[tuple[str, str, str]] 
     }
 
 
+def chain_fields(
+    parameters: Parameters, compiled: Compiled, options: Options, prefix: str
+) -> dict[str, Any]:
+    """The same of a model with effects, `glue` with its blocks."""
+    name, tables = parameters.name, compiled.tables
+    static = dataclasses.replace(compiled.static, output_offset=0.0)
+    behind = [
+        stage(tables.behind, j, name, f"{prefix}_real_t", options, "behind")
+        for j in range(len(tables.behind.stage_kind))
+    ]
+    operators = [op for op in ("forward", "inverse") if getattr(options, op)]
+    glue = chain.glue(compiled, operators, name, behind)
+    limits, dtype = tables.limits, tables.threshold.dtype.type
+    bounds = chain_bounds(compiled, options.arithmetic)
+    plays = _float_fields(parameters, static, options, prefix)
+    return {
+        **plays,
+        "numbers": tables,
+        "output_min": operand(limits[slots.OUTPUT_MIN]),
+        "output_max": operand(limits[slots.OUTPUT_MAX]),
+        "constants": [*plays["constants"], *glue.constants],
+        "beside": [*plays["beside"], *glue.arrays, *glue.beside],
+        "envelopes": plays["envelopes"] or any(one["kind"] == "envelope" for one in behind),
+        "forward_max_error": operand(float_tables.upward(bounds.forward, dtype)),
+        "inverse_max_error": operand(float_tables.upward(bounds.inverse, dtype)) if options.inverse else "",
+        "inverse_rounding_error": operand(float_tables.upward(bounds.rounding, dtype)) if options.inverse else "",
+        "glue": glue,
+    }
+
+
 def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     name, real_t = parameters.name, f"{prefix}_real_t"
     corners = options.engine == "corners"
     numbers = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
     dtype = numbers.threshold.dtype.type
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
-    stages = [_stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
+    stages = [stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
     arrays = (_corner_fields if corners else _loop_fields)(numbers, name, prefix, options)
     own = [] if corners else [_loop_tables(_loop_pointers(name, options), numbers, name, prefix)]
     return {
@@ -173,10 +208,13 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
     return found
 
 
-def _stage(numbers: Tables, j: int, name: str, real_t: str, options: Options) -> dict[str, Any]:
-    """A stage of the memoryless part: its kind, its tables, and how the chain names them and what they limit."""
+def stage(
+    numbers: StageTables, j: int, name: str, real_t: str, options: Options, where: str = "stage"
+) -> dict[str, Any]:
+    """A stage of the memoryless part, or of saturation: its kind, its tables, and how the chain names them and what
+    they limit."""
     data = numbers.stage_data[int(numbers.stage_first[j]) :]
-    own = f"stage_{j + 1}"
+    own = f"{where}_{j + 1}"
     prefix = real_t.removesuffix("real_t")
     if numbers.stage_kind[j] == slots.TANH:
         ascending, descending = data[:7], data[7:14]

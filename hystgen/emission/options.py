@@ -12,12 +12,16 @@ OPERATORS = banner.OPTIONS["operator"]
 
 @dataclass(frozen=True)
 class Options:
-    """What to emit: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`."""
+    """What to emit: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
+
+    `left_out`: effects that the C does not have, in words, where that is allowed.
+    """
 
     operator: str
     arithmetic: str
     engine: str
     layout: str
+    left_out: tuple[str, ...] = ()
 
     @property
     def forward(self) -> bool:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 
@@ -27,6 +28,10 @@ FLOAT_KERNELS = (
     "loop_absorb.c",
     "loop_solve.c",
 )
+CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
+CHAIN_BLOCKS = ("creep.c", "lag.c", "lag_exact.c", "ageing.c", "gain.c", "preview.c")
+"""What models with effects have of their own, also beside a shared run time."""
+
 FIXED_KERNELS = (
     "over_slope.c",
     "corners_fixed.c",
@@ -123,7 +128,9 @@ class Variant:
     """The kind of a model, which decides on the files of the run time that its operators are made of.
 
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
-    drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value.
+    drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value; `chain`: it has
+    effects, `slew`: one of them keeps the drive within a rate, `ages`: one is a gain that follows the travel, `moves`
+    and `bends`: how plays move and are bent where that is not as in engine loop.
     """
 
     engine: str
@@ -133,6 +140,11 @@ class Variant:
     finer: bool = False
     saturates: bool = False
     start_list: bool = False
+    chain: bool = False
+    slew: bool = False
+    ages: bool = False
+    moves: str = ""
+    bends: str = ""
 
     def state(self, operator: str) -> str:
         """The header with the type of an instance."""
@@ -156,8 +168,14 @@ class Variant:
     def _loop(self) -> tuple[str, ...]:
         front = "branches" if self.branches else "front" if self.fronts else "plain"
         kind = "fixed" if self.fixed else "float"
+        start = "loop_start_list.c" if self.start_list else "loop_start.c"
+        if self.chain:
+            slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
+            moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
+            plays = moving if self.moves else ("chain_plays.c",)
+            return (start, f"loop_{front}.c", slew, *plays, "chain.c", *more)
         return (
-            "loop_start_list.c" if self.start_list else "loop_start.c",
+            start,
             f"loop_{front}.c",
             f"loop_output_{kind}.c",
             "loop.c",
@@ -252,10 +270,25 @@ def table_pieces(family: Family) -> list[Piece]:
     return _pieces(family.tables)
 
 
-def operator_pieces(variant: Variant, operators: Iterable[str], glue: str) -> list[Piece]:
-    """The functions of a model's operators, with those that `glue` defines for it."""
-    wanted = [piece.name for op in operators for piece in _pieces([f"hystgen_{op}_api.h"])]
-    return needed([*split_pieces(glue), *_pieces(variant.sources())], wanted)
+def operator_pieces(
+    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({})
+) -> list[Piece]:
+    """The functions of a model's operators, with those that `glue` defines for it; `calls` as for `api`."""
+    blocks = CHAIN_BLOCKS if variant.chain else ()
+    wanted = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
+    return needed([*_pieces(blocks), *split_pieces(glue), *_pieces(variant.sources())], wanted)
+
+
+def chain_types(glue: str) -> list[Piece]:
+    """The types of blocks and of instances of models with effects, those before these."""
+    return [*_pieces(CHAIN_TYPES), *split_pieces(glue)]
+
+
+def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
+    """Prototypes of an operator: those of every model, and of what models with effects have beside, the ones named."""
+    chain = {f"hystgen_{operator}_{each}" for each in more}
+    beside = [piece for piece in _pieces([f"hystgen_chain_{operator}_api.h"]) if piece.name in chain]
+    return [*_pieces([f"hystgen_{operator}_api.h"]), *beside]
 
 
 def state_pieces(variant: Variant, operators: Iterable[str]) -> list[Piece]:
@@ -302,9 +335,11 @@ def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: s
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
 
 
-def api(operators: Iterable[str], name: str, prefix: str, family: Family) -> str:
-    """Prototypes of a model's functions."""
-    text = "\n".join("".join(piece.text for piece in _pieces([f"hystgen_{op}_api.h"])) for op in operators)
+def api(
+    operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]]
+) -> str:
+    """Prototypes of a model's functions; `calls`: by operator, what it has beside those of every model."""
+    text = "\n".join("".join(piece.text for piece in _calls(op, calls.get(op, ()))) for op in operators)
     return _named(text, prefix, family, name)
 
 

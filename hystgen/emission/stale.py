@@ -72,8 +72,8 @@ def advice(
     found: list[Difference],
     parameters: str,
     folder: str,
-    given: Mapping[str, str],
-    wanted: Mapping[str, str],
+    given: Mapping[str, str | bool],
+    wanted: Mapping[str, str | bool],
     again: Callable[[Mapping[str, str]], list[Difference]],
 ) -> list[str]:
     """Commands that fit these differences of one model's files, each with what it does.
@@ -85,10 +85,11 @@ def advice(
     said = []
     if any(LINE_ENDS in each.reasons for each in found):
         said.append('git leaves line ends alone with "*.[ch] text eol=lf" in .gitattributes')
-    theirs = next((each.options for each in found if len(each.options) == len(wanted)), {})
-    if not theirs or theirs == wanted:
+    flags = {key: value for key, value in wanted.items() if value is True}
+    theirs = next((each.options for each in found if len(each.options) == len(wanted) - len(flags)), {})
+    if not theirs or {**theirs, **flags} == wanted:
         return [*said, f"to write them again: {asked}{lost}"]
-    own = command(parameters, folder, theirs)
+    own = command(parameters, folder, {**theirs, **flags})
     if again(theirs):
         said.append(f"to write them again with their own options: {own}{lost}")
     else:
@@ -96,7 +97,11 @@ def advice(
     return [*said, f"to replace them: {asked}{lost}"]
 
 
-def command(parameters: str, folder: str, options: Mapping[str, str]) -> str:
+def command(parameters: str, folder: str, options: Mapping[str, str | bool]) -> str:
     """The command that emits with these options."""
     words = ["hystgen", "emit", parameters, *(["-o", folder] if folder != "." else [])]
-    return shlex.join([*words, *(word for key, value in options.items() for word in (f"--{key}", value))])
+    for key, value in options.items():
+        words.append(f"--{key.replace('_', '-')}")
+        if isinstance(value, str):
+            words.append(value)
+    return shlex.join(words)

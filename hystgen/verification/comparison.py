@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
+from hystgen.compensator.chain.tables import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.slots import Bytes
 from hystgen.verification import signals
@@ -37,7 +38,7 @@ class Difference:
 
 
 def expected_record(
-    numbers: Tables | FixedTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
 ) -> Expected:
     """A record of calls, in numbers of type `real`, with the answers of the bit reference."""
     name, op, values = calls
@@ -47,7 +48,7 @@ def expected_record(
 
 
 def expected_records(
-    numbers: Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, length: int
 ) -> list[Expected]:
     """The verification records of an operator with the answers of the bit reference."""
     suite = signals.suite(numbers, real, inverse, length)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, writing
 from hystgen.emission import module
-from hystgen.emission.calls import emit_options
+from hystgen.emission.calls import emit_options, emitted_model
 from hystgen.model import Model, as_model
 from hystgen.verification import avr, cores, host, sources
 from hystgen.verification.comparison import Expected, expected_records
@@ -29,6 +29,7 @@ def verify(
     length: int = 100_000,
     target_length: int | None = None,
     optimize: str | None = None,
+    allow_partial: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Report:
     """Compile what `emit` would write and compare it, bit for bit, with the Python reference of the same arithmetic.
@@ -46,7 +47,8 @@ def verify(
     if target_length is not None:
         arguments.whole("target_length", target_length, "calls", 1)
     model = as_model(source)
-    options = emit_options(model, operator, arithmetic, engine, layout, optimize)
+    options = emit_options(model, operator, arithmetic, engine, layout, optimize, allow_partial)
+    model = emitted_model(model, options)
     numbers = model.tables(options.arithmetic, options.engine)
     real = ARITHMETICS[options.arithmetic].number
     report = Report(model.name, options.arithmetic, options.engine, options.layout)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
+from hystgen.compensator.chain.tables import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.front import curve
 from hystgen.plays import slots
@@ -110,14 +112,53 @@ def _onto_the_bends(
 
 
 def suite(
-    tables: Tables | FixedTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
+    tables: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
 ) -> Iterator[Calls]:
-    """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same ones every time."""
-    for name, op, x in _suite(tables, real, inverse, length):
+    """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same ones every time.
+
+    Of a model with effects those of its plays, and calls of its settings among them.
+    """
+    plays = tables.plays if isinstance(tables, ChainTables) else tables
+    records = _suite(plays, real, inverse, length)
+    if isinstance(tables, ChainTables):
+        records = itertools.chain(records, _settings(tables, inverse, length))
+    for name, op, x in records:
         with np.errstate(over="ignore"):
             if real.kind == "i":
                 x = np.clip(np.rint(x), np.iinfo(real).min, np.iinfo(real).max)
             yield name, op, x.astype(real).astype(np.float64)
+
+
+def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
+    """Steps with everything else that may be called between them, now and then and often."""
+    first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
+    low, high = (float(a) for a in tables.limits[first : first + 2])
+    drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
+    rng = np.random.default_rng(20261126)
+    kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
+    if len(tables.gain):
+        kinds.append(slots.OP_TEMPERATURE)
+    if len(tables.ageing.turns):
+        kinds += [slots.OP_GAIN, slots.OP_TRAVEL, slots.OP_TRAVELLED]
+    if inverse:
+        kinds += [slots.OP_COMMIT, slots.OP_EXPECTED, slots.OP_CORRECT, *([slots.OP_PUSH] * (len(tables.tap) > 0))]
+    for name, chance in (("settings now and then", 0.01), ("settings", 0.4)):
+        walk = np.cumsum(rng.normal(0, 0.02, length))
+        x = (low + high) / 2 + 0.6 * (high - low) * np.sin(walk)
+        op = np.where(rng.random(length) < chance, rng.choice(kinds, length), slots.OP_STEP).astype(np.uint8)
+        op[rng.random(length) < 0.003] = slots.OP_RESET
+        op[rng.random(length) < 0.001] = slots.OP_INIT
+        drives = rng.uniform(drive_low - 5.0, drive_high + 5.0, length)
+        x = np.where((op == slots.OP_SETTLE) | (op == slots.OP_COMMIT), drives, x)
+        x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
+        x = np.where(op == slots.OP_TEMPERATURE, 20.0 + rng.standard_cauchy(length) * 30.0, x)
+        x = np.where(op == slots.OP_GAIN, rng.uniform(0.3, 2.2, length), x)
+        x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(0.0, 9.0, length), x)
+        odd = rng.random(length) < 0.01
+        x[odd] = rng.choice([np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30], int(odd.sum()))
+        yield name, op, x
+    # held for a long time, from where slow states still move
+    yield "held", _steps(np.empty(length)), np.where(np.arange(length) < 50, low, 0.7 * high + 0.3 * low)
 
 
 def _suite(

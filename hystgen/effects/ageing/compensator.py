@@ -2,16 +2,208 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
+from hystgen.effects.base import Array
+from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
+from hystgen.plays.slots import Counts, Reals, zero
+
+Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
+
+DECADES = 6
+"""Decades of the longest travel that the table of a gain covers; beyond it the gain keeps its last value."""
+
+TABLE_ERROR = 1e-6
+"""Share of the output by which a table may differ from the gain; 67 pieces cover six decades of 5 % each (a logarithm
+over a piece of 1.23 to 1: `0.05/2.3 * 6/384 * 0.23^4`)."""
 
 
-def gain(effect: LogarithmicAgeing | ExponentialAgeing | SeveralAgeing, travelled: float) -> float:
+def gain(effect: Ageing, travelled: float) -> float:
     """The gain after that distance, input units."""
     if isinstance(effect, LogarithmicAgeing):
         return 1.0 - effect.loss * math.log10(1.0 + min(travelled / effect.travel, 1e300))
     if isinstance(effect, ExponentialAgeing):
         return 1.0 + effect.loss * math.expm1(-travelled / effect.travel)
     pairs = zip(effect.losses, effect.travels, strict=True)
-    return 1.0 + sum(loss * math.expm1(-travelled / travel) for loss, travel in pairs)
+    return 1.0 + math.fsum(loss * math.expm1(-travelled / travel) for loss, travel in pairs)
+
+
+def steepness(effect: Ageing, travelled: float) -> float:
+    """Change of the gain per input unit of travel."""
+    if isinstance(effect, LogarithmicAgeing):
+        return -effect.loss / (math.log(10.0) * (effect.travel + travelled))
+    if isinstance(effect, ExponentialAgeing):
+        return -effect.loss / effect.travel * math.exp(-travelled / effect.travel)
+    pairs = zip(effect.losses, effect.travels, strict=True)
+    return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in pairs)
+
+
+def pieces(effect: Ageing) -> Array:
+    """The gain as cubic pieces (m, 6): where each begins, 1 over its length, and the coefficients of the share of it.
+
+    A piece has the gain's values and slopes at its ends, and is as long as TABLE_ERROR lets it.
+    """
+    several = isinstance(effect, SeveralAgeing)
+    travels = effect.travels if several else (effect.travel,)  # type: ignore[union-attr]
+    last = max(travels) * 10.0**DECADES if isinstance(effect, LogarithmicAgeing) else 20.0 * max(travels)
+    rows = []
+    at, length = 0.0, 0.25 * min(travels)
+    while at < last:
+        length *= 4.0
+        row = _piece(effect, at, length)
+        while _error(effect, row) > TABLE_ERROR:
+            length *= 0.8
+            row = _piece(effect, at, length)
+        if not LEAST_GAIN <= gain(effect, at + length) <= LARGEST_GAIN:
+            break
+        rows.append(row)
+        at += length
+    return np.array(rows).reshape(-1, 6)
+
+
+def _piece(effect: Ageing, at: float, length: float) -> tuple[float, ...]:
+    a, b = gain(effect, at), gain(effect, at + length)
+    da, db = (length * steepness(effect, x) for x in (at, at + length))
+    return at, 1.0 / length, a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
+
+
+def _error(effect: Ageing, row: tuple[float, ...]) -> float:
+    """Largest difference at places inside a piece."""
+    at, inverse, *c = row
+    shares = np.linspace(0.0, 1.0, 17)[1:-1]
+    curve = ((c[3] * shares + c[2]) * shares + c[1]) * shares + c[0]
+    pairs = zip(shares.tolist(), curve.tolist(), strict=True)
+    return float(max(abs(gain(effect, at + x / inverse) - y) for x, y in pairs))
+
+
+def most_at_once(effect: Ageing, span: float) -> float:
+    """Largest relative change of the gain in one move over `span`."""
+    rows = pieces(effect)
+    places = [0.0, *rows[:, 0].tolist()] if len(rows) else [0.0]
+    return max(abs(gain(effect, x + span) / gain(effect, x) - 1.0) for x in places)
+
+
+def problems(effect: Ageing, span: float) -> Iterator[str]:
+    """Why the C cannot follow the gain."""
+    change = most_at_once(effect, span)
+    if len(pieces(effect)) == 0 or change > MOST:
+        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST:.0%}"
+
+
+MOST = 0.25
+"""Largest relative change of the gain in one sample: five steps of Newton's leave `0.25^32`."""
+
+
+def turns(effect: Ageing, span: float, roundoff: float) -> int:
+    """Steps of Newton's after which the reciprocal of the gain is as good as its rounding."""
+    left = max(most_at_once(effect, span), 1e-9)
+    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
+
+
+# ---------------------------------------------------------------- ageing.c
+
+BEGIN, INVERSE_LENGTH, C0, C1, C2, C3 = range(6)
+HIGH, LOW, GAIN, INVERSE = range(4)
+ONE, TWO, LEAST, LARGEST, LAST = range(5)
+
+
+class AgeingTables(NamedTuple):
+    """All ageing of a model: `piece` (m, 6), those of each from `first` (k + 1) on; `number` (k, 5); `turns` (k,)."""
+
+    first: Counts
+    piece: Reals
+    number: Reals
+    turns: Counts
+
+
+class AgeingState(NamedTuple):
+    """`block` (k, 4): travel in two parts, gain and its reciprocal; `own` (k,): whether the gain follows the travel."""
+
+    block: Reals
+    own: Counts
+
+
+@jit
+def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
+    """The gain after a travel, from the piece that it lies in."""
+    low = t.first[j]
+    high = t.first[j + 1]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if travel >= t.piece[middle, BEGIN]:
+            low = middle
+        else:
+            high = middle
+    share = (travel - t.piece[low, BEGIN]) * t.piece[low, INVERSE_LENGTH]
+    if share > t.number[j, ONE]:
+        share = t.number[j, ONE]
+    return ((t.piece[low, C3] * share + t.piece[low, C2]) * share + t.piece[low, C1]) * share + t.piece[low, C0]
+
+
+@jit
+def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
+    """The travel from the next step on; whether it had to be limited."""
+    inside = travel
+    if inside < zero(t.number[j, ONE]):
+        inside = zero(t.number[j, ONE])
+    elif inside > t.number[j, LAST]:
+        inside = t.number[j, LAST]
+    s.block[j, HIGH] = inside
+    s.block[j, LOW] = zero(inside)
+    s.own[j] = 1
+    s.block[j, GAIN] = ageing_gain(t, j, inside)
+    s.block[j, INVERSE] = t.number[j, ONE] / s.block[j, GAIN]
+    return bool(inside != travel)
+
+
+@jit
+def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
+    """A gain in place of the travel's, from the next step on; whether it had to be limited."""
+    inside = gain
+    if inside < t.number[j, LEAST]:
+        inside = t.number[j, LEAST]
+    elif inside > t.number[j, LARGEST]:
+        inside = t.number[j, LARGEST]
+    s.own[j] = 0
+    s.block[j, GAIN] = inside
+    s.block[j, INVERSE] = t.number[j, ONE] / inside
+    return bool(inside != gain)
+
+
+@jit
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
+    """The drive has moved by `way`, either sign."""
+    change = (way if way >= zero(way) else -way) + s.block[j, LOW]
+    high = s.block[j, HIGH]
+    following = high + change
+    if following > t.number[j, LAST]:
+        following = t.number[j, LAST]
+        change = following - high
+    s.block[j, HIGH] = following
+    s.block[j, LOW] = change - (following - high)
+    if s.own[j]:
+        gain = ageing_gain(t, j, following)
+        inverse = s.block[j, INVERSE]
+        for _ in range(t.turns[j]):
+            inverse = inverse * (t.number[j, TWO] - gain * inverse)
+        s.block[j, GAIN] = gain
+        s.block[j, INVERSE] = inverse
+
+
+@jit(inline=True)
+def ageing_solve(s: AgeingState, j: int, y: Any) -> Any:
+    """The input that gives the output y."""
+    return y * s.block[j, INVERSE]
+
+
+@jit(inline=True)
+def ageing_absorb(s: AgeingState, j: int, x: Any) -> Any:
+    """The output for the input x."""
+    return s.block[j, GAIN] * x

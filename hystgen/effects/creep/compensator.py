@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
+from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
 
@@ -73,3 +76,88 @@ def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
             f"{effect.t_min:g} s nothing of a step arrives at once ({effect.at_once:.3g} of it); give a t0 nearer to "
             "t_min, or a smaller share"
         )
+
+
+class CreepNumbers(NamedTuple):
+    """Constants of a block at even steps, in double precision. `terms` (m, 4): of each state 1 - E, c b0, c b1, c."""
+
+    slope: float  # d + sum c_i b1_i
+    rest: float  # d + sum c_i
+    terms: Array
+
+
+def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> CreepNumbers:
+    """The constants of an effect without `problems` at steps of `seconds`."""
+    one = block(effect)
+    one.advance(seconds)
+    rate = -np.expm1(-seconds / one.time_constants)
+    terms = np.column_stack([rate, one.early, one.late, one.weights])
+    return CreepNumbers(one.slope, one.direct + float(np.sum(one.weights)), terms)
+
+
+# ---------------------------------------------------------------- creep.c
+
+SLOPE, INVERSE_SLOPE, REST, INVERSE_REST = 0, 1, 2, 3
+RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
+BEFORE, AHEAD = 0, 1
+HIGH, LOW = 0, 1
+
+
+class CreepTables(NamedTuple):
+    """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 4)."""
+
+    block: Reals
+    first: Counts
+    term: Reals
+
+
+class CreepState(NamedTuple):
+    """`block` (k, 2): input before, and the output that the next input 0 would give; `state` (m, 2): in two parts."""
+
+    block: Reals
+    state: Reals
+
+
+@jit
+def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
+    """Settle at the input x; the output."""
+    ahead = zero(x)
+    for i in range(t.first[j], t.first[j + 1]):
+        state = t.term[i, WEIGHT] * x
+        s.state[i, HIGH] = state
+        s.state[i, LOW] = zero(x)
+        ahead = ahead + (state + (t.term[i, EARLY] * x - t.term[i, RATE] * state))
+    s.block[j, BEFORE] = x
+    s.block[j, AHEAD] = ahead
+    return t.block[j, REST] * x
+
+
+@jit(inline=True)
+def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+    """The input that gives the output y once everything has settled."""
+    return y * t.block[j, INVERSE_REST]
+
+
+@jit(inline=True)
+def creep_solve(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:
+    """The input that gives the output y at this sample."""
+    return (y - s.block[j, AHEAD]) * t.block[j, INVERSE_SLOPE]
+
+
+@jit
+def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
+    """The input is x at this sample; the output."""
+    y = s.block[j, AHEAD] + t.block[j, SLOPE] * x
+    before = s.block[j, BEFORE]
+    ahead = zero(x)
+    for i in range(t.first[j], t.first[j + 1]):
+        state = s.state[i, HIGH]
+        change = (t.term[i, EARLY] * before + t.term[i, LATE] * x) - t.term[i, RATE] * state
+        change = change + s.state[i, LOW]
+        following = state + change
+        s.state[i, HIGH] = following
+        s.state[i, LOW] = change - (following - state)
+        ahead = ahead + (following + (t.term[i, EARLY] * x - t.term[i, RATE] * following))
+    s.block[j, BEFORE] = x
+    s.block[j, AHEAD] = ahead
+    return y

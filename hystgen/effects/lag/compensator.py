@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
+from hystgen.basics.jit import jit
 from hystgen.effects.base import decays
 from hystgen.effects.lag.model import Lag
+from hystgen.plays.slots import Counts, Reals, zero
+
+EXACT = 2.0
+"""Time constants in a step from which the lag is inverted exactly: the pole of that inverse is then above -0.53."""
 
 
 class LagBlock:
@@ -19,13 +26,13 @@ class LagBlock:
 
     def __init__(self, time_constant: float) -> None:
         self.time_constant = time_constant
-        self.state = self.reached = self.before = self.wanted = self.answer = 0.0
+        self.state = self.reached = self.before = self.wanted = self._asked = self.answer = 0.0
         self.advance(0.0)
 
     def advance(self, seconds: float) -> None:
         """The factors of this step."""
         self.decay, self.early, self.late = (float(x[0]) for x in decays(np.array([seconds]), self.time_constant))
-        self.exact = seconds >= 2.0 * self.time_constant
+        self.exact = seconds >= EXACT * self.time_constant
         self.theta = self.early / (1.0 - self.decay) if self.decay < 1.0 else 0.5
 
     def resting(self, y: float) -> float:
@@ -34,7 +41,7 @@ class LagBlock:
 
     def rest(self, x: float) -> float:
         """Settle."""
-        self.state = self.reached = self.before = self.wanted = self.answer = x
+        self.state = self.reached = self.before = self.wanted = self._asked = self.answer = x
         return x
 
     def solve(self, y: float) -> float:
@@ -48,10 +55,10 @@ class LagBlock:
         return self.answer
 
     def absorb(self, x: float) -> float:
-        """The lag follows. Behind another drive than the one asked for, the next lead starts from what is reached."""
+        """The lag follows. Behind another drive than the one asked for, the next lead starts from where that leads."""
         self.reached = self.decay * self.reached + self.early * self.before + self.late * x
         self.state = self.state + (1.0 - self.decay) * (x - self.state)
-        self.wanted = self._asked if x == self.answer else self.reached
+        self.wanted = self._asked + self.late * (x - self.answer)
         self.before = x
         return self.reached
 
@@ -59,3 +66,70 @@ class LagBlock:
 def block(effect: Lag) -> LagBlock | None:
     """The block of an effect; none for no lag."""
     return LagBlock(effect.time_constant) if effect.time_constant > 0.0 else None
+
+
+def numbers(effect: Lag, seconds: float) -> tuple[bool, tuple[float, float, float, float]]:
+    """Whether the inverse is exact, and its constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`."""
+    one = LagBlock(effect.time_constant)
+    one.advance(seconds)
+    rate = -float(np.expm1(-seconds / effect.time_constant))
+    if one.exact:
+        return True, (rate, one.early, one.late, 1.0 / one.late)
+    return False, (rate, one.early / rate, one.late, 1.0 / rate)
+
+
+# ---------------------------------------------------------------- lag.c, lag_exact.c
+
+RATE, THETA, LATE, INVERSE = 0, 1, 2, 3
+EARLY = THETA
+HIGH, LOW, WANTED, ASKED, ANSWER = 0, 1, 2, 3, 4
+REACHED, BEFORE = HIGH, LOW
+
+
+class LagTables(NamedTuple):
+    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4)."""
+
+    exact: Counts
+    block: Reals
+
+
+@jit
+def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
+    """Settle at the input x; the output."""
+    s[j, HIGH] = x
+    s[j, LOW] = x if t.exact[j] else zero(x)
+    s[j, WANTED] = x
+    s[j, ASKED] = x
+    s[j, ANSWER] = x
+    return x
+
+
+@jit
+def lag_solve(t: LagTables, s: Reals, j: int, y: Any) -> Any:
+    """The input that leads to the output y at this sample."""
+    n = t.block[j]
+    if t.exact[j]:
+        reached = s[j, REACHED]
+        return (y - (reached + (n[EARLY] * s[j, BEFORE] - n[RATE] * reached))) * n[INVERSE]
+    goal = y + n[THETA] * (y - s[j, WANTED])
+    s[j, ASKED] = y
+    s[j, ANSWER] = s[j, HIGH] + (goal - s[j, HIGH]) * n[INVERSE]
+    return s[j, ANSWER]
+
+
+@jit
+def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
+    """The input is x at this sample; the output."""
+    n = t.block[j]
+    state = s[j, HIGH]
+    if t.exact[j]:
+        reached = state + ((n[EARLY] * s[j, BEFORE] + n[LATE] * x) - n[RATE] * state)
+        s[j, REACHED] = reached
+        s[j, BEFORE] = x
+        return reached
+    change = n[RATE] * (x - state) + s[j, LOW]
+    following = state + change
+    s[j, HIGH] = following
+    s[j, LOW] = change - (following - state)
+    s[j, WANTED] = s[j, ASKED] + n[LATE] * (x - s[j, ANSWER])
+    return following - n[THETA] * (following - state)

@@ -1,0 +1,83 @@
+#include "hystgen_runtime.h"
+
+/* Gain that follows the distance travelled, as cubic pieces over it. */
+
+/* The gain after a travel, from the piece that it lies in; behind the last one it stays. */
+static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystgen_real_t travel)
+{
+    unsigned int low = 0;
+    unsigned int high = t->n;
+    while (high - low > 1u) {
+        const unsigned int middle = (low + high) / 2u;
+        if (travel >= t->piece[middle].begin) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const hystgen_ageing_piece_t *piece = &t->piece[low];
+    const hystgen_real_t along = (travel - piece->begin) * piece->inverse_length;
+    const hystgen_real_t share = along > 1 ? 1 : along;
+    return ((piece->c3 * share + piece->c2) * share + piece->c1) * share + piece->c0;
+}
+
+/* The travel from the next step on. Returns whether it had to be limited. */
+static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
+                                      hystgen_real_t travel)
+{
+    const hystgen_real_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
+    self->high = inside;
+    self->low = 0;
+    self->own = true;
+    self->gain = hystgen_ageing_gain(t, inside);
+    self->inverse = 1 / self->gain;
+    return inside < travel || inside > travel;
+}
+
+/* A gain in place of that of the travel, from the next step on. Returns whether it had to be
+   limited. */
+static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
+                               hystgen_real_t gain)
+{
+    const hystgen_real_t inside = gain < t->least     ? t->least
+                                  : gain > t->largest ? t->largest
+                                                      : gain;
+    self->own = false;
+    self->gain = inside;
+    self->inverse = 1 / inside;
+    return inside < gain || inside > gain;
+}
+
+/* The drive has moved by `way`. The reciprocal of the gain follows by Newton's steps. */
+static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
+                                hystgen_real_t way)
+{
+    const hystgen_real_t high = self->high;
+    hystgen_real_t change = (way >= 0 ? way : -way) + self->low;
+    hystgen_real_t next = high + change;
+    if (next > t->last) {
+        next = t->last;
+        change = next - high;
+    }
+    self->high = next;
+    self->low = change - (next - high); /* what the sum has lost */
+    if (self->own) {
+        unsigned int i;
+        self->gain = hystgen_ageing_gain(t, next);
+        for (i = 0; i < t->turns; ++i) {
+            self->inverse = self->inverse * (2 - self->gain * self->inverse);
+        }
+    }
+}
+
+/* The input that gives the output y. */
+static hystgen_real_t hystgen_ageing_solve(const hystgen_ageing_t *self, hystgen_real_t y)
+{
+    return y * self->inverse;
+}
+
+/* The output for the input x. */
+static hystgen_real_t hystgen_ageing_absorb(const hystgen_ageing_t *self, hystgen_real_t x)
+{
+    return self->gain * x;
+}

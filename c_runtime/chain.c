@@ -1,0 +1,314 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects. Everything between drive and displacement is a block. What was
+   applied goes through all of them forwards, a reference backwards, so that the memory is the
+   actuator's and nothing else. Which blocks there are, the model's own functions say:
+
+   drive_side    lag: in front of the memoryless part and the plays
+   output_side   creep, ageing, gain: behind the plays
+   displaced     saturation and offsets, behind everything
+
+   rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
+   output.
+
+   moving   false  no drive has been applied yet: the first one finds everything at rest there
+            true   every block has seen the sample before
+   A step leaves its answer pending. The next step or settle takes it, or what was committed. */
+
+static bool hystgen_finite(hystgen_real_t x)
+{
+    return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
+}
+
+/* An offset that is set, kept to what the displacement spans. */
+static hystgen_real_t hystgen_inside_offset(hystgen_real_t d)
+{
+    return d > HYSTGEN_FARTHEST_OFFSET    ? HYSTGEN_FARTHEST_OFFSET
+           : d < -HYSTGEN_FARTHEST_OFFSET ? -HYSTGEN_FARTHEST_OFFSET
+                                          : d;
+}
+
+/* The actuator has seen drive v. */
+static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
+{
+    const bool moving = self->moving;
+    if (moving) {
+        hystgen_forward_travelled(self, v);
+    }
+    const hystgen_real_t a = moving ? hystgen_forward_drive_side_absorb(self, v)
+                                    : hystgen_forward_drive_side_rest(self, v);
+    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, a));
+    self->output = moving ? hystgen_forward_output_side_absorb(self, self->level)
+                          : hystgen_forward_output_side_rest(self, self->level);
+    self->applied = v;
+    self->moving = true;
+}
+
+/* The actuator has seen drive v. */
+static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    const bool moving = self->moving;
+    if (moving) {
+        hystgen_inverse_travelled(self, v);
+    }
+    const hystgen_real_t a = moving ? hystgen_inverse_drive_side_absorb(self, v)
+                                    : hystgen_inverse_drive_side_rest(self, v);
+    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, a));
+    self->output = moving ? hystgen_inverse_output_side_absorb(self, self->level)
+                          : hystgen_inverse_output_side_rest(self, self->level);
+    self->applied = v;
+    self->moving = true;
+}
+
+/* What is pending is what the actuator has seen. */
+static void hystgen_inverse_take(hystgen_inverse_t *self)
+{
+    if (self->has_pending) {
+        hystgen_inverse_absorb(self, self->pending);
+        self->has_pending = false;
+    }
+}
+
+/* Returns drive v and leaves it pending. */
+static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    self->answer = v;
+    self->pending = v;
+    self->has_pending = true;
+    self->stepped = true;
+    return v;
+}
+
+/* What init and reset have in common once the plays are set; they stand for this drive. */
+static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending)
+{
+    self->drive = drive;
+    self->ascending = ascending;
+    self->moving = false;
+    self->status = 0;
+    self->level = hystgen_forward_started(self);
+    self->applied = hystgen_forward_drive_side_rest(self, drive);
+    self->output = hystgen_forward_output_side_rest(self, self->level);
+    self->answer = hystgen_forward_displaced(self, self->output);
+}
+
+/* What init and reset have in common once the plays are set; they stand for this drive. */
+static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive, bool ascending)
+{
+    self->pending = drive;
+    self->answer = drive;
+    self->has_pending = false;
+    self->stepped = false;
+    self->filled = false;
+    self->bits = 0;
+    self->drive = drive;
+    self->ascending = ascending;
+    self->moving = false;
+    self->status = 0;
+    self->level = hystgen_inverse_started(self);
+    self->applied = hystgen_inverse_drive_side_rest(self, drive);
+    self->output = hystgen_inverse_output_side_rest(self, self->level);
+}
+
+void hystgen_forward_init(hystgen_forward_t *self)
+{
+    hystgen_forward_settings_init(self);
+    hystgen_loop_init(self->play);
+    hystgen_forward_begin(self, HYSTGEN_FORWARD_INIT_DRIVE, HYSTGEN_FORWARD_INIT_ASCENDING);
+}
+
+void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
+{
+    hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
+    hystgen_forward_begin(self, HYSTGEN_FORWARD_RESET_DRIVE, HYSTGEN_FORWARD_RESET_ASCENDING);
+    (void)hystgen_forward_step(self, v);
+}
+
+void hystgen_inverse_init(hystgen_inverse_t *self)
+{
+    hystgen_inverse_settings_init(self);
+    hystgen_loop_init(self->play);
+    hystgen_inverse_begin(self, HYSTGEN_INVERSE_INIT_DRIVE, HYSTGEN_INVERSE_INIT_ASCENDING);
+}
+
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
+{
+    hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
+    hystgen_inverse_begin(self, HYSTGEN_INVERSE_RESET_DRIVE, HYSTGEN_INVERSE_RESET_ASCENDING);
+    (void)hystgen_inverse_step(self, u);
+}
+
+void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v)
+{
+    if (!hystgen_finite(v)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    const hystgen_real_t inside = hystgen_clamp_drive(v) + 0; /* no drive is -0 */
+    if (inside < v || inside > v) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    if (self->moving) {
+        hystgen_forward_travelled(self, inside);
+    }
+    self->moving = false;
+    hystgen_forward_absorb(self, inside);
+}
+
+void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
+{
+    hystgen_inverse_take(self);
+    if (!hystgen_finite(v)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    const hystgen_real_t inside = hystgen_clamp_drive(v) + 0; /* no drive is -0 */
+    if (inside < v || inside > v) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    if (self->moving) {
+        hystgen_inverse_travelled(self, inside);
+    }
+    self->moving = false;
+    hystgen_inverse_absorb(self, inside);
+}
+
+void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
+{
+    if (!hystgen_finite(d)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    const hystgen_real_t inside = hystgen_inside_offset(d);
+    if (inside < d || inside > d) {
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
+    self->offset = inside;
+}
+
+void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
+{
+    if (!hystgen_finite(d)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    const hystgen_real_t inside = hystgen_inside_offset(d);
+    if (inside < d || inside > d) {
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
+    self->offset = inside;
+}
+
+void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature)
+{
+    if (!hystgen_finite(temperature)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+    } else if (hystgen_forward_heat(self, temperature)) {
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
+}
+
+void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t temperature)
+{
+    if (!hystgen_finite(temperature)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+    } else if (hystgen_inverse_heat(self, temperature)) {
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
+}
+
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
+{
+    if (!hystgen_finite(v)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return self->answer;
+    }
+    const hystgen_real_t inside = hystgen_clamp_drive(v);
+    if (inside < v || inside > v) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    const hystgen_real_t reached = hystgen_forward_slewed(self, inside);
+    if (reached < inside || reached > inside) {
+        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
+    }
+    hystgen_forward_absorb(self, reached);
+    self->answer = hystgen_forward_displaced(self, self->output);
+    return self->answer;
+}
+
+/* The next reference. Returns what the output side has to give at this sample. */
+static hystgen_real_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_real_t u)
+{
+    bool limited = false;
+    const hystgen_real_t level = hystgen_inverse_clamp(u);
+    if (level < u || level > u) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    const hystgen_real_t wanted = hystgen_inverse_undisplaced(self, level, &limited);
+    if (limited) {
+        self->status |= HYSTGEN_STATUS_DOMAIN;
+    }
+    return hystgen_inverse_ahead(self, wanted);
+}
+
+void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u)
+{
+    if (hystgen_finite(u)) {
+        (void)hystgen_inverse_put(self, u);
+    } else {
+        self->status |= HYSTGEN_STATUS_HELD;
+        hystgen_inverse_repeat(self);
+    }
+}
+
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
+{
+    hystgen_inverse_take(self);
+    if (!hystgen_finite(u)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        hystgen_inverse_repeat(self);
+        return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
+    }
+    const hystgen_real_t y = hystgen_inverse_put(self, u);
+    const bool moving = self->moving;
+    const hystgen_real_t h = moving ? hystgen_inverse_output_side_solve(self, y)
+                                    : hystgen_inverse_output_side_resting(self, y);
+    self->bits = 0;
+    const hystgen_real_t a = hystgen_inverse_drive(self, h, hystgen_inverse_input(self, h));
+    const hystgen_real_t v = moving ? hystgen_inverse_drive_side_solve(self, a) : a;
+    const hystgen_real_t reached = hystgen_inverse_slewed(self, v);
+    if (reached < v || reached > v) {
+        self->bits |= HYSTGEN_STATUS_SLEW_LIMITED;
+    }
+    const hystgen_real_t inside = hystgen_clamp_drive(reached);
+    if (inside < reached || inside > reached) {
+        self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    }
+    self->status |= self->bits;
+    return hystgen_inverse_answer(self, inside);
+}
+
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
+{
+    if (!hystgen_finite(applied)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    const hystgen_real_t inside = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
+    if (inside < applied || inside > applied) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    self->pending = inside;
+    self->has_pending = true;
+}
+
+hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self)
+{
+    return hystgen_inverse_displaced(self, self->output);
+}
+
+void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured, hystgen_real_t share)
+{
+    const hystgen_real_t more = share * (measured - hystgen_inverse_expected(self));
+    hystgen_inverse_set_offset(self, self->offset + more);
+}

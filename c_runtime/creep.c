@@ -1,0 +1,58 @@
+#include "hystgen_runtime.h"
+
+/* Creep as a block of the chain. A state answers a move at once by a known share, so that the block
+   is exactly invertible; what the states will give anyway is summed up where they move. */
+
+/* Everything has settled at the input x. Returns the output. */
+static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                         hystgen_creep_state_t *state, hystgen_real_t x)
+{
+    hystgen_real_t ahead = 0;
+    unsigned int i;
+    for (i = 0; i < t->n; ++i) {
+        const hystgen_creep_term_t *term = &t->term[i];
+        const hystgen_real_t settled = term->weight * x;
+        state[i].high = settled;
+        state[i].low = 0;
+        ahead = ahead + (settled + (term->early * x - term->rate * settled));
+    }
+    self->before = x;
+    self->ahead = ahead;
+    return t->rest * x;
+}
+
+/* The input that gives the output y once everything has settled. */
+static hystgen_real_t hystgen_creep_resting(const hystgen_creep_table_t *t, hystgen_real_t y)
+{
+    return y * t->inverse_rest;
+}
+
+/* The input that gives the output y at this sample. */
+static hystgen_real_t hystgen_creep_solve(const hystgen_creep_table_t *t,
+                                          const hystgen_creep_t *self, hystgen_real_t y)
+{
+    return (y - self->ahead) * t->inverse_slope;
+}
+
+/* The input is x at this sample. Returns the output. */
+static hystgen_real_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                           hystgen_creep_state_t *state, hystgen_real_t x)
+{
+    const hystgen_real_t y = self->ahead + t->slope * x;
+    const hystgen_real_t before = self->before;
+    hystgen_real_t ahead = 0;
+    unsigned int i;
+    for (i = 0; i < t->n; ++i) {
+        const hystgen_creep_term_t *term = &t->term[i];
+        const hystgen_real_t high = state[i].high;
+        const hystgen_real_t change =
+            (term->early * before + term->late * x) - term->rate * high + state[i].low;
+        const hystgen_real_t next = high + change;
+        state[i].high = next;
+        state[i].low = change - (next - high); /* what the sum has lost */
+        ahead = ahead + (next + (term->early * x - term->rate * next));
+    }
+    self->before = x;
+    self->ahead = ahead;
+    return y;
+}

@@ -1,0 +1,43 @@
+/* The memory of a model's effects in floating point. */
+#ifndef HYSTGEN_CHAIN_STATE_H
+#define HYSTGEN_CHAIN_STATE_H
+
+/* A number that grows in steps far below its own last bit, in two parts. */
+typedef struct {
+    hystgen_real_t high;
+    hystgen_real_t low;
+} hystgen_creep_state_t;
+
+typedef struct {
+    hystgen_real_t before; /* input of the last sample */
+    hystgen_real_t ahead;  /* output of the next one for an input 0 */
+} hystgen_creep_t;
+
+typedef struct {
+    hystgen_real_t high;
+    hystgen_real_t low;
+    hystgen_real_t wanted; /* output that the last solution led to */
+    hystgen_real_t asked;  /* output asked for, */
+    hystgen_real_t answer; /* and the input that was to lead there */
+} hystgen_lag_t;
+
+typedef struct {
+    hystgen_real_t reached;
+    hystgen_real_t before; /* input of the last sample */
+} hystgen_lag_exact_t;
+
+typedef struct {
+    hystgen_real_t gain;
+    hystgen_real_t inverse;
+    hystgen_real_t offset;
+} hystgen_gain_t;
+
+typedef struct {
+    hystgen_real_t high; /* travel, in two parts */
+    hystgen_real_t low;
+    hystgen_real_t gain;
+    hystgen_real_t inverse;
+    bool own; /* the gain follows the travel */
+} hystgen_ageing_t;
+
+#endif

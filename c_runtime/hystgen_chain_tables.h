@@ -1,0 +1,70 @@
+/* The constants of a model's effects in floating point, for steps of HYSTGEN_SAMPLE_TIME. */
+#ifndef HYSTGEN_CHAIN_TABLES_H
+#define HYSTGEN_CHAIN_TABLES_H
+
+/* A state of creep: X += early h_before + late h - rate X, its share of the output folded in. */
+typedef struct {
+    hystgen_real_t rate;
+    hystgen_real_t early;
+    hystgen_real_t late;
+    hystgen_real_t weight;
+} hystgen_creep_term_t;
+
+/* Creep behind the plays: y = d h + X_1 + X_2 + ... */
+typedef struct {
+    const hystgen_creep_term_t *term;
+    hystgen_real_t slope; /* change of y with h at once */
+    hystgen_real_t inverse_slope;
+    hystgen_real_t rest; /* y over h at rest */
+    hystgen_real_t inverse_rest;
+    uint_least16_t n;
+} hystgen_creep_table_t;
+
+/* Lag in front of the plays: x += rate (v - x), and what arrives lies theta of that step behind x. */
+typedef struct {
+    hystgen_real_t rate;
+    hystgen_real_t theta;
+    hystgen_real_t late;
+    hystgen_real_t inverse_rate;
+} hystgen_lag_table_t;
+
+/* Lag that is shorter than half a step: a += early v_before + late v - rate a. */
+typedef struct {
+    hystgen_real_t rate;
+    hystgen_real_t early;
+    hystgen_real_t late;
+    hystgen_real_t inverse_late;
+} hystgen_lag_exact_table_t;
+
+/* Gain and offset per degree above the reference, and between which temperatures. */
+typedef struct {
+    hystgen_real_t per_degree;
+    hystgen_real_t offset_per_degree;
+    hystgen_real_t reference;
+    hystgen_real_t coldest;
+    hystgen_real_t hottest;
+    hystgen_real_t least;
+    hystgen_real_t largest;
+} hystgen_gain_table_t;
+
+/* A piece of the gain over travel, cubic in the share of its length. */
+typedef struct {
+    hystgen_real_t begin;
+    hystgen_real_t inverse_length;
+    hystgen_real_t c0;
+    hystgen_real_t c1;
+    hystgen_real_t c2;
+    hystgen_real_t c3;
+} hystgen_ageing_piece_t;
+
+/* Gain over travel up to `last`; one set from outside lies between `least` and `largest`. */
+typedef struct {
+    const hystgen_ageing_piece_t *piece;
+    hystgen_real_t least;
+    hystgen_real_t largest;
+    hystgen_real_t last;
+    uint_least16_t n;
+    uint_least8_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
+} hystgen_ageing_table_t;
+
+#endif

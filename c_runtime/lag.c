@@ -1,0 +1,39 @@
+#include "hystgen_runtime.h"
+
+/* A lag as a block of the chain. The inverse of a lag on a drive that is straight between samples
+   rings; that of x, a lag on a drive that holds, does not. What arrives is x less theta of its last
+   step, so that x is led to the output asked for and theta of its step beyond: exact on ramps. */
+
+/* Everything has settled at the input v. Returns the output. */
+static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v)
+{
+    self->high = v;
+    self->low = 0;
+    self->wanted = v;
+    self->asked = v;
+    self->answer = v;
+    return v;
+}
+
+/* The input that leads to the output y at this sample. */
+static hystgen_real_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self,
+                                        hystgen_real_t y)
+{
+    const hystgen_real_t goal = y + t->theta * (y - self->wanted);
+    self->asked = y;
+    self->answer = self->high + (goal - self->high) * t->inverse_rate;
+    return self->answer;
+}
+
+/* The input is v at this sample. Returns the output. */
+static hystgen_real_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self,
+                                         hystgen_real_t v)
+{
+    const hystgen_real_t high = self->high;
+    const hystgen_real_t change = t->rate * (v - high) + self->low;
+    const hystgen_real_t next = high + change;
+    self->high = next;
+    self->low = change - (next - high); /* what the sum has lost */
+    self->wanted = self->asked + t->late * (v - self->answer);
+    return next - t->theta * (next - high);
+}

@@ -1,0 +1,1 @@
+"""The compensator and the forward operator of models with effects, as the emitted C computes them."""

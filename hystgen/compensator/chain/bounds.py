@@ -1,0 +1,184 @@
+"""How far a compiled operator with effects can be from the model in double precision, block by block.
+
+Every block adds the roundings of its own operations to the error that reaches it, and passes the sum on with the
+largest gain that it has from sample to sample. Where a drive is limited to its range or committed, in one of two
+computations or in both, they come no farther apart than they would else: limiting is not expansive, and both absorb
+what was applied. A slew limit keeps drives apart as far as they were, and a lag in front of the plays follows them
+meanwhile, so that with both only the range of the drive bounds what comes behind; `rounding` leaves that out.
+
+Inverse. The reference less its offsets, through what saturates (slope at the ends of the output), through the taps
+(sum of their sizes), gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an error of its output on to its
+input, and from there through all states to later ones: `e <= R eta + R g e`, `g = sum c_i (1 - b1_i)` the states' share
+of the input before, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. The plays as in `hystgen.compensator.bounds`. A
+lag's lead multiplies by `(2 - rate)/rate`, what it is led to by `(1 + 2 theta)/(1 - theta)`: the target before counts
+too, also where it was shifted by a limit.
+
+States that move by less than their last bit are kept in two parts; their roundings are shares of their steps, so that
+they add up to a few units of the state however slow it is, and the second part's own to `u^2/rate` of it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.tables import Compiled
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.ageing.compensator import TABLE_ERROR
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.saturation.model import TanhSaturation
+from hystgen.effects.thermal.compensator import LEAST_GAIN
+from hystgen.front.tanh import kernels
+from hystgen.plays import slots
+
+
+@dataclasses.dataclass(frozen=True)
+class _Sizes:
+    """Largest sizes: drive, sum of the plays, output behind creep, displacement with what may be set beside it."""
+
+    drive: float
+    plays: float
+    output: float
+    displacement: float
+
+
+def _sizes(compiled: Compiled) -> _Sizes:
+    static, t = compiled.static, compiled.tables
+    drive = max(abs(end) for end in static.input_range)
+    plays = largest_sum(dataclasses.replace(static, output_offset=0.0))
+    output = plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
+    ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
+    return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + 2.0 * max(ends))
+
+
+def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
+    """Of what saturates: the slope of its inverse at the ends of the output, and the roundings of the inverse, as
+    errors of the input, and of the map."""
+    slope, back, there = 1.0, 0.0, 0.0
+    limits = compiled.tables.limits
+    ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
+    size = float(np.max(np.abs(ends)))
+    for effect in reversed(compiled.parts.saturations):
+        if isinstance(effect, TanhSaturation):
+            share = min(size / effect.level, 1.0 - 4.0 * u)
+            slope = slope / (1.0 - share * share)
+            back += u * (4.0 * size + effect.level * (0.9 * kernels.ATANH_MAX_ULP[kind] + 2.0)) * slope
+            there += u * effect.level * (4.0 + 2.0 * kernels.TANH_MAX_ULP[kind])
+            size = effect.level * math.atanh(share)
+        else:
+            give = getattr(effect, "give", 0.0)
+            slope = slope / (give if 0.0 < give < 1.0 else 1.0)
+            back += 8.0 * u * size * slope
+            there += 8.0 * u * size
+    return slope, back, there
+
+
+def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, float]:
+    """Roundings of the output of a block whose input is at most `size`, and the gain of its inverse."""
+    t = compiled.tables.creep
+    term = t.term[t.first[j] : t.first[j + 1]].astype(float)
+    rate, late, weight = term[:, creep.RATE], term[:, creep.LATE], term[:, creep.WEIGHT]
+    total, rest = float(np.sum(weight)), float(t.block[j, creep.REST])
+    states = (13.0 + len(term)) * total + u * float(np.sum(weight / rate))
+    around = rest - 2.0 * total + 2.0 * float(np.sum(late))
+    slope = rest - total + float(np.sum(late))
+    return u * size * (states + 4.0 * rest), 1.0 / around if around > 0.0 else 2.0 / slope - 1.0 / rest
+
+
+def _late(compiled: Compiled) -> float:
+    """Share of the output that the gain changes at most in one step at the fastest rate, and that of its table."""
+    return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
+
+
+def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
+    """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it."""
+    u = float(np.finfo(kind).eps) / 2
+    t, static = compiled.tables.moving, compiled.static
+    p, r = np.abs(np.array(static.pi.weights)), np.array(static.pi.thresholds)
+    low, high = static.play_range
+    size = 3.0 * max(abs(low), abs(high)) + float(r[-1])
+    steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
+    play = 4.0 * u * size
+    if t.moves == moving.RELAXING:
+        slow = t.first[1:].astype(float)
+        play = 8.0 * u * size / float(np.min(slow))
+        if kind != "float64":
+            play += compiled.largest_step / 4.0  # contacts inside a step, taken at the first touch
+    each = steep * play + (12.0 + len(static.pi.weights)) * u * size * steep
+    error = float(np.sum(p)) * each
+    width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
+    return error, error + float(np.sum(p)) * steep * width
+
+
+def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
+    """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for, for one
+    arithmetic and without the plays' own."""
+    u = float(np.finfo(kind).eps) / 2
+    t, sizes = compiled.tables, _sizes(compiled)
+    slope, back, there = _saturation(compiled, u, kind)
+    gains = len(t.gain) + len(t.ageing.turns)
+    gain = (1.0 / LEAST_GAIN) ** gains
+    taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
+    inverse = 4.0 * u * sizes.displacement * slope + back
+    if compiled.taps:
+        inverse = taps * (inverse + u * (len(compiled.taps.weights) + 1) * sizes.displacement * slope)
+    inverse = gain * (inverse + 3.0 * u * gains * taps * sizes.output)
+    late = 0.0
+    if t.ageing.turns.size and kind != "float64":  # the gain of the travel one sample before, and its table
+        late = _late(compiled) * sizes.output
+        inverse += gain * late
+    moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
+    static = compiled.static
+    forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
+    size = sizes.plays
+    for j in range(len(t.creep.block)):
+        rounding, back_gain = _creep(compiled, j, size, u)
+        forward = forward * float(t.creep.block[j, creep.REST]) + rounding
+        inverse = back_gain * (inverse + rounding)
+        size *= float(t.creep.block[j, creep.REST])
+    forward = gain * (forward + 3.0 * u * sizes.output * gains) + TABLE_ERROR * sizes.output * (late > 0.0) + there
+    return forward + 3.0 * u * sizes.displacement, inverse
+
+
+def _lags(compiled: Compiled, error: float, u: float) -> float:
+    """The error of the drive, for one of what is in front of the plays."""
+    drive = _sizes(compiled).drive
+    for exact, row in zip(compiled.tables.lag.exact, compiled.tables.lag.block.astype(float), strict=True):
+        rate = float(row[lag.RATE])
+        if exact:
+            error = ((2.0 - rate) * error + 8.0 * u * drive) / float(row[lag.LATE] - row[lag.EARLY])
+            continue
+        theta = float(row[lag.THETA])
+        states = u * drive * (5.0 + u / rate)
+        goal = (1.0 + 2.0 * theta) / (1.0 - theta) * (error + states) + 6.0 * u * drive
+        error = (goal + states) * (2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
+    return error
+
+
+def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
+    """Bounds for `arithmetic` 'float32' or 'float64', with no more set from outside than gains and temperatures."""
+    static = dataclasses.replace(compiled.static, output_offset=0.0)
+    plays = error_bounds(static, arithmetic, "loop")
+    pi = static.pi
+    gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
+    if compiled.tables.moving.used:
+        gain = 2.0 / moving.least_slope(static, compiled.parts.plays) / static.front_slopes[0]
+        pairs = zip(_moving(compiled, arithmetic), _moving(compiled, "float64"), strict=True)
+        there, back = (sum(each) for each in pairs)
+        plays = ErrorBounds(plays.forward + there, plays.inverse + gain * back, plays.rounding + gain * back)
+    u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
+    forward, asked = (sum(each) for each in zip(_one(compiled, arithmetic), _one(compiled, "float64"), strict=True))
+    whole = static.input_range[1] - static.input_range[0]
+    inverse, rounding = (
+        min(SECOND_ORDER * _lags(compiled, own + gain * asked, u), whole) for own in (plays.inverse, plays.rounding)
+    )
+    if compiled.tables.slew and len(compiled.tables.lag.exact):
+        inverse = whole
+    rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
+    most = (1.0 / LEAST_GAIN) ** (len(compiled.tables.gain) + len(compiled.tables.ageing.turns)) * rest
+    return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

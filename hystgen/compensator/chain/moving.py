@@ -1,0 +1,270 @@
+"""Plays that an effect moves or bends in its own way: `c_runtime/chain_moving.c` and what it is made of.
+
+Play i is kept as where it would come to rest and what it contributes there. A plain play rests where it is; a viscous
+one is on its way there, `z = q + b1 dz_r(w - q)` at the end of a step, whose rest a step later is
+`q = z + (1 - E/M) dz_r(w - z)` with `M = (1 - E) tau/T` and dz_r what lies beyond +-r: the exact response to a straight
+input while the play slides or rests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hystgen.basics.jit import jit
+from hystgen.chain.static import StaticModel
+from hystgen.effects.base import Effect, decays
+from hystgen.effects.noncongruent.model import LoopCentre, PlayFunctions
+from hystgen.effects.rate_dependence.compensator import Movement
+from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
+from hystgen.front.tanh.kernels import TanhTables, tanh
+from hystgen.plays.loop import State
+from hystgen.plays.slots import Reals
+
+PLAIN, DILATED, RELAXING = range(3)
+STRAIGHT, POLYNOMIAL, CENTRE = range(3)
+"""How plays move, and how they are bent."""
+
+SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LARGEST_INPUT, HALF = range(9)
+"""Places in `MovingTables.number`."""
+
+CELLS = 4096
+"""Inputs at which the slope of bent plays is looked at: a cell of 1/4096 of the range is far below the width of any
+bump that a record shows, of which a search takes none below a twentieth of it."""
+
+
+class MovingTables(NamedTuple):
+    """`first`, `second` (n + 1,): of dilated plays how much wider a threshold is per unit of the way of a step, of
+    viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves` of the search; `used`: 0
+    for plain plays that nothing bends, which engine loop solves."""
+
+    moves: int
+    bends: int
+    first: Reals
+    second: Reals
+    curve: Reals
+    number: Reals
+    halves: int
+
+    @property
+    def used(self) -> bool:
+        """Whether plays are other than those of engine loop."""
+        return self.moves != PLAIN or self.bends != STRAIGHT
+
+
+def problems(static: StaticModel, effects: Sequence[Effect]) -> Iterator[tuple[Effect, str]]:
+    """Which effects on plays the C cannot solve for, and why."""
+    for effect in effects:
+        if isinstance(effect, RelaxingPlays) and effect.exponent != 1.0 and effect.time_constant > 0.0:
+            yield effect, "there is no C for a nonlinear dashpot, an exponent other than 1"
+    bends = [effect for effect in effects if effect.bends_plays()]
+    yield from ((effect, "one effect bends the plays, and there is another one") for effect in bends[1:])
+    if bends and not (slope := least_slope(static, bends[:1])) > 0.0:
+        yield bends[0], f"somewhere the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"
+
+
+def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
+    """Thresholds that grow so fast with the rate that viscous plays stand in for them, in the inverse alone."""
+    r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
+    for effect in effects:
+        if isinstance(effect, ThresholdRate) and not Movement(effect, r, p).by_threshold(seconds):
+            yield effect, "viscous plays stand in for it, which only the inverse may; emit the inverse alone"
+
+
+def least_slope(static: StaticModel, bends: Sequence[Effect]) -> float:
+    """Least change of the sum per change of the plays' input, over what they can reach and any number that follow."""
+    low, high = static.play_range
+    p, r = np.array(static.pi.weights), np.array(static.pi.thresholds)
+    at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
+    rows = np.tile(at, (len(p), 1))
+    for effect in bends:
+        if effect.bends_plays():
+            rows = effect.bent(rows, r)
+    steep = np.diff(rows, axis=1) / np.diff(at)
+    return float(np.min(np.cumsum(p[:, None] * steep, axis=0)))
+
+
+def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
+    """Largest slope by which a bent play differs from the play itself."""
+    low, high = static.play_range
+    r = np.array(static.pi.thresholds)
+    at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
+    rows = np.tile(at, (len(r), 1))
+    for effect in effects:
+        if effect.bends_plays():
+            rows = effect.bent(rows, r)
+    return float(np.max(np.abs(np.diff(rows, axis=1) / np.diff(at) - 1.0)))
+
+
+def build(
+    static: StaticModel, effects: Sequence[Effect], seconds: float, dtype: Any
+) -> MovingTables:
+    """The tables of a model's plays, for effects without `problems`."""
+    n = static.pi.n
+    low, high = static.play_range
+    first, second = np.zeros(n + 1), np.zeros(n + 1)
+    moves, bends = PLAIN, STRAIGHT
+    r = np.array(static.pi.thresholds)
+    curve = np.zeros((n + 1, 1))
+    number = np.zeros(9)
+    number[[LEAST_INPUT, LARGEST_INPUT, HALF]] = 2.0 * low - high, 2.0 * high - low, 0.5
+    for effect in effects:
+        if isinstance(effect, RelaxingPlays | ThresholdRate):
+            moves = RELAXING
+            movement = Movement(effect, r, np.array(static.pi.weights))
+            if movement.by_threshold(seconds):
+                moves = DILATED
+                first[1:] = np.asarray(movement.betas) / seconds
+            else:
+                first[1:], second[1:] = np.array([_viscous(seconds, tau) for tau in movement.taus]).T
+        elif isinstance(effect, PlayFunctions):
+            bends = POLYNOMIAL
+            terms = max(map(len, effect.coefficients))
+            curve = np.zeros((n + 1, terms))
+            for i, row in enumerate(effect.coefficients, 1):
+                curve[i, : len(row)] = row
+            number[[SCALE, INVERSE_SCALE]] = r[-1], 1.0 / r[-1]
+        elif isinstance(effect, LoopCentre):
+            bends = CENTRE
+            number[[MIDDLE, INVERSE_WIDTH]] = effect.centre, 1.0 / effect.width
+            number[[BUMP, TANH_CENTRE]] = effect.amplitude * effect.width, math.tanh(effect.centre / effect.width)
+    halves = int(np.finfo(dtype).nmant) + 4
+    first, second, curve, number = (np.array(each, dtype=dtype) for each in (first, second, curve, number))
+    return MovingTables(moves, bends, first, second, curve, number, halves)
+
+
+def _viscous(seconds: float, tau: float) -> tuple[float, float]:
+    """b1 and 1 - E/M of a step; a play without time constant follows at once."""
+    if not tau > 0.0:
+        return 1.0, 0.0
+    decay, _, late = (float(x[0]) for x in decays(np.array([seconds]), tau))
+    return late, 1.0 - decay / (1.0 - late)
+
+
+@jit(inline=True)
+def beyond(x: Any, r: Any) -> Any:
+    """What of x lies beyond +-r."""
+    if x > r:
+        return x - r
+    if x < -r:
+        return x + r
+    return r - r
+
+
+@jit
+def moved(t: MovingTables, r: Reals, i: int, q: Any, before: Any, w: Any) -> Any:
+    """Play i that rests at q, once its input has gone from `before` to w."""
+    if t.moves == RELAXING:
+        return q + t.first[i] * beyond(w - q, r[i])
+    threshold = r[i]
+    if t.moves == DILATED:
+        way = w - before if w > before else before - w
+        threshold = r[i] + t.first[i] * way
+    low = w - threshold
+    high = w + threshold
+    upper = high if q > high else q
+    return low if upper < low else upper
+
+
+@jit
+def left(t: MovingTables, r: Reals, i: int, z: Any, w: Any) -> Any:
+    """Where play i comes to rest from z with its input held at w, as far as one more step goes."""
+    if t.moves == RELAXING:
+        return z + t.second[i] * beyond(w - z, r[i])
+    return z
+
+
+@jit
+def bent(t: MovingTables, kernel: TanhTables, i: int, z: Any) -> Any:
+    """What play i contributes at z."""
+    if t.bends == POLYNOMIAL:
+        x = z * t.number[INVERSE_SCALE]
+        total = z - z
+        for k in range(t.curve.shape[1] - 1, -1, -1):
+            total = (total + t.curve[i, k]) * x
+        return z + t.number[SCALE] * (total * x)
+    if t.bends == CENTRE:
+        x = (z - t.number[MIDDLE]) * t.number[INVERSE_WIDTH]
+        return z + t.number[BUMP] * (tanh(x, kernel) + t.number[TANH_CENTRE])
+    return z
+
+
+@jit
+def moved_sum(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, w: Any) -> Any:
+    """What the plays give once their input has gone to w."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = moved(t, r, i, s.play[i], s.play[0], w)
+        total = total + p[i] * (values[i] if z == s.play[i] else bent(t, kernel, i, z))
+    return total
+
+
+@jit
+def moved_follow(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, w: Any) -> Any:
+    """The plays follow their input w; their sum."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = moved(t, r, i, s.play[i], s.play[0], w)
+        rest = left(t, r, i, z, w)
+        value = values[i] if z == s.play[i] else bent(t, kernel, i, z)
+        total = total + p[i] * value
+        values[i] = value if rest == z else bent(t, kernel, i, rest)
+        s.play[i] = rest
+    s.play[0] = w
+    return total
+
+
+@jit
+def resting(r: Reals, s: State, i: int, w: Any) -> Any:
+    """Play i at rest with its input at w."""
+    low = w - r[i]
+    high = w + r[i]
+    upper = high if s.play[i] > high else s.play[i]
+    return low if upper < low else upper
+
+
+@jit
+def moved_rest(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, w: Any) -> Any:
+    """The plays at rest with their input at w; their sum."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        s.play[i] = resting(r, s, i, w)
+        values[i] = bent(t, kernel, i, s.play[i])
+        total = total + p[i] * values[i]
+    s.play[0] = w
+    return total
+
+
+@jit
+def resting_sum(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
+    """What rest at an input w gives."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        total = total + p[i] * bent(t, kernel, i, resting(r, s, i, w))
+    return total
+
+
+@jit
+def moved_input(
+    t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, moving: bool, h: Any
+) -> Any:
+    """Input of the plays at which their sum is h, by halves between where it is and the farthest."""
+    here = s.play[0]
+    total = moved_sum(t, kernel, r, p, s, values, here) if moving else resting_sum(t, kernel, r, p, s, here)
+    if total == h:
+        return here
+    low = here if total < h else t.number[LEAST_INPUT]
+    high = t.number[LARGEST_INPUT] if total < h else here
+    for _ in range(t.halves):
+        w = low + (high - low) * t.number[HALF]
+        total = moved_sum(t, kernel, r, p, s, values, w) if moving else resting_sum(t, kernel, r, p, s, w)
+        if total < h:
+            low = w
+        else:
+            high = w
+    return high
+
+

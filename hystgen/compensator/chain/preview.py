@@ -1,0 +1,81 @@
+"""What is taken ahead of its time: the reference's samples around the present one, and their weights.
+
+A delay is straight interpolation between two samples, a mode three of them (`hystgen.effects.resonance.compensator`).
+One behind the other they are one row of weights, which sum to 1: no recursion, hence stable whatever the numbers are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics.jit import jit
+from hystgen.effects.resonance.compensator import denominator
+from hystgen.effects.resonance.model import Resonance
+from hystgen.plays.slots import Counts, Reals
+
+
+class Taps(NamedTuple):
+    """Weights of the reference from sample `first` to `first + len(weights) - 1`, counted from the present one."""
+
+    first: int
+    weights: NDArray[np.float64]
+
+    @property
+    def ahead(self) -> int:
+        """Samples that the last one lies ahead."""
+        return self.first + len(self.weights) - 1
+
+
+def taps(delay: float, modes: Sequence[Resonance], seconds: float) -> Taps:
+    """The weights for a delay in s and modes in series at samples `seconds` apart; the reference alone for none."""
+    samples = delay / seconds
+    whole = math.floor(samples)
+    share = samples - whole
+    weights = np.array([1.0 - share, share] if share > 0.0 else [1.0])
+    first = whole
+    for mode in modes:
+        a1, a2 = denominator(mode, seconds)
+        weights = np.convolve(weights, np.array([a2, a1, 1.0]) / (1.0 + a1 + a2))
+        first -= 1
+    return Taps(first, weights)
+
+
+# ---------------------------------------------------------------- preview.c
+
+
+class Line(NamedTuple):
+    """The last samples of the reference (L,), the newest one last, and whether there are any yet (1,)."""
+
+    sample: Reals
+    filled: Counts
+
+
+@jit
+def preview_put(line: Line, x: Any) -> None:
+    """The next sample; the first one stands for all before it too."""
+    n = len(line.sample)
+    for i in range(n - 1):
+        line.sample[i] = line.sample[i + 1] if line.filled[0] else x
+    line.sample[n - 1] = x
+    line.filled[0] = 1
+
+
+@jit
+def preview_repeat(line: Line) -> None:
+    """The newest sample once more, where there is one."""
+    if line.filled[0]:
+        preview_put(line, line.sample[len(line.sample) - 1])
+
+
+@jit
+def preview_target(tap: Reals, line: Line) -> Any:
+    """The weighted sum of the oldest samples."""
+    total = tap[0] * line.sample[0]
+    for i in range(1, len(tap)):
+        total = total + tap[i] * line.sample[i]
+    return total

@@ -1,0 +1,36 @@
+"""Running the bit reference of a model with effects over a record, all of which is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.compensator import reference
+from hystgen.compensator.chain.tables import Compiled
+from hystgen.effects.base import Run
+from hystgen.effects.thermal.model import COLUMN
+from hystgen.plays import slots
+
+EVEN = 1e-3
+"""Share of a step by which times may differ from even ones: what a clock of a recorder makes of them."""
+
+
+def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
+    """Answers (N,) for the drives or references in `record.v`; a preview sees what follows, the last sample stays."""
+    x, t = record.v, compiled.tables
+    ahead = compiled.ahead if inverse else 0
+    later = np.append(x[ahead:], np.full(min(ahead, len(x)), x[-1:])) if ahead else x
+    calls = [np.full(min(ahead, len(x)), slots.OP_PUSH, dtype=np.uint8)]
+    given = [x[:ahead]]
+    if len(t.gain):
+        op = np.tile(np.array([slots.OP_TEMPERATURE, slots.OP_STEP], dtype=np.uint8), len(x))
+        calls.append(op)
+        given.append(np.column_stack([record.extra[COLUMN], later]).ravel())
+    else:
+        calls.append(np.full(len(x), slots.OP_STEP, dtype=np.uint8))
+        given.append(later)
+    op = np.concatenate(calls)
+    found, _ = reference.answers(t, inverse, op, np.concatenate(given))
+    return np.asarray(found[op == slots.OP_STEP])

@@ -1,0 +1,320 @@
+"""The C that names the blocks of a model with effects: their tables, their memory, and the order they are called in.
+
+What a block does stands in `c_runtime/`; here are only its places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.moving import MovingTables
+from hystgen.compensator.chain.tables import ChainTables, Compiled
+from hystgen.emission.text import literal, operand, table
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of an instance: `kind` is real, flag, status or one of `STRUCTS`; more than one where it is an array."""
+
+    kind: str
+    name: str
+    comment: str = ""
+    count: int = 0
+
+    def text(self) -> str:
+        """Its declaration."""
+        kind = {"flag": "bool", "status": "unsigned int"}.get(self.kind, f"hystgen_{self.kind}_t")
+        size = f"[{self.count}]" if self.count else ""
+        return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
+
+
+STRUCTS = {
+    "creep": (2, 0), "creep_state": (2, 0), "lag": (5, 0), "lag_exact": (2, 0), "gain": (3, 0), "ageing": (4, 1),
+}  # fmt: skip
+"""Reals and flags in the memory of a block, by the name of its type."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a chain: its kind, which names its functions and types, the fields of its memory, and the text of
+    its table."""
+
+    kind: str
+    name: str
+    fields: tuple[Field, ...]
+    arrays: tuple[str, ...]
+    table: str = ""
+    more: str = ""
+
+    def call(self, verb: str, x: str) -> str:
+        """A call of one of its verbs with the argument x."""
+        given = [self.table] * (verb in _TABLE[self.kind]) + [f"&self->{self.name}"] * (verb != "resting")
+        if self.more and verb in ("rest", "absorb"):
+            given.append(f"self->{self.more}")
+        return f"hystgen_{self.kind}_{verb}({', '.join([*given, x])})"
+
+
+_TABLE = {
+    "creep": ("rest", "resting", "solve", "absorb"),
+    "lag": ("solve", "absorb"),
+    "lag_exact": ("solve", "absorb"),
+    "gain": (),
+    "ageing": (),
+}
+"""Verbs of a block that read its table."""
+
+
+def _entries(values: Iterable[float]) -> str:
+    return ", ".join(map(literal, values))
+
+
+def drive_side(t: ChainTables, prefix: str) -> list[Block]:
+    """The blocks in front of the plays, from the drive on."""
+    blocks = []
+    for j, (exact, row) in enumerate(zip(t.lag.exact, t.lag.block, strict=True), 1):
+        kind, name = "lag_exact" if exact else "lag", f"lag_{j}"
+        text = f"static const {prefix}_{kind}_table_t {prefix}_{name} = {{\n    {_entries(row)},\n}};\n"
+        blocks.append(Block(kind, name, (Field(kind, name),), (text,), f"&hystgen_{name}"))
+    return blocks
+
+
+def output_side(t: ChainTables, prefix: str) -> list[Block]:
+    """The blocks behind the plays, from these on."""
+    blocks = []
+    for j, row in enumerate(t.creep.block, 1):
+        terms = t.creep.term[t.creep.first[j - 1] : t.creep.first[j]]
+        name, n = f"creep_{j}", len(terms)
+        lines = ",\n".join(f"    {{{_entries(term)}}}" for term in terms)
+        own = f"static const {prefix}_creep_term_t {prefix}_{name}_term[{n}] = {{\n{lines},\n}};\n"
+        numbers = f"    {prefix}_{name}_term, {_entries(row)}, {n},"
+        text = f"static const {prefix}_creep_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
+        fields = (Field("creep", name), Field("creep_state", f"{name}_state", "", n))
+        blocks.append(Block("creep", name, fields, (own, text), f"&hystgen_{name}", f"{name}_state"))
+    for j in range(1, len(t.ageing.turns) + 1):
+        pieces = t.ageing.piece[t.ageing.first[j - 1] : t.ageing.first[j]]
+        name, n = f"ageing_{j}", len(pieces)
+        lines = ",\n".join(f"    {{{_entries(piece)}}}" for piece in pieces)
+        own = f"static const {prefix}_ageing_piece_t {prefix}_{name}_piece[{n}] = {{\n{lines},\n}};\n"
+        numbers = f"    {prefix}_{name}_piece, {_entries(t.ageing.number[j - 1, 2:])}, {n}, {t.ageing.turns[j - 1]},"
+        text = f"static const {prefix}_ageing_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
+        blocks.append(Block("ageing", name, (Field("ageing", name),), (own, text), f"&hystgen_{name}"))
+    for j, row in enumerate(t.gain, 1):
+        name = f"gain_{j}"
+        text = f"static const {prefix}_gain_table_t {prefix}_{name} = {{\n    {_entries(row[:7])},\n}};\n"
+        blocks.append(Block("gain", name, (Field("gain", name),), (text,), f"&hystgen_{name}"))
+    return blocks
+
+
+MOVES = ("play", "dilated", "relaxing")
+BENDS = ("none", "polynomial", "centre")
+"""Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
+
+
+def plays(t: ChainTables) -> tuple[str, str]:
+    """How plays move and are bent; empty where engine loop has them."""
+    return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
+
+
+def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
+    """Tables and numbers of plays that an effect moves or bends."""
+    real_t = f"{prefix}_real_t"
+    arrays = []
+    if t.moves == moving.DILATED:
+        arrays.append(table(real_t, f"{prefix}_wider", list(t.first)))
+    if t.moves == moving.RELAXING:
+        arrays += [table(real_t, f"{prefix}_late", list(t.first)), table(real_t, f"{prefix}_kept", list(t.second))]
+    if t.bends == moving.POLYNOMIAL:
+        n, terms = t.curve.shape
+        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.curve)
+        arrays.append(f"static const {real_t} {prefix}_curve[{n}][{terms}] = {{\n{rows},\n}};\n")
+    words = (
+        ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
+        ("CENTRE", moving.MIDDLE, "of the loops that count more or less"),
+        ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
+        ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
+        ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
+        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""), ("HALF", moving.HALF, ""),
+    )  # fmt: skip
+    constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
+    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search")]
+    return arrays, [*constants, *counts]
+
+
+@dataclass(frozen=True)
+class Glue:
+    """The operators of a model with effects: the memory of an instance and the text of its type by operator, functions,
+    tables, which functions of the interface it has beside those of every model, and the numbers that functions name."""
+
+    fields: dict[str, list[Field]]
+    states: dict[str, str]
+    functions: str
+    arrays: list[str]
+    beside: list[str]
+    calls: dict[str, list[str]]
+    constants: list[tuple[str, str, str]]
+
+
+def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, str]]) -> Glue:
+    """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
+    t = compiled.tables
+    before, after = drive_side(t, prefix), output_side(t, prefix)
+    functions = [
+        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, len(t.gain) > 0)
+    ]
+    heated = ["set_temperature"] * (len(t.gain) > 0)
+    aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
+    every = ["settle", "set_offset", *heated, *aged]
+    calls = {
+        "forward": every,
+        "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
+    }
+    arrays = [text for block in (*before, *after) for text in block.arrays]
+    if len(t.tap):
+        arrays.append(table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap)))
+    number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
+    words = {
+        "OUTPUT_OFFSET": "part of every displacement",
+        "FARTHEST_OFFSET": "largest that can be set beside it",
+        "SLEW_RISING": "largest move of the drive in a step",
+        "SLEW_FALLING": "",
+    }
+    constants = [(name, operand(value), words[name]) for name, value in number.items()]
+    constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
+    if t.moving.used:
+        more, numbers = _moving(t.moving, prefix)
+        arrays, constants = arrays + more, constants + numbers
+    fields = {op: instance(op, [*before, *after], len(t.tap), len(t.threshold) - 1, t.moving.used) for op in operators}
+    return Glue(
+        fields,
+        {op: _state(op, fields[op]) for op in operators},
+        "\n".join(functions), arrays, [text for stage in behind for text in stage["arrays"]], calls, constants,
+    )  # fmt: skip
+
+
+def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, moving: bool) -> list[Field]:
+    """The memory of one operator, field by field."""
+    inverse = op == "inverse"
+    return [
+        *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
+        Field("real", "applied", "drive seen last"),
+        Field("real", "drive", "what arrived of it in front of the plays"),
+        Field("real", "level", "sum of the plays"),
+        Field("real", "output", "what the output side made of it"),
+        Field("real", "answer", f"{'drive' if inverse else 'displacement'} returned last"),
+        Field("real", "offset", "set beside that of the model"),
+        *(field for block in blocks for field in block.fields),
+        *([Field("real", "line", "references, the newest one last", taps)] if inverse and taps else []),
+        Field("flag", "ascending", "direction of the drive's last move"),
+        Field("flag", "moving", "a drive was applied"),
+        *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),
+        *([Field("flag", "filled", "there are references"), Field("status", "bits", "of the last step")] if inverse
+          else []),
+        Field("status", "status"),
+        Field("play", "play", "play 0 is the input of the plays", plays + 1),
+        *([Field("real", "bent", "what each contributes", plays + 1)] if moving else []),
+    ]  # fmt: skip
+
+
+def _state(op: str, fields: Sequence[Field]) -> str:
+    """The type of an instance."""
+    words = "reference in, drive out" if op == "inverse" else "drive in, displacement out"
+    top = f"/* One {op} operator: {words}. Plain data, owned by the caller. */"
+    body = "\n".join(f"    {field.text()}" for field in fields)
+    return f"{top}\ntypedef struct {{\n{body}\n}} hystgen_{op}_t;\n"
+
+
+def _function(comment: str, head: str, lines: Sequence[str]) -> str:
+    body = "\n".join(f"    {line}" for line in lines)
+    return f"/* {comment} */\n{head}\n{{\n{body}\n}}\n"
+
+
+def _functions(
+    op: str,
+    before: Sequence[Block],
+    after: Sequence[Block],
+    behind: Sequence[dict[str, str]],
+    ahead: bool,
+    heated: bool,
+) -> Iterator[str]:
+    """The functions of one operator that name the blocks."""
+    inverse = op == "inverse"
+    self_t = f"hystgen_{op}_t *self"
+
+    def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
+        lines = [f"{x} = {block.call(_verb(block, verb), x)};" for block in blocks] or ["(void)self;"]
+        if verb == "resting" and not any("self" in line for line in lines):
+            lines = ["(void)self;", *lines]
+        head = f"static hystgen_real_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_real_t {x})"
+        return _function(comment, head, [*lines, f"return {x};"])
+
+    yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.")
+    yield through(before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.")
+    yield through(after, "rest", "h", "output_side", "Settles at the sum h of the plays. Returns the output.")
+    yield through(after, "absorb", "h", "output_side", "The sum of the plays is h at this sample. Returns the output.")
+    if inverse:
+        back = list(reversed(before)), list(reversed(after))
+        yield through(back[0], "solve", "a", "drive_side", "The drive that leads to a in front of the plays.")
+        yield through(back[1], "solve", "y", "output_side", "The sum of the plays that gives y at this sample.")
+        yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
+    lines = ["hystgen_real_t x = y;"] if behind else []
+    x = "x" if behind else "y"
+    lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
+    yield _function(
+        "The displacement for an output y of the chain.",
+        f"static hystgen_real_t hystgen_{op}_displaced(const {self_t}, hystgen_real_t y)",
+        [*lines, f"return {x} + (HYSTGEN_OUTPUT_OFFSET + self->offset);"],
+    )
+    if inverse:
+        lines = ["hystgen_real_t y = u - (HYSTGEN_OUTPUT_OFFSET + self->offset);"]
+        lines += [
+            f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
+        ]
+        unused = [] if any(stage["limited"] for stage in behind) else ["(void)limited;"]
+        yield _function(
+            "The output of the chain that gives the displacement u; `limited` tells whether none does.",
+            f"static hystgen_real_t hystgen_inverse_undisplaced(const {self_t}, hystgen_real_t u, bool *limited)",
+            [*lines, *unused, "return y;"],
+        )
+        put = ["hystgen_preview_put(self->line, &self->filled, y);"]
+        yield _function(
+            "What has to be given now for the newest reference, y once it is undisplaced.",
+            f"static hystgen_real_t hystgen_inverse_ahead({self_t}, hystgen_real_t y)",
+            [*put, "return hystgen_preview_target(hystgen_tap, self->line);"] if ahead
+            else ["(void)self;", "return y;"],
+        )
+        yield _function(
+            "No new reference: the newest one once more.",
+            f"static void hystgen_inverse_repeat({self_t})",
+            ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else ["(void)self;"],
+        )  # fmt: skip
+    gains = [block for block in after if block.kind == "gain"]
+    ageing = [block for block in after if block.kind == "ageing"]
+    yield _function(
+        "Offset and gains of the parameter file.",
+        f"static void hystgen_{op}_settings_init({self_t})",
+        [
+            "self->offset = 0;",
+            *(f"hystgen_gain_init(&self->{block.name});" for block in gains),
+            *(f"(void)hystgen_ageing_set_travel({each.table}, &self->{each.name}, 0);" for each in ageing),
+        ],
+    )
+    yield _function(
+        "The drive moves to v from where it was.",
+        f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
+        [f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing]
+        or ["(void)self;", "(void)v;"],
+    )
+    if heated:
+        calls = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
+        yield _function(
+            "Gains and offsets of a temperature. Returns whether it had to be limited.",
+            f"static bool hystgen_{op}_heat({self_t}, hystgen_real_t temperature)",
+            ["bool limited = false;", *(f"limited = {call} || limited;" for call in calls), "return limited;"],
+        )
+
+
+def _verb(block: Block, verb: str) -> str:
+    """What a block without memory calls it."""
+    return {"rest": "absorb", "resting": "solve"}.get(verb, verb) if block.kind in ("gain", "ageing") else verb
