@@ -240,7 +240,7 @@ class TestInterrupt:
 
 class TestCores:
     def test_those_of_this_process(self) -> None:
-        assert parallel.cores() in (1, min(len(os.sched_getaffinity(0)), parallel.MOST))
+        assert parallel.cores() in (1, min(len(os.sched_getaffinity(0)), parallel.MOST_PROCESSES))
 
     def test_one_beside_another_thread(self) -> None:
         done = threading.Event()

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 R = TypeVar("R")
 
-MOST = 16
+MOST_PROCESSES = 16
 """Processes at most; each has its own results in memory."""
 
 _at_work: Sequence[int] | memoryview[int] = (0,)
@@ -46,7 +46,7 @@ def cores() -> int:
 
 def _cores() -> int:
     available = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return min(available, MOST)
+    return min(available, MOST_PROCESSES)
 
 
 def each(

@@ -22,8 +22,8 @@ from hystgen.basics.progress import Progress
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import fit, gpi, pi, prepared, quality, reduction
-from hystgen.identification.fit import HELD_OUT, Fit, Used, visited
+from hystgen.identification import gpi, pi, prepared, quality, reduction
+from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError, rounded
 from hystgen.identification.quality import Row
@@ -50,7 +50,7 @@ MOST_PLAYS = 1000
 
 MOST_BREAKS = 64
 
-PARSIMONY = 1.03
+MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
 
@@ -127,9 +127,9 @@ def identify(
             if reason:
                 reported.append(reason)
             fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, bar.tick)
-    masks = fit.of_records(fit_records, compared, False)
+    masks = used_of(fit_records, compared, False)
     if held:
-        masks += fit.of_records(held_records, done.held, True)
+        masks += used_of(held_records, done.held, True)
     reported += [text for each in masks for text in each.sentences()]
     errors = [_compare(item, fitted) for item in compared]
     own = Row.of("fit" if held or not rows else "all", "written", errors)
@@ -228,7 +228,7 @@ def _try(
 
 def _choose(tried: Sequence[_Tried]) -> int:
     """The first, that is the simplest, whose held-out error is about as small as any."""
-    enough = PARSIMONY * min(each.held_out.rms for each in tried)
+    enough = MODEL_PARSIMONY * min(each.held_out.rms for each in tried)
     return next(k for k, each in enumerate(tried) if each.held_out.rms <= enough)
 
 
@@ -381,7 +381,7 @@ def identifier_from(text: str) -> str:
 
 __all__ = [
     "MODELS",
-    "PARSIMONY",
+    "MODEL_PARSIMONY",
     "Fit",
     "IdentificationError",
     "Row",

@@ -21,12 +21,12 @@ Flags = NDArray[np.bool_]
 LONGEST = 4
 """Most samples in a row that count as an isolated fault; more are something that the actuator or the sensor did."""
 
-FAR = 8.0
+OUTLYING = 8.0
 """Standard deviations of its surroundings' scatter by which an outlier is off their median."""
 
 LITTLE = 5e-4
 """Least scatter, as a share of the peak-to-peak output: a model of a simulation leaves next to nothing but at its
-kinks, and an error of `FAR` times that in a single sample spoils no fit."""
+kinks, and an error of `OUTLYING` times that in a single sample spoils no fit."""
 
 WINDOW = 15
 """Samples of the running median, more than twice `LONGEST`."""
@@ -43,13 +43,13 @@ TAIL, NORMAL_TAIL = 0.98, 2.326
 STEP, STEP_OF_RANGE = 3.0, 0.02
 """A step of the drive is `STEP` times the quantile `TAIL` of its moves, and at least this share of its range."""
 
-MOST = 0.01
+MOST_OUTLIERS = 0.01
 """Largest share of samples that is left out as outliers; beyond it they are no outliers."""
 
 FEW = 2
 """Number of samples that may be left out of a record of any length: its first and its last."""
 
-LOST = 25.0
+LONG_GAP = 25.0
 """Median steps of a gap after which the drive in between, and with it the memory, counts as unknown."""
 
 SEEN, SIGMAS = 0.05, 4.0
@@ -62,7 +62,7 @@ OUT_OF_SCALE = 3.0
 
 def most(samples: int) -> int:
     """Most samples of a record that are left out as isolated."""
-    return max(FEW, math.ceil(MOST * samples))
+    return max(FEW, math.ceil(MOST_OUTLIERS * samples))
 
 
 def outliers(error: Array, v: Array, swing: float) -> Flags:
@@ -98,7 +98,7 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
         return []
     e = error[known]
     from_middle = np.abs(e - median_filter(e, WINDOW, mode="mirror"))
-    far = from_middle > FAR * max(_scatter(from_middle, FEW), LITTLE * swing)
+    far = from_middle > OUTLYING * max(_scatter(from_middle, FEW), LITTLE * swing)
     return [
         (int(known[first]), int(known[last - 1]) + 1)
         for first, last in runs_of(far)
@@ -195,7 +195,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     step = np.abs(np.diff(v))
     # three of them are not small at a sample that stands apart
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
-    least = max(STEP_OF_RANGE * span, FAR * usual_bend)
+    least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
     # at most `LONGEST` + 1 of the steps around the two jumps belong to the pulse, and two to another one
     usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="nearest")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
@@ -294,7 +294,7 @@ class Piece:
 def between_gaps(record: Record) -> list[Piece]:
     """The record, cut where the time missing is so long that the drive in between is unknown."""
     steps = np.diff(record.t)
-    cuts = [0, *(np.flatnonzero(steps > LOST * record.sample_time) + 1).tolist(), len(record)]
+    cuts = [0, *(np.flatnonzero(steps > LONG_GAP * record.sample_time) + 1).tolist(), len(record)]
     if len(cuts) == 2:
         return [Piece(record, 0, False)]
     return [
@@ -315,7 +315,7 @@ def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
 # Stretches of the output: drop-outs, held samples, a converter at its end ------------------------------------
 
 
-HELD = 6
+FEWEST_HELD = 6
 """Fewest equal samples in a row, while the drive moves, that count as held."""
 
 CHANCE = 1e-6
@@ -349,7 +349,7 @@ NEAR = 4
 """Equal samples are counted over this many lengths of the run on either side too: where the drive is slow for a while,
 a coarse converter repeats its codes."""
 
-ROUNDING = 1e-9
+NOISE_FREE = 1e-9
 """Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""
 
 
@@ -399,15 +399,15 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
     """Runs [a, b) of equal outputs while the drive moves on, longer than noise and a converter's steps make them."""
     step = np.diff(y)
     same = step == 0.0
-    runs = [(a, b) for a, b in runs_of(same) if b - a + 1 >= HELD]
+    runs = [(a, b) for a, b in runs_of(same) if b - a + 1 >= FEWEST_HELD]
     known = np.isfinite(step)
     sizes = np.abs(step[known & ~same])
-    if not runs or len(sizes) < HELD:
+    if not runs or len(sizes) < FEWEST_HELD:
         return []
     grain = float(np.min(sizes))
     noise = float(np.median(np.abs(np.diff(y[np.isfinite(y)], 3)))) / 3.0
     at = np.isfinite(y)
-    real = noise > ROUNDING * float(np.ptp(y[at]))
+    real = noise > NOISE_FREE * float(np.ptp(y[at]))
     slope = sensitivity(y[at], v[at])
     long = np.zeros(len(same), dtype=bool)
     for a, b in runs:

@@ -215,7 +215,7 @@ class Used:
         ]
 
 
-def of_records(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
+def used_of(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
     """What became of the samples of `records`, given the courses that were compared in the end."""
     return tuple(
         _of_record(record, [item for item in courses if item.origin[0] == number], held_out)

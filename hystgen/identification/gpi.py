@@ -26,10 +26,10 @@ Tick = Callable[[int], None] | None
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Names of what can be fitted; `auto` chooses among them."""
 
-BREAKS = (1, 2, 4, 8)
+BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks of a dead-zone sum that are tried."""
 
-PARSIMONY = 1.02
+FRONT_PARSIMONY = 1.02
 """A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
 
 INVERSE_PLAYS = 10
@@ -83,7 +83,7 @@ def solve(
         shaped = _shaped(compared, front, fine, before, tick)
         before = shaped.shape
         error = validation(shaped, front)
-        if best is None or error * PARSIMONY < best[0]:
+        if best is None or error * FRONT_PARSIMONY < best[0]:
             best = error, front, shaped.shape
     assert best is not None
     _, front, shape = best
@@ -123,7 +123,7 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
                 f"breaks have to lie inside the drive range of the records, {drive[0]:.6g} to {drive[1]:.6g}"
             )
         return [DeadZones(drive, breaks)]
-    return [DeadZones(drive, even_breaks(drive, count)) for count in ([breaks] if breaks is not None else BREAKS)]
+    return [DeadZones(drive, even_breaks(drive, count)) for count in ([breaks] if breaks is not None else BREAK_COUNTS)]
 
 
 def _shaped(

@@ -128,13 +128,13 @@ COUNTS = (6, 8, 12, 16, 24)
 POWERS = (1.0, 1.5, 2.0)
 """Spacings tried, `r_i = r_n (i/n)^power`: even, or denser near zero where loops bend most."""
 
-PARSIMONY = 1.01
+PLAYS_PARSIMONY = 1.01
 """The fewest plays whose validation error is within this factor of the best are chosen."""
 
 DENSE = 16
 """Plays of the list that other parts of a model are sought with."""
 
-MANY = 100
+MANY_PLAYS = 100
 """More plays than this are spaced evenly."""
 
 SAMPLES_A_PLAY = 8
@@ -182,7 +182,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
     lists = []
     for n in counts:
         # A single play has one place; very many leave nothing to choose
-        for power in POWERS[: 1 if n < 2 or n > MANY else None]:
+        for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
             lists.append(Candidate((0.0, *places)))
     return lists
@@ -222,7 +222,7 @@ def choose(reduced: Reduced, lists: Sequence[Candidate]) -> Candidate:
             chosen = columns(reduced, candidate)
             squares[k] += residual(left_out, chosen, non_negative(training, chosen))
     errors = np.sqrt(squares)
-    enough = float(errors.min()) * PARSIMONY
+    enough = float(errors.min()) * PLAYS_PARSIMONY
     return min(
         (candidate for candidate, error in zip(lists, errors, strict=True) if error <= enough),
         key=lambda candidate: (candidate.n, errors[lists.index(candidate)]),

@@ -21,17 +21,17 @@ from hystgen.records import LARGEST, SHORTEST, Record, no_value
 
 Array = NDArray[np.float64]
 
-LEFT = 0.1
+LEAST_SOUND = 0.1
 """Least share of a record that has to be left of it where its output stood at a converter's end."""
 
-ROUNDS = 4
+MOST_FITS = 4
 """Most robust fits; the first that finds the same faults is the last."""
 
-HALF = 0.25
+LESS_MISSED = 0.25
 """The drive, not the output, is wrong where bridging it reduces the squared error to less than this share."""
 
 
-SMALLEST = 1e-20
+LEAST_MOVEMENT = 1e-20
 """Drive or output that moves by less is no measurement: squares of it, and ratios to the other one, leave the numbers
 that there are in double precision and in parameter files."""
 
@@ -62,7 +62,7 @@ def courses(
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
-            f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
+            f"{faults.LONG_GAP:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
     for k, item in enumerate(made):
@@ -103,7 +103,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
     if not len(measured) or np.ptp(measured) == 0.0:
         raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
     for name, x in (("v", v), ("y", measured)):
-        if np.ptp(x) < SMALLEST:
+        if np.ptp(x) < LEAST_MOVEMENT:
             raise IdentificationError(
                 f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
                 "to a smaller unit, or name another column"
@@ -121,7 +121,7 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
         return item, []
     at = np.isin(item.y, [level for _, level in levels])
     left, before = np.count_nonzero(np.isfinite(item.y) & ~at), np.count_nonzero(np.isfinite(item.y))
-    if left < max(LEFT * before, SHORTEST):
+    if left < max(LEAST_SOUND * before, SHORTEST):
         raise IdentificationError(
             f"{item.name}: y stands at the converter's end in {before - left} of {len(at)} samples; set the sensor's "
             "range so that the whole motion lies inside it, and record again"
@@ -180,7 +180,7 @@ def mask_outliers(
     solution, _ = pi.solve([_without_runs(item)[0] for item in to_fit], wanted, floor)
     places = tuple(float(r) for r in solution.thresholds)
     before: list[Array] = []
-    for number in range(ROUNDS):
+    for number in range(MOST_FITS):
         to_fit[:] = [_with_drive_right(item, solution, number > 0) for item in to_fit]
         wrong = [faults.outliers(_errors(item, solution), item.v, item.output_range) for item in to_fit]
         now = [np.stack([item.v, flags]) for item, flags in zip(to_fit, wrong, strict=True)]
@@ -215,7 +215,7 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
         run[first:last] = True
         other = replace(item, v=faults.bridged(item.v, run)).resettled(math.inf)
         less = _errors(other, solution)
-        if _size(less[run]) < HALF * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
+        if _size(less[run]) < LESS_MISSED * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
             item, error = other, less
     return item
 

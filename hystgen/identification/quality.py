@@ -75,7 +75,7 @@ class Row:
         )
 
 
-LEFT = (0, 1, 8)
+WORD_COLUMNS = (0, 1, 8)
 """Columns of the table that hold words."""
 
 
@@ -105,7 +105,7 @@ def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
     content = cells(rows, unit)
     widths = [max(len(line[k]) for line in content) for k in range(len(content[0]))]
     lines = [
-        "  ".join(line[k].ljust(width) if k in LEFT else line[k].rjust(width) for k, width in enumerate(widths))
+        "  ".join(line[k].ljust(width) if k in WORD_COLUMNS else line[k].rjust(width) for k, width in enumerate(widths))
         for line in content
     ]
     return "\n".join([*(line.rstrip() for line in lines), *remarks]) + "\n"
@@ -119,10 +119,10 @@ REDRAWS = 1000
 TAILS = (0.025, 0.975)
 """Of 95 % intervals."""
 
-BLOCKS, MOST_BLOCKS = 40, 4000
+FEWEST_BLOCKS, MOST_BLOCKS = 40, 4000
 """Fewest blocks, however long the residuals' memory, and most: more improve nothing."""
 
-MANY = 100
+MANY_WEIGHTS = 100
 """Of more weights than this, those that are zero stay so in every redraw: then one factorisation serves all."""
 
 MEMORY = 4.0
@@ -179,7 +179,7 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
     moved = signs @ scores / np.sqrt(1.0 - lost)
     target = triangle[:, : len(p)] @ p
     back, *_ = np.linalg.lstsq(triangle.T, moved.T, rcond=1e-12)
-    if len(p) > MANY:
+    if len(p) > MANY_WEIGHTS:
         active = np.flatnonzero(np.append(p > 0.0, np.ones(len(fitted.shape), dtype=bool)))
         found, *_ = np.linalg.lstsq(triangle[:, active], target[:, None] + back, rcond=1e-12)
         redrawn = np.zeros((REDRAWS, unknowns))
@@ -235,7 +235,7 @@ def _scores(rows: reduction.Source, item: Course, errors: Errors, block: int) ->
 def block_length(errors: Sequence[Array]) -> int:
     """Samples in a block: a few correlation times of the residuals, but no more than leave enough blocks."""
     samples = sum(len(e) for e in errors)
-    longest, shortest = max(1, samples // BLOCKS), max(1, samples // MOST_BLOCKS)
+    longest, shortest = max(1, samples // FEWEST_BLOCKS), max(1, samples // MOST_BLOCKS)
     times = [correlation_time(e[np.isfinite(e)]) * len(e) for e in errors]
     return int(min(max(shortest, round(MEMORY * sum(times) / samples)), longest))
 

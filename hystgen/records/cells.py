@@ -23,7 +23,7 @@ DAY = 86400
 
 NANO = 10**9
 
-LATE = 0.5
+PAST_MIDNIGHT = 0.5
 """Fraction of a day by which a clock without a date has to go back to have passed midnight."""
 
 
@@ -67,7 +67,7 @@ class Clock:
             time += self._day(match["date"]) * DAY * NANO
         else:
             time += self._midnights * DAY * NANO
-            if self._first is not None and time < self._latest - LATE * DAY * NANO:
+            if self._first is not None and time < self._latest - PAST_MIDNIGHT * DAY * NANO:
                 self._midnights += 1
                 time += DAY * NANO
         self._latest = time

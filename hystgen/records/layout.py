@@ -426,7 +426,7 @@ def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) 
 # GCS arrays of Physik Instrumente ----------------------------------------------------------------------------
 
 
-MOST = 1 << 16
+LARGEST_CODE = 1 << 16
 """Numbers of columns and codes of characters are smaller."""
 
 _ENTRY = re.compile(r"\s*#\s*(\w+)\s*(?:=\s*(.*?))?\s*")
@@ -471,7 +471,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
 
 def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> int:
     line, text = entries[key]
-    if not text.isdecimal() or (key != "NDATA" and not 0 < int(text) < MOST):
+    if not text.isdecimal() or (key != "NDATA" and not 0 < int(text) < LARGEST_CODE):
         raise reading.refuse(f"{key} is no whole number that can be; correct it, or export the table again", line)
     return int(text)
 

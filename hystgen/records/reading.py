@@ -16,7 +16,7 @@ from hystgen.basics.problems import RecordError, counted, printable
 from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
 from hystgen.records.record import Array, Record, no_value
 
-AGREE = 1e-6
+SAME_STEP = 1e-6
 """Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
 
 
@@ -139,7 +139,7 @@ class Reading:
         if len({step.start for step in steps}) > 1:
             starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
             self.problem(f"the columns do not start together, {starts}; export them with one time", line)
-        if any(abs(step.seconds - steps[0].seconds) > AGREE * steps[0].seconds for step in steps):
+        if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, and the file has {said}; give --sample-time", line)
         self.refuse_if_any()
@@ -258,7 +258,7 @@ SHORTEST = 16
 REPAIRABLE = 0.05
 """Largest share of samples that is dropped with a note; beyond it a file is refused."""
 
-GAP = 3.0
+NOTED_GAP = 3.0
 """A step longer than this many median steps is a gap."""
 
 
@@ -380,12 +380,12 @@ def _step(reading: Reading, t: Array) -> float:
         return reading.sample_time or 1.0
     steps = np.diff(t)
     step = float(np.median(steps, overwrite_input=True))
-    number = int(np.count_nonzero(steps > GAP * step))
+    number = int(np.count_nonzero(steps > NOTED_GAP * step))
     if number:
         np.subtract(t[1:], t[:-1], out=steps)  # the median has put them in another order
         worst = int(np.argmax(steps))
         reading.notes.append(
-            f"{counted(number, 'gap')} longer than {GAP:g} median steps kept, the largest {steps[worst]:.4g} s "
+            f"{counted(number, 'gap')} longer than {NOTED_GAP:g} median steps kept, the largest {steps[worst]:.4g} s "
             f"at t = {t[worst]:.6g} s"
         )
     given = reading.sample_time

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
 """How exactly, and how, a compensator corrects a stage in front of the plays."""
 
-LONGER = 0.01
+VISIBLE = 0.01
 """An error is visibly larger than another from this share on."""
 
 
@@ -85,7 +85,7 @@ def _chance(p_value: float) -> str:
 def _refitted(result: Result) -> list[Text]:
     """An explanation of the second bar where it is visibly longer than the first."""
     given, refitted = result.gap.as_given, result.gap.refitted
-    if refitted.holdout <= (1.0 + LONGER) * given.holdout:
+    if refitted.holdout <= (1.0 + VISIBLE) * given.holdout:
         return []
     fitted = f"{given.fit:.4g} to {refitted.fit:.4g}"
     return [

@@ -15,9 +15,9 @@ from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
 from hystgen.emission import files
 from hystgen.front.dead_zone.model import DeadZone
-from hystgen.identification import PARSIMONY
+from hystgen.identification import MODEL_PARSIMONY
 from hystgen.identification.fit import HELD_OUT, Fit
-from hystgen.identification.quality import LEFT, cells
+from hystgen.identification.quality import WORD_COLUMNS, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, read_records, several
@@ -170,7 +170,7 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> l
 def _table(fit: Fit) -> list[Text | Table | Listing]:
     row = held_out_row(fit)
     marked = next((k for k, each in enumerate(fit.rows) if each is row), len(fit.rows) - 1)
-    blocks: list[Text | Table | Listing] = [Table(cells(fit.rows, fit.unit), LEFT, marked)]
+    blocks: list[Text | Table | Listing] = [Table(cells(fit.rows, fit.unit), WORD_COLUMNS, marked)]
     candidates = [each for each in fit.rows if each.part == "candidate"]
     if candidates and row is not None:
         best = min(each.rms for each in candidates)
@@ -178,7 +178,7 @@ def _table(fit: Fit) -> list[Text | Table | Listing]:
         blocks.append(
             Text(
                 f"{chosen.model} was chosen: of the candidates, the simplest first, it is the first whose held-out "
-                f"error is within {100 * (PARSIMONY - 1):.3g} % of the least, {best:.4g}"
+                f"error is within {100 * (MODEL_PARSIMONY - 1):.3g} % of the least, {best:.4g}"
                 f"{f' {fit.unit}' if fit.unit else ''}."
             )
         )

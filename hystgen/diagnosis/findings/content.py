@@ -167,7 +167,7 @@ def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
 # The remaining error: which variables it goes with -----------------------------------------------------------
 
 
-PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
+DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
 """Thresholds of the plays that stand for the memory, as shares of the drive range."""
 
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
@@ -304,7 +304,7 @@ def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, flo
         if not len(at):
             continue
         v = (item.run.v - low) / max(widest, 1e-300)
-        plays = operators.plays(v, PLAYS, np.full(len(PLAYS), v[0])) - v
+        plays = operators.plays(v, DESCRIBED_PLAYS, np.full(len(DESCRIBED_PLAYS), v[0])) - v
         powers = [v, v**2, v**3]
         rates = [v - _averaged(v, np.exp(-1.0 / n)) for n in MEMORIES]
         tables.append(np.stack([*powers, *plays, *(plays * v), *rates])[:, at])
@@ -315,7 +315,7 @@ def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, flo
     if len(e) < acceptance.DESCRIBED_SAMPLES:
         return 0.0, 0.0
     x = (x - x.mean(axis=1, keepdims=True)) / np.maximum(x.std(axis=1, keepdims=True), 1e-12)
-    free, with_rates = _regressed(x[: 3 + 2 * len(PLAYS)], e), _regressed(x, e)
+    free, with_rates = _regressed(x[: 3 + 2 * len(DESCRIBED_PLAYS)], e), _regressed(x, e)
     return free, max(free, with_rates)
 
 
@@ -388,24 +388,24 @@ def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 # Where model and measurement disagree, and what the drive does there -----------------------------------------
 
 
-WINDOWS = 24
+STRETCH_WINDOWS = 24
 """Windows that each record is cut into; neighbours of one kind become one stretch."""
 
-LISTED = 12
+LISTED_STRETCHES = 12
 """Most stretches that are listed: a reader looks at no more."""
 
 
 def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple[Stretch, ...]:
     """The worst stretches of all records, the largest rms first."""
     found = [each for item, error in zip(items, errors, strict=True) for each in _stretches(item, error, noise)]
-    return tuple(sorted(found, key=lambda each: -each.rms)[:LISTED])
+    return tuple(sorted(found, key=lambda each: -each.rms)[:LISTED_STRETCHES])
 
 
 def _stretches(item: Item, error: Array, noise: float) -> list[Stretch]:
     """The windows of a record with more than noise, those next to each other joined where their kinds agree."""
     kind_of = _Kinds(item)
     merged: list[tuple[int, int, float, str]] = []
-    edges = np.linspace(0, len(error), WINDOWS + 1).astype(int)
+    edges = np.linspace(0, len(error), STRETCH_WINDOWS + 1).astype(int)
     for a, b in itertools.pairwise(edges.tolist()):
         part = error[a:b]
         known = np.isfinite(part)

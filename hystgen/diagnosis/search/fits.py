@@ -20,7 +20,7 @@ from hystgen.effects.base import Effect
 from hystgen.identification import joint, pi, reduction, stage_content
 from hystgen.identification.joint import DIFFERENCE, Shaped
 from hystgen.identification.pi import root_mean_square
-from hystgen.identification.quality import correlation_time
+from hystgen.identification.quality import SEED, TAILS, correlation_time
 from hystgen.identification.reduction import Reduced
 from hystgen.plays import operators
 
@@ -210,10 +210,6 @@ def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fit
 
 
 DRAWS = 400
-
-TAILS = (0.025, 0.975)
-
-SEED = 1
 
 HALVINGS = 20
 """Bisections on the way to an inadmissible shape: down to a millionth of an interval's width."""

@@ -1,6 +1,4 @@
-"""Extensions of a hypothesis by one effect: every shape of the catalogue, ranked on thinned records, the best fitted
-jointly.
-"""
+"""Extensions of a hypothesis by one effect: all shapes of the catalogue ranked quickly, the best fitted jointly."""
 
 from __future__ import annotations
 
@@ -30,7 +28,7 @@ Array = NDArray[np.float64]
 # Every shape of every effect of the catalogue, and fronts ----------------------------------------------------
 
 
-PLACES = 201
+SLOPE_PLACES = 201
 """Drives at which the slope of a front is judged."""
 
 
@@ -134,22 +132,23 @@ def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple
 
     Both names where one end alone is a little flatter: a soft limit there and a bent actuator give the same front.
     """
-    v = np.linspace(*drive, PLACES)
+    v = np.linspace(*drive, SLOPE_PLACES)
     w = v
     for stage in front.stages(shape):
         w = stage.forward(w)
     slopes = np.diff(w) / np.diff(v)
     middle, near = float(np.median(slopes)), acceptance.LIMITER_NEAR * float(np.ptp(slopes))
-    flatter, other = sorted(float(end.mean()) for end in (slopes[: PLACES // 16], slopes[-PLACES // 16 :]))
+    flatter, other = sorted(float(end.mean()) for end in (slopes[: SLOPE_PLACES // 16], slopes[-SLOPE_PLACES // 16 :]))
     straight = float(np.mean(np.abs(slopes - middle) <= near)) >= acceptance.LIMITER_STRAIGHT
     if straight and other <= middle + near and flatter < middle - near:
         sure = flatter < acceptance.LIMITER_SLOPE * middle or other < middle - near
         return ("saturation",) if sure else ("saturation", "asymmetry")
     bent = w - np.polyval(np.polyfit(v, w, 1), v)
     odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
-    ends = 0.5 * (slopes[: PLACES // 8].mean() + slopes[-PLACES // 8 :].mean())
+    ends = 0.5 * (slopes[: SLOPE_PLACES // 8].mean() + slopes[-SLOPE_PLACES // 8 :].mean())
     odd_wins = np.sum(odd**2) > acceptance.ODD_FRONT * np.sum(even**2)
-    return ("saturation",) if odd_wins and ends < slopes[PLACES // 3 : -PLACES // 3].mean() else ("asymmetry",)
+    flat_ends = ends < slopes[SLOPE_PLACES // 3 : -SLOPE_PLACES // 3].mean()
+    return ("saturation",) if odd_wins and flat_ends else ("asymmetry",)
 
 
 # Their screening beside a hypothesis -------------------------------------------------------------------------
@@ -158,7 +157,7 @@ def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple
 COARSE = 1e-3
 """A search of the screening ends with a step that lowers the error by a smaller share: ranks differ by per cents."""
 
-LARGE = 5_000
+WORTH_PROCESSES = 5_000
 """Samples to fit from which the options are tried in several processes; fewer are not worth starting them."""
 
 
@@ -267,7 +266,7 @@ def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
 
 def _jobs(to_fit: Sequence[Item]) -> int:
     """Number of processes; the compiled functions of effects are loaded before they fork."""
-    if sum(len(item.run.t) for item in to_fit) < LARGE:
+    if sum(len(item.run.t) for item in to_fit) < WORTH_PROCESSES:
         return 1
     jobs = parallel.cores()
     if jobs > 1:
