@@ -71,7 +71,7 @@ def in_short_form(item: pytest.Item) -> bool:
     """Whether a test runs without HYSTGEN_WHOLE: of a slow one a case in `one_in`, and none without that number.
 
     Which ones, the places of its parameters in their lists decide by their sum: where there are several lists, each
-    value of the one comes up with one in so many of another.
+    value of the one comes up with every n-th value of another.
     """
     slow = item.get_closest_marker("slow")
     if slow is None:

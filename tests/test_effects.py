@@ -98,7 +98,7 @@ def uneven(n: int = 1500, seed: int = 1) -> tuple[Array, Array]:
 
 
 def rounding(steps: int, size: float) -> float:
-    """Bound on what rounding does to a linear filter that remembers so many steps, of numbers up to `size`.
+    """Bound on the rounding of a linear filter that remembers a number of steps, of numbers up to `size`.
 
     A step rounds its states and the output 12 times at most, each time by half the spacing of numbers at `size`, and a
     stable filter does not enlarge an error that it has (Higham, Accuracy and Stability of Numerical Algorithms, 2002,

@@ -64,7 +64,7 @@ def white(number: int) -> Array:
 
 @pytest.mark.parametrize("name", drives())
 def test_plays_at_the_needed_samples_are_those_of_all_samples(name: str) -> None:
-    """A turn that is passed over moves the drive that plays see by so much, and none of them by more (their map is
+    """A turn that is passed over moves the drive that plays see by this amount, and none of them by more (their map is
     Lipschitz)."""
     v = drives()[name]
     at = needed(v, white(len(v)))

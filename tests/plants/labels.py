@@ -48,8 +48,8 @@ def write(case: Case, folder: Path, with_rivals: bool = True) -> Path:
 
 
 def parameters(case: Case) -> str:
-    """The believed model in the package's parameter format."""
-    stand, model = case.session.bench, case.believed
+    """The nominal model in the package's parameter format."""
+    stand, model = case.session.bench, case.nominal
     return "\n".join(
         [
             "hystgen: 1",
