@@ -89,7 +89,7 @@ def identify(
     changes nothing here. `name`: C identifier of the model. `units`: `input` and `output`, by default those of the
     records. `skip`: samples at the start of every record that are not compared, though their drive counts.
     `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and nothing
-    is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `weights.fit`; 0 leaves p_0 as it
+    is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as it
     comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin

@@ -33,7 +33,7 @@ PLAYS = 24
 
 @dataclass(frozen=True)
 class Data:
-    """A course with a measured output (seen samples); `clock` is the time the records tell, at every sample."""
+    """A course with a measured output (seen samples); `clock` is the time that the records give, at every sample."""
 
     course: refit.Track
     clock: Array

@@ -190,7 +190,7 @@ def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> 
 def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, pi.Weights]:
     """A hypothesis with p_0 raised to a share `floor` of the sum of weights if the records allow it, and its weights.
 
-    As in `identify` (`weights.fit`); all other numbers stay.
+    As in `identify` (`pi.fit_weights`); all other numbers stay.
     """
     p, here = fitted.weights, fitted.actuator
     kept = pi.Weights(p, fitted.rms)
