@@ -168,7 +168,7 @@ class TestSeveralProcesses:
         return case
 
     def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(screening, "LARGE", 0)
+        monkeypatch.setattr(screening, "WORTH_PROCESSES", 0)
         found = []
         for cores in (1, 3):
             monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
@@ -183,7 +183,7 @@ class TestSeveralProcesses:
             "from hystgen.diagnosis.search import screening; "
             "from hystgen.basics.progress import Progress; tick = Progress.tick; "
             "Progress.tick = lambda bar, n: (print('fitted', flush=True), tick(bar, n)); "
-            "screening.LARGE = 0; parallel.cores = lambda: 2; "
+            "screening.WORTH_PROCESSES = 0; parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
         )
         with subprocess.Popen(

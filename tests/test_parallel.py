@@ -90,7 +90,7 @@ class TestEach:
                 os.kill(process, 0)
 
 
-class TestCrew:
+class TestPool:
     @pytest.mark.parametrize("jobs", [1, 2, 3])
     def test_what_follows_from_a_result_is_done_in_the_order_of_a_plain_loop(self, jobs: int) -> None:
         def work(k: int) -> int:
@@ -186,7 +186,7 @@ class TestThreads:
             parallel.in_threads(lambda k: 1 // k, [1, 0, 2])
 
 
-    def test_none_beside_a_crew_at_work(self) -> None:
+    def test_none_beside_a_pool_at_work(self) -> None:
         def work(seconds: float) -> int:
             time.sleep(seconds)
             threads: set[int] = set()
