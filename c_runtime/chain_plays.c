@@ -23,13 +23,13 @@ static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystg
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_forward_started(hystgen_forward_t *self)
+static hystgen_real_t hystgen_forward_started(const hystgen_forward_t *self)
 {
     return hystgen_loop_output(&hystgen_model_tables, self->play);
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_inverse_started(hystgen_inverse_t *self)
+static hystgen_real_t hystgen_inverse_started(const hystgen_inverse_t *self)
 {
     return hystgen_loop_output(&hystgen_model_tables, self->play);
 }

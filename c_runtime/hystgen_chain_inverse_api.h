@@ -2,7 +2,8 @@
 #ifndef HYSTGEN_CHAIN_INVERSE_API_H
 #define HYSTGEN_CHAIN_INVERSE_API_H
 
-/* The next reference of the preview, without a drive: before the first step, HYSTGEN_PREVIEW times. */
+/* The next reference of the preview, without a drive: before the first step, HYSTGEN_PREVIEW times.
+ */
 void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u);
 /* Everything comes to rest at drive v; the next step finds it moving from there. */
 void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v);
@@ -17,7 +18,8 @@ hystgen_real_t hystgen_inverse_travel(const hystgen_inverse_t *self);
 void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_real_t travel);
 /* The displacement that the model expects of the drive that was applied last. */
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self);
-/* Trim the offset by this share, 0 to 1, of what a sensor measures beyond the expected displacement. */
+/* Trim the offset by this share, 0 to 1, of what a sensor measures beyond the expected
+ * displacement. */
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
                              hystgen_real_t share);
 

@@ -20,7 +20,8 @@ typedef struct {
     uint_least16_t n;
 } hystgen_creep_table_t;
 
-/* Lag in front of the plays: x += rate (v - x), and what arrives lies theta of that step behind x. */
+/* Lag in front of the plays: x += rate (v - x), and what arrives lies theta of that step behind x.
+ */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t theta;

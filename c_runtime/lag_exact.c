@@ -24,8 +24,7 @@ static hystgen_real_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *
                                                hystgen_lag_exact_t *self, hystgen_real_t v)
 {
     const hystgen_real_t reached = self->reached;
-    self->reached =
-        reached + ((t->early * self->before + t->late * v) - t->rate * reached);
+    self->reached = reached + ((t->early * self->before + t->late * v) - t->rate * reached);
     self->before = v;
     return self->reached;
 }

@@ -1,6 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* The line of references, of which the newest is the argument of step and lies ahead of the motion. */
+/* The line of references, of which the newest is the argument of step and lies ahead of the motion.
+ */
 
 /* The next sample; the first one stands for all before it too. Stores go through volatile where a
    compiler would otherwise call memmove, which a freestanding target need not have. */

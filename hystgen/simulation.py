@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
 from hystgen.compensator.session import Session
 from hystgen.model import Model
@@ -40,6 +41,8 @@ def simulate_records(
         answers = model.chain.simulate(runs, history)
         ends = model.cascade.input_range
         return [(y, _outside(r.name, ends, r.v, False)) for r, y in zip(records, answers, strict=True)]
+    if model.effects:
+        return [_emulated(model, records, operator, arithmetic)]
     session = model.session(operator, arithmetic, engine, clamp=operator == "inverse")
     if history:
         session.visit(history)
@@ -49,6 +52,18 @@ def simulate_records(
         samples, status = session.run(signal)
         found.append((samples, _remarks(record.name, session, operator, signal, status)))
     return found
+
+
+def _emulated(
+    model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
+) -> tuple[NDArray[Any], list[str]]:
+    """Answers of the bit reference of a model with effects for the one record that there is, and no remarks."""
+    if len(records) > 1:
+        raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
+    (record,) = records
+    signal = record.columns()["v" if operator == "forward" else "u"]
+    run = model.simulate if operator == "forward" else model.inverse().simulate
+    return run(signal, arithmetic, t=record.t, extra=record.extra), []
 
 
 def _compensated(

@@ -48,3 +48,46 @@ FILES = {
     "linear": head("linear", 0, 1) + "\n  pi: {thresholds: [0], weights: [2]}\n",
     "density": head("density", 0, 10) + '\n  pi: {density: {formula: "0.8*exp(-0.3*r)", p0: 0.7, r_max: 4, n: 40}}\n',
 }
+
+TANH = "  memoryless: {kind: tanh, ascending: {a0: 6, a1: 0.4, a2: 0.1, a3: 0.2}}\n"
+BRANCHES = (
+    "  memoryless:\n    kind: tanh\n    ascending: {a0: 6, a1: 0.4, a2: 0.1, a3: 0.2}\n"
+    "    descending: {a0: 6, a1: 0.4, a2: 0.1, a3: 0.5}\n"
+)
+
+
+def chain(name: str, *effects: str, front: str = "") -> str:
+    """A model with effects, a sample a millisecond."""
+    return (
+        head(name) + PLAYS + front + "  output_offset: 0.5\n  effects:\n"
+        + "".join(f"    - {{{effect}}}\n" for effect in effects) + "sample_time: 1.0e-3\n"
+    )  # fmt: skip
+
+
+CREEP = "name: creep, time_constants: [0.01, 0.1, 300], weights: [0.02, 0.03, 0.05]"
+CHAINS = {
+    "creeping": chain("creeping", CREEP),
+    "logarithmic": chain("logarithmic", "name: creep, shape: logarithmic, per_decade: 0.02, t0: 0.1, t_min: 1.0e-3, "
+                         "t_max: 1.0e4", front=TANH),
+    "lagging": chain("lagging", "name: lag, time_constant: 0.01", "name: saturation, level: 12", CREEP, front=BRANCHES),
+    "quick": chain("quick", "name: lag, time_constant: 2.0e-4", "name: slew_limit, rate: 500, falling_rate: 300",
+                   "name: saturation, shape: stops, lower: -5, upper: 4, give: 0.2"),
+    "warm": chain("warm", "name: thermal, gain_per_degree: -0.002, offset_per_degree: 0.01",
+                  "name: saturation, shape: hard, level: 9"),
+    "aged": chain("aged", "name: ageing, loss: 0.02, travel: 50", front=BRANCHES),
+    "worn": chain("worn", "name: ageing, shape: exponentials, losses: [0.02, 0.03], travels: [10, 200]", CREEP),
+    "viscous": chain("viscous", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
+                     "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]"),
+    "dilated": chain("dilated", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",
+                     "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
+    "bumpy": chain("bumpy", "name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5"),
+    "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
+    "late": chain("late", "name: delay, time: 2.6e-3", "name: resonance, frequency: 30, damping: 0.05", CREEP),
+    "everything": chain("everything", CREEP, "name: lag, time_constant: 0.01", "name: delay, time: 2.0e-3",
+                        "name: resonance, frequency: 40, damping: 0.3", "name: saturation, level: 15",
+                        "name: slew_limit, rate: 3000", "name: ageing, loss: 0.01, travel: 100",
+                        "name: thermal, gain_per_degree: 0.001", front=BRANCHES),
+}  # fmt: skip
+"""Models with effects, every block and every kind of each; the last three can be emitted as an inverse alone."""
+
+INVERSE_ALONE = ("viscous_twin", "late", "everything")

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import units
-from modelfiles import FILES
+from modelfiles import CHAINS, FILES
 from ruamel.yaml import YAML
 
 import hystgen
@@ -50,6 +50,8 @@ MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("mixed", "forward", "float32", "corners", "single-header"),
     ("linear", "both", "float32", "corners", "self-contained"),
     ("linear", "both", "q15", "corners", "shared-runtime"),
+    ("everything", "inverse", "float32", "loop", "self-contained"),
+    ("viscous", "both", "float64", "loop", "shared-runtime"),
 )
 
 # cppcheck reads no system header; these are what <float.h> says on every target, and the core whose code has most to
@@ -79,7 +81,7 @@ class Finding:
 
 def emit(folder: Path, name: str, operator: str, arithmetic: str, engine: str, layout: str) -> list[Path]:
     """Emit a module into `folder` and return the C files to compile."""
-    model = Model(parse_parameters(FILES[name], f"{name}.yaml"))
+    model = Model(parse_parameters({**FILES, **CHAINS}[name], f"{name}.yaml"))
     hystgen.emit(model, folder, operator=operator, arithmetic=arithmetic, engine=engine, layout=layout)
     if layout == "single-header":
         (folder / f"{name}.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')

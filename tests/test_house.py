@@ -36,6 +36,7 @@ ROOMS = (
     "verification",
     "closed_loop",
     "identification",
+    "tracking",
     "fleet",
     "diagnosis",
     "planning",

@@ -8,10 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
+from modelfiles import CHAINS
 from mutants import MODELS
 
 from hystgen.emission import module, runtime
-from hystgen.emission.calls import emit_options
+from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 
@@ -40,33 +41,60 @@ UNITS = (
     ("plain", "q15", "corners"),
     ("above", "q31", "corners"),
     ("far_low", "q15", "loop"),
+    ("lagging", "float32", "loop"),
+    ("quick", "float64", "loop"),
+    ("warm", "float32", "loop"),
+    ("aged", "float32", "loop"),
+    ("viscous", "float32", "loop"),
+    ("dilated", "float64", "loop"),
+    ("bumpy", "float32", "loop"),
+    ("viscous_twin", "float32", "loop"),
+    ("late", "float32", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
 
 
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    return Model(parse_parameters(MODELS[name], f"{name}.yaml").model_copy(update={"name": "hystgen"}))
+    text = {**MODELS, **CHAINS}[name]
+    return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 
 def files(name: str, arithmetic: str, engine: str) -> set[str]:
     """The files that a unit is made of."""
     values = _values(name, arithmetic, engine)
-    states = map(values.variant.state, ("forward", "inverse"))
-    return {*values.variant.sources(), *values.family.kernel_files, *states}
+    return {*values.variant.sources(), *values.family.kernel_files, *_states(values), *_blocks(values)}
 
 
 def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
     one = model(name)
-    options = emit_options(one, operator="both", arithmetic=arithmetic, engine=engine, layout="self-contained")
-    return module.values_of(one.parameters, one.cascade, options)
+    return module.values_of(one.parameters, one.cascade, Options("both", arithmetic, engine, "self-contained"))
+
+
+def _states(values: SimpleNamespace) -> list[str]:
+    """The headers with the memory of an instance, or of the blocks that it is made of."""
+    if values.variant.chain:
+        return ["hystgen_chain_state.h"]
+    return [values.variant.state(op) for op in ("forward", "inverse")]
+
+
+def _blocks(values: SimpleNamespace) -> list[str]:
+    """The files of blocks, that of the preview where there is one."""
+    if not values.variant.chain:
+        return []
+    return [file for file in runtime.CHAIN_BLOCKS if file != "preview.c" or len(values.numbers.tap)]
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     values = _values(name, arithmetic, engine)
     operators = ("forward", "inverse")
-    headers = [*map(values.variant.state, operators), *(f"hystgen_{op}_api.h" for op in operators)]
+    apis = [f"hystgen_{op}_api.h" for op in operators]
+    headers = [*_states(values), *([] if values.variant.chain else apis)]
+    types = [] if not values.variant.chain else [
+        '#include "hystgen_chain_tables.h"', *values.glue.states.values(),
+        *(f'#include "{header}"' for header in (*apis, *(f"hystgen_chain_{op}_api.h" for op in operators))),
+    ]  # fmt: skip
     text = "\n".join(
         [
             '#include "hystgen_runtime.h"',
@@ -75,9 +103,11 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *values.status,
             *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in values.constants),
             *(f'#include "{header}"' for header in headers),
+            *types,
             *(f'#include "{file}"' for file in values.family.kernel_files),
             *values.arrays,
             *values.beside,
+            *(f'#include "{file}"' for file in _blocks(values)),
             values.functions,
             *(f'#include "{file}"' for file in values.variant.sources()),
         ]

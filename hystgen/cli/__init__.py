@@ -12,6 +12,7 @@ from hystgen.cli.identify import identify
 from hystgen.cli.schema import schema
 from hystgen.cli.show import show
 from hystgen.cli.simulate import simulate
+from hystgen.cli.track import track
 from hystgen.cli.verify import verify
 
 
@@ -24,5 +25,5 @@ def main() -> None:
     jit.announce = console.note
 
 
-for command in (emit, verify, simulate, identify, diagnose, show, schema):
+for command in (emit, verify, simulate, identify, diagnose, track, show, schema):
     main.add_command(command)

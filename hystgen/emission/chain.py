@@ -161,7 +161,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     t = compiled.tables
     before, after = drive_side(t, prefix), output_side(t, prefix)
     functions = [
-        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, len(t.gain) > 0)
+        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -236,7 +236,6 @@ def _functions(
     after: Sequence[Block],
     behind: Sequence[dict[str, str]],
     ahead: bool,
-    heated: bool,
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
     inverse = op == "inverse"
@@ -306,13 +305,13 @@ def _functions(
         [f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing]
         or ["(void)self;", "(void)v;"],
     )
-    if heated:
-        calls = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
-        yield _function(
-            "Gains and offsets of a temperature. Returns whether it had to be limited.",
-            f"static bool hystgen_{op}_heat({self_t}, hystgen_real_t temperature)",
-            ["bool limited = false;", *(f"limited = {call} || limited;" for call in calls), "return limited;"],
-        )
+    heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
+    yield _function(
+        "Gains and offsets of a temperature. Returns whether it had to be limited.",
+        f"static bool hystgen_{op}_heat({self_t}, hystgen_real_t temperature)",
+        ["bool limited = false;", *(f"limited = {heat} || limited;" for heat in heats), "return limited;"]
+        if heats else ["(void)self;", "(void)temperature;", "return false;"],
+    )  # fmt: skip
 
 
 def _verb(block: Block, verb: str) -> str:

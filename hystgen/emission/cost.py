@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
+from hystgen.compensator.chain import costs
 from hystgen.compensator.chain.tables import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import STRUCTS, Field
@@ -157,7 +158,11 @@ def estimate(
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
     memory, avr = (_memory(cascade, options, fixed, text, plays, layout, fields) for layout in (CORE_32, AVR))
-    code = engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine)
+    code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
+    if isinstance(numbers, ChainTables):
+        more = costs.code_bytes(numbers, options.arithmetic)
+        both = 2 if options.operator == "both" else 1
+        code = {core: size + both * more[core] for core, size in code.items()}
     return Cost(code, memory, avr if known else None, worst)
 
 

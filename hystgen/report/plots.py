@@ -17,6 +17,7 @@ from hystgen.report.drawing import PlotError, label
 if TYPE_CHECKING:
     from hystgen.identification import Fit
     from hystgen.records import Record
+    from hystgen.tracking import Tracking
 
 FORMATS = (".png", ".svg")
 
@@ -80,6 +81,26 @@ def _model_figure(model: Model) -> Any:
         )
     figure.suptitle(model.name)
     return figure
+
+
+def show_tracking(tracking: Tracking, path: str | os.PathLike[str]) -> None:
+    """The motion of each record and the tracking error of each compensator along time, as PNG or SVG.
+
+    Raises PlotError.
+    """
+    with drawing.styled():
+        figure = drawing.figure(9.0, 1.0 + 3.4 * len(tracking.records))
+        panels = figure.subplots(2 * len(tracking.records), 1, squeeze=False)[:, 0]
+        colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
+        for motion, error, each in zip(panels[::2], panels[1::2], tracking.records, strict=True):
+            motion.plot(each.t, each.reference, color=drawing.MEASURED, linewidth=1.0)
+            motion.set(title=each.name, ylabel=label("reference", tracking.unit))
+            for (which, values), colour in zip(each.errors.items(), colours, strict=True):
+                words = f"{which}: {each.rms(which):.3g} % rms"
+                error.plot(each.t, 100.0 * values / each.span, color=colour, linewidth=1.0, label=words)
+            error.set(xlabel="time, s", ylabel="tracking error, % of span")
+            drawing.legend_above(error, 3)
+        _save(figure, path)
 
 
 def show_fit(fit: Fit, records: list[Record], path: str | os.PathLike[str]) -> None:

@@ -1,4 +1,4 @@
-"""Command line: `python -m tests.plants generate | run | score`; each has `--help`."""
+"""Command line: `python -m tests.plants generate | run | score | track`; each has `--help`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _seeds(text: str) -> range:
 
 
 def main(words: list[str] | None = None) -> int:
-    from . import labels, score, session
+    from . import labels, score, session, track
     from .case import KINDS, LARGE, REPORT, SMALL
     from .run import run
 
@@ -45,7 +45,13 @@ def main(words: list[str] | None = None) -> int:
     judge.add_argument("labels", type=Path)
     judge.add_argument("results", type=Path)
     judge.add_argument("--json", type=Path, metavar="F")
+    follow = commands.add_parser("track", help="how well plants follow a reference behind compensators")
+    follow.add_argument("effects", nargs="*", metavar="EFFECT", help="default: all that need nothing from outside")
+    follow.add_argument("--seeds", type=_seeds, default=range(5), metavar="A:B")
+    follow.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(words)
+    if given.command == "track":
+        return track.main(given.effects, given.seeds, given.jobs)
     if given.command == "run":
         run(given.cases, given.results, given.jobs, given.timeout)
         return 0

@@ -184,13 +184,13 @@ class Diagnosis:
 
     def not_emitted(self) -> str:
         """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
-        from hystgen.basics.problems import UnsupportedEffectsError
+        from hystgen.basics.problems import EffectsError, NotInvertibleError
         from hystgen.emission.calls import emit_options
         from hystgen.model import Model
 
         try:
             emit_options(Model(self.parameters))
-        except UnsupportedEffectsError as error:
+        except (EffectsError, NotInvertibleError) as error:
             return str(error)
         return ""
 

@@ -1,0 +1,121 @@
+"""Measure what each effect adds to an emitted model: bytes of code, and instructions of a sample.
+
+    python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f]
+
+Code is that of a module at -O2, of zig and gcc the larger one; instructions are the mean of the inverse, strict -O2
+build of zig, over a slow sine. `any` is what any effect at all adds, a gain among it, which is the least of them; the
+others are more than that, or less. Plays that are moved or bent have a search in common, `dilated`, and more than that.
+`effect_sizes.csv`, which the banner of emitted files is made from, has the code on both cores that
+`hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import functools
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from engine_costs import SHIPPED, _program
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.compensator import engines
+from hystgen.compensator.chain.costs import PARTS
+from hystgen.emission import module
+from hystgen.emission.calls import emit_options
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
+from hystgen.verification import comparison, emulator, sources, targets
+
+MOVED = ("relaxing", "polynomial", "centre")
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+FLOATS = ("float32", "float64")
+PLAYS = 10
+
+EFFECTS = {
+    "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
+    "weights: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]",
+    "lag": "name: lag, time_constant: 0.01",
+    "lag_exact": "name: lag, time_constant: 2.0e-4",
+    "ageing": "name: ageing, loss: 0.02, travel: 50",
+    "gain": "name: thermal, gain_per_degree: 0.001",
+    "preview": "name: resonance, frequency: 30, damping: 0.05",
+    "slew": "name: slew_limit, rate: 1.0e+5",
+    "tanh": "name: saturation, level: 1000",
+    "dead_zone": "name: saturation, shape: stops, lower: -900, upper: 900, give: 0.1",
+    "relaxing": "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
+    "dilated": "name: rate_dependence, betas: [1.0e-4, 0, 0, 0, 0, 0, 0, 0, 0, 0]",
+    "polynomial": "name: noncongruent, coefficients: [[0.02, 0.01], [0.02], [0.02], [0.02], [0.02], [0.02], [0.02], "
+    "[0.02], [0.02], [0.02]]",
+    "centre": "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
+}
+"""A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
+assert {"any", *EFFECTS} == set(PARTS)
+
+
+@functools.cache
+def model(effect: str) -> Model:
+    """Ten plays with one effect, or none."""
+    text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
+    text += f"    thresholds: {[0.45 * k for k in range(PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * PLAYS}\n"
+    text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
+    return Model(parse_parameters(text, "bench.yaml"))
+
+
+def measured(folder: Path, effect: str, arithmetic: str, cores: list[str]) -> tuple[dict[str, int], dict[str, float]]:
+    """Bytes of code and mean instructions of a sample of the inverse on each core."""
+    one = model(effect)
+    options = emit_options(one, "inverse", arithmetic, "loop")
+    files = sources.write(folder, one, options)
+    constants = module.cost_of(one.parameters, one.cascade, options).memory.tables
+    numbers, real = one.tables(arithmetic, "loop"), ARITHMETICS[arithmetic].number
+    low, high = (float(end) for end in numbers.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    u = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(0.01 * np.arange(600))
+    record = comparison.expected_record(numbers, real, True, ("sine", np.zeros(len(u), np.uint8), u))
+    code, counts = {}, {}
+    for core in cores:
+        built = {name: _program(files, folder / f"{core}-{name}", core, name) for name in ("zig", "gcc")}
+        images = {name: emulator.Image.load(path) for name, path in built.items()}
+        code[core] = max(image.sections[".module"] for image in images.values()) - constants
+        machine = emulator.Core(targets.find(core), images["zig"])
+        outcome = comparison.compare(functools.partial(machine.run, "bench", "inverse"), [record])
+        assert not outcome.different, (effect, arithmetic, core, outcome)
+        counts[core] = float(np.mean(machine.counts))
+    return code, counts
+
+
+def main() -> None:
+    """Measure everything and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, help="folder of both tables, default where they are shipped")
+    parser.add_argument("--cores", default=",".join(engines.CORES))
+    given = parser.parse_args()
+    cores = given.cores.split(",")
+    sizes, costs = [], []
+    with tempfile.TemporaryDirectory(prefix="hystgen-effects-") as place:
+        for arithmetic in FLOATS:
+            base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
+            least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
+            moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
+            for effect in ("any", *EFFECTS):
+                folder = Path(place) / f"{effect}-{arithmetic}"
+                code, counts = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores)
+                before = base if effect == "any" else moved if effect in MOVED else least
+                more = [(core, code[core] - before[0][core], counts[core] - before[1][core]) for core in cores]
+                sizes.append((effect, arithmetic, *(size for _, size, _ in more)))
+                costs += [(effect, arithmetic, core, size, round(count)) for core, size, count in more]
+                print(*sizes[-1], *(round(count) for *_, count in more), flush=True)
+    own, docs = (given.output or SHIPPED), (given.output or DOCS)
+    if set(cores) >= set(engines.CORES):
+        with (own / "effect_sizes.csv").open("w", encoding="ascii", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([("part", "arithmetic", *cores), *sizes])
+    with (docs / "effects.csv").open("w", encoding="ascii", newline="") as file:
+        heads = ("part", "arithmetic", "core", "bytes of code", "instructions of a sample")
+        csv.writer(file, lineterminator="\n").writerows([heads, *costs])
+
+
+if __name__ == "__main__":
+    main()

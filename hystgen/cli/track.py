@@ -1,0 +1,53 @@
+"""`hystgen track`: how well a compensator would track on the recorded actuator."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import click
+
+from hystgen.basics import console
+from hystgen.cli.common import (
+    effects_option,
+    guarded,
+    history_values,
+    keep_inputs,
+    load_model,
+    params_argument,
+    reading_options,
+    record_options,
+)
+
+
+@click.command()
+@params_argument
+@click.argument("data", nargs=-1, required=True, type=click.Path())
+@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
+@effects_option
+@record_options
+def track(
+    params: str, data: tuple[str, ...], plot: str | None, effects: tuple[str, ...], history: str | None, rest: float,
+    **reading: Any,
+) -> None:
+    """Print what tracking would leave on the recorded actuator: with a straight line, with plays alone, with the model.
+
+    Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
+    """
+    from hystgen import records, tracking
+    from hystgen.report import plots
+
+    model = load_model(params, effects)
+    visited = history_values(history)
+    if plot:
+        keep_inputs([plot], [params, *data])
+        guarded(params, partial(plots.check_path, plot))
+    read = guarded(params, partial(records.read_records, data, need=("v", "y"), **reading_options(**reading)))
+    for record in read:
+        for note in record.notes:
+            console.note(f"warning: {record.name}: {note}")
+    found = guarded(params, lambda: tracking.track(model, read, visited or (), rest))
+    console.say(found.table())
+    if plot:
+        guarded(params, lambda: plots.show_tracking(found, plot))
+        console.say(plot)

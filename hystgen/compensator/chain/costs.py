@@ -1,0 +1,49 @@
+"""How much code effects add to a model: a table measured on emulated cores (`benchmarks/effect_costs.py`)."""
+
+from __future__ import annotations
+
+import csv
+import functools
+from collections import Counter
+from pathlib import Path
+
+from hystgen.compensator import engines
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.tables import ChainTables
+from hystgen.plays import slots
+
+PARTS = (
+    "any", "creep", "lag", "lag_exact", "ageing", "gain", "preview", "slew", "tanh", "dead_zone", "relaxing", "dilated",
+    "polynomial", "centre",
+)  # fmt: skip
+"""What is counted: `any` once for a model with effects, the others for each kind of block that there is; `dilated`
+for plays that are moved or bent in any way."""
+
+
+def parts(t: ChainTables) -> list[str]:
+    """The parts that a model has; two blocks of one kind share their code."""
+    exact = [bool(each) for each in t.lag.exact]
+    kinds = [int(kind) for kind in t.behind.stage_kind]
+    found = Counter({
+        "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
+        "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew,
+        "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
+        "relaxing": t.moving.moves == moving.RELAXING, "dilated": t.moving.used,
+        "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
+    })  # fmt: skip
+    return ["any", *(part for part in PARTS[1:] if found[part])]
+
+
+def code_bytes(t: ChainTables, arithmetic: str) -> dict[str, int]:
+    """Bytes of code at -O2 that effects add on each of `engines.CORES`, one operator; not less than those of parts."""
+    found = [_sizes()[part, arithmetic] for part in parts(t)]
+    return {core: sum(each[core] for each in found) for core in engines.CORES}
+
+
+@functools.cache
+def _sizes() -> dict[tuple[str, str], dict[str, int]]:
+    with (Path(engines.__file__).parent / "effect_sizes.csv").open(encoding="ascii", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {
+        (row["part"], row["arithmetic"]): {core: int(row[core]) for core in engines.CORES} for row in rows
+    }

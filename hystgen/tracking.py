@@ -1,0 +1,104 @@
+"""How well a compensator would track on the actuator that was recorded: straight line, plays alone, whole model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.identification import identify
+from hystgen.model import Model
+
+if TYPE_CHECKING:
+    from hystgen.records import Record
+
+Array = NDArray[np.float64]
+
+MOST_UNKNOWN = 0.8
+"""Share of a record behind which the drive may have reached its ends for what follows to be looked at alone; a fifth of
+a record is the least that says anything of it."""
+
+LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
+"""What the reference is turned into a drive with."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """The motion of one record, tracked: error (N,) of each compensator in output units, over `span` of the motion.
+
+    `known`: the first sample behind both ends of the drive, from where on it no longer matters what the stage did
+    before the record. Errors are about their mean from there on: the zero of a displacement is free.
+    """
+
+    name: str
+    t: Array
+    reference: Array
+    errors: dict[str, Array]
+    span: float
+    known: int
+
+    def rms(self, which: str) -> float:
+        """Rms error, % of the span."""
+        return 100.0 * float(np.sqrt(np.mean(self.errors[which][self.known :] ** 2))) / self.span
+
+    def most(self, which: str) -> float:
+        """Largest error, % of the span."""
+        return 100.0 * float(np.max(np.abs(self.errors[which][self.known :]))) / self.span
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """What tracking would leave on the recorded actuator, record by record."""
+
+    unit: str
+    records: tuple[Tracked, ...]
+
+    def table(self) -> str:
+        """The table that the command prints."""
+        width = max(len(each.name) for each in self.records)
+        lines = [f"{'record':{width}}  compensator     rms %    max %   of the motion's span, about the mean"]
+        for each in self.records:
+            for which in each.errors:
+                name = each.name if which == LINE else ""
+                lines.append(f"{name:{width}}  {which:14} {each.rms(which):6.3f}  {each.most(which):7.3f}")
+        return "\n".join(lines)
+
+
+def track(model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0) -> Tracking:
+    """What each compensator would leave, were the records' motions the references.
+
+    The recorded actuator answers a drive as the model does, and beyond that by what it did in the record that the model
+    does not explain: `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's own motion of the
+    record. `straight line`: the drive as a linear function of the reference, least squares; `plays alone`: the inverse
+    of a Prandtl-Ishlinskii model identified from the same records; `whole model`: the inverse of `model`. `history` and
+    `rest` come before every record. Raises NotInvertibleError, EffectsError, ValueError for records without y.
+    """
+    if any(record.y is None for record in records):
+        raise ValueError("tracking needs the measured motion: a column y in every record")
+    model.inverse()
+    plain = Model(identify(list(records), history=list(history) or None, rest=rest).parameters)
+    runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
+    moved = [model.chain.simulate([run], history)[0] for run in runs]
+    ends = model.cascade.input_range
+    slope, start = np.polyfit(np.concatenate(moved), np.concatenate([record.v for record in records]), 1)
+    found = []
+    for record, run, reference in zip(records, runs, moved, strict=True):
+        assert record.y is not None
+        drives = {
+            LINE: np.clip(start + slope * reference, *ends),
+            PLAYS: plain.inverse().simulate(reference, clamp=True),
+            WHOLE: model.inverse().simulate(reference, t=run.t, extra=run.extra, clamp=True),
+        }
+        beside = record.y - reference
+        moves = {which: model.chain.simulate([model.run(v, run.t, run.extra)])[0] for which, v in drives.items()}
+        known = max(int(np.argmax(record.v)), int(np.argmin(record.v)))
+        known = known if known < MOST_UNKNOWN * len(record.v) else 0
+        errors = {}
+        for which, y in moves.items():
+            error = y - reference + beside
+            errors[which] = error - np.mean(error[known:])
+        found.append(Tracked(record.name, run.t, reference, errors, float(np.ptp(reference)), known))
+    return Tracking(model.parameters.units.output, tuple(found))

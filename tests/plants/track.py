@@ -1,0 +1,203 @@
+"""Closed simulation: the plants of the cases behind compensators that the package makes from their records.
+
+Records, `identify`, `diagnose`, and the inverse of both models, as the emitted C computes it (`simulate --arithmetic
+float32`, whose bits `verify` holds the C to), turn a reference that is in no record into a drive; the plant answers
+that drive on its own fine grid. Everything of the package is called through its command line.
+
+What is printed is the rms error about its mean, in per cent of the reference's range, of a straight line, of the plays
+that `identify` finds, and of the model that `diagnose` writes, with the ratio of the last two.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import labels
+from .case import REPORT, SMALL, Case, catalogue, make
+from .run import COMMAND
+from .session import FINER, Planned
+
+Array = NDArray[np.float64]
+
+EFFECTS = (
+    "creep", "lag", "rate_dependence", "asymmetry", "saturation", "resonance", "delay", "noncongruent", "slew_limit",
+)  # fmt: skip
+"""Effects that nothing from outside goes with."""
+
+FAST = ("lag", "rate_dependence", "resonance", "delay", "slew_limit")
+"""Those that are looked at at the rate of the bench's fast records."""
+
+LENGTH, SWEEP = 3000, 400
+"""Samples of a reference, and of one sweep over its range, two of which come first and are not counted."""
+
+SLOWEST = 60
+"""Samples of the fastest half wave of a reference."""
+
+INSIDE = 0.1
+"""Share of the recorded output that a reference stays away from its ends."""
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What one plant left, rms in per cent of the reference's range; `named`: whether its effect was."""
+
+    effect: str
+    seed: int
+    named: bool
+    line: float
+    plays: float
+    whole: float
+    holdout: float
+    words: str
+
+    @property
+    def ratio(self) -> float:
+        return self.whole / self.plays
+
+
+def reference(rng: np.random.Generator, low: float, high: float) -> Array:
+    """Two sweeps over the range, then smooth noise, a raster and steps with rounded edges."""
+    up = np.linspace(low, high, SWEEP)
+    parts = [up, up[::-1]]
+    rest = LENGTH - 2 * SWEEP
+    knots = np.arange(0, rest // 3 + SLOWEST, SLOWEST)
+    heights = rng.uniform(0.0, 1.0, len(knots))
+    at = np.arange(rest // 3)
+    place = at / SLOWEST
+    k = place.astype(int)
+    soft = 0.5 - 0.5 * np.cos(np.pi * (place - k))
+    smooth = heights[k] + (heights[k + 1] - heights[k]) * soft
+    raster = np.abs((at / (2.5 * SLOWEST)) % 2.0 - 1.0)
+    steps = np.repeat(rng.uniform(0.1, 0.9, rest // 240 + 2), 80)[: rest - 2 * (rest // 3)]
+    edge = np.hanning(31)
+    longer = np.concatenate([np.full(15, steps[0]), steps, np.full(15, steps[-1])])
+    steps = np.convolve(longer, edge / edge.sum(), "valid")
+    joined = np.zeros(1)
+    for part in (smooth, raster, steps):  # straight ways from one to the next
+        joined = np.concatenate([joined, np.linspace(joined[-1], part[0], SLOWEST), part])
+    return np.concatenate([*parts, low + (high - low) * joined[:rest]])
+
+
+def answer(case: Case, drive: Array, rate: float) -> Array:
+    """What the plant answers to a drive, a sample each, from rest at its first value."""
+    n = len(drive)
+    before = np.geomspace(1e-4, 1.0, 50) * 5.0 * max(case.session.bench.long, n / rate)
+    fine = before[-1] + ((np.arange(FINER * n) + 0.5) / FINER + 0.5) / rate
+    times = before[-1] + (np.arange(n) + 1.0) / rate
+    t = np.concatenate([before, fine])
+    v = np.interp(t, times, drive)
+    planned = Planned("reference", True, rate, len(before), n)
+    room = np.full(len(t), float(case.session.temperature[0]))
+    stage = replace(case.session, t=t, v=v, records=(planned,), history=None, rest=None, temperature=room)
+    return stage.sampled(case.plant.respond(stage), planned)
+
+
+def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
+    """One plant with one effect; `seed` counts within the block of reports."""
+    number = sorted(catalogue()).index(effect) + len(catalogue()) * seed
+    case = make("single", REPORT + _aligned(number), samples)
+    assert case.plant.effects[0].name == effect
+    rate = case.session.bench.rates[1 if effect in FAST else 0]
+    with tempfile.TemporaryDirectory() as place:
+        home = labels.write(case, Path(place), with_rivals=False)
+        told = json.loads((home / "session.json").read_text())
+        words = [*told["fit"], *(word for name in told["holdout"] for word in ("--holdout", name))]
+        if told["history"]:
+            words.append("--history=" + ",".join(f"{x:g}" for x in told["history"]))
+        if told["rest"]:
+            words.append(f"--rest={told['rest']:g}")
+        _call(home, "identify", *words, "-o", "plain.yaml", "--units", "V,um")
+        _call(home, "diagnose", "plain.yaml", *words, "-o", "out")
+        found = json.loads((home / "out" / "diagnosis.json").read_text())
+        shutil.copy(home / "out" / "params.yaml", home / "whole.yaml")
+        outputs = np.concatenate([columns["y"] for columns in case.measured])
+        drives = np.concatenate([columns["v"] for columns in case.measured])
+        low, high = float(outputs.min()), float(outputs.max())
+        low, high = low + INSIDE * (high - low), high - INSIDE * (high - low)
+        u = reference(np.random.default_rng(seed), low, high)
+        rows = np.column_stack([np.arange(len(u)) / rate, u])
+        np.savetxt(home / "reference.csv", rows, delimiter=",", header="t,u", comments="", fmt="%.12g")
+        slope, start = np.polyfit(outputs, drives, 1)
+        stand = case.session.bench
+        tried = {"line": np.clip(start + slope * u, stand.low, stand.high)}
+        for name in ("plain", "whole"):
+            with (home / f"{name}.yaml").open("a") as file:
+                file.write(f"sample_time: {1.0 / rate!r}\n")
+            _call(home, "simulate", f"{name}.yaml", "reference.csv", "--operator", "inverse", "--arithmetic", "float32",
+                  "-o", f"{name}.csv")  # fmt: skip
+            tried[name] = np.genfromtxt(home / f"{name}.csv", delimiter=",", names=True, deletechars="")["v"]
+    left = {}
+    for name, drive in tried.items():
+        error = (answer(case, drive, rate) - u)[2 * SWEEP :]
+        left[name] = 100.0 * float(np.std(error)) / (high - low)
+    named = [entry["name"] for entry in found["effects"]]
+    alike = {name for pair in found["not_separable"] if set(pair) & set(named) for name in pair}
+    holdout = 100.0 * found["gap"]["after"]["holdout"] / (high - low)
+    return Tracked(effect, seed, effect in {*named, *alike}, left["line"], left["plain"], left["whole"], holdout,
+                   ", ".join(named) or found["verdict"])  # fmt: skip
+
+
+def _aligned(number: int) -> int:
+    """A seed of the block of reports whose effect is the one counted: cases take effects in turn from 0 on."""
+    return number - REPORT % len(catalogue())
+
+
+def _call(folder: Path, *words: Any) -> None:
+    done = subprocess.run([*COMMAND, *words], cwd=folder, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(words)}: {done.stderr[-1500:]}")
+
+
+def _tried(task: tuple[str, int]) -> Tracked | tuple[str, int, str]:
+    try:
+        return track(*task)
+    except RuntimeError as error:
+        return (*task, str(error))
+
+
+def table(rows: Sequence[Tracked]) -> Iterator[str]:
+    """Plant by plant, then the medians of those named."""
+    yield f"{'effect':16} {'seed':>4} {'line':>7} {'plays':>7} {'whole':>7} {'ratio':>6} {'held out':>8}  found"
+    for row in rows:
+        mark = " " if row.named else "*"
+        yield (
+            f"{row.effect:16} {row.seed:4} {row.line:7.3f} {row.plays:7.3f} {row.whole:7.3f} {row.ratio:6.2f}{mark}"
+            f"{row.holdout:8.3f}  {row.words}"
+        )
+    yield ""
+    for effect in dict.fromkeys(row.effect for row in rows):
+        ratios = [row.ratio for row in rows if row.effect == effect and row.named]
+        if ratios:
+            yield f"{effect:16} median {np.median(ratios):.3f}, largest {max(ratios):.3f} of {len(ratios)} named"
+    yield "rms about the mean, % of the reference's range; *: another name was found, or none"
+
+
+def main(effects: Sequence[str], seeds: range, jobs: int) -> int:
+    """Print the table; 1 where a plant failed."""
+    tasks = [(effect, seed) for effect in effects or EFFECTS for seed in seeds]
+    rows, failed = [], []
+    with ProcessPoolExecutor(jobs) as pool:
+        for number, found in enumerate(pool.map(_tried, tasks), 1):
+            print(f"{number}/{len(tasks)}", file=sys.stderr, flush=True)
+            if isinstance(found, Tracked):
+                rows.append(found)
+            else:
+                failed.append(found)
+    print(*table(rows), sep="\n")
+    for effect, seed, message in failed:
+        print(f"{effect} {seed}: {message}")
+    return int(bool(failed))
+
+
