@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 import hystgen
-from hystgen.identification import pi, reduction, weights
+from hystgen.identification import pi, prepared, reduction
 from hystgen.plays import operators
 from hystgen.records import Record
 
@@ -62,7 +62,7 @@ def compare(v: Array) -> tuple[float, float, float]:
     r = np.linspace(0.0, 45.0, PLAYS + 1)
     rng = np.random.default_rng(2)
     y = operators.plays(v, r, 0.0).T @ rng.uniform(0.0, 1.0, PLAYS + 1) + rng.normal(0.0, 0.5, len(v)) - 30.0
-    course = pi.course(Record("made", np.arange(len(v)) * 1e-4, v, y), (), 0)
+    course = prepared.course_of(Record("made", np.arange(len(v)) * 1e-4, v, y), (), 0)
     columns = np.arange(PLAYS + 1)
     found: list[float] = [0.0, 0.0]
 
@@ -73,7 +73,7 @@ def compare(v: Array) -> tuple[float, float, float]:
 
     def ours() -> None:
         reduced = reduction.reduce([course], r)
-        found[1] = weights.residual(reduced.whole, columns, weights.non_negative(reduced.whole, columns)) ** 0.5
+        found[1] = pi.residual(reduced.whole, columns, pi.non_negative(reduced.whole, columns)) ** 0.5
 
     ours()  # compiles
     return best(theirs), best(ours), abs(found[1] / found[0] - 1.0)

@@ -44,7 +44,7 @@ PLAYS = np.array([[0.0, 4.0, 9.0, 16.0, 26.0], [0.10, 0.03, 0.025, 0.02, 0.015]]
 
 @dataclass(frozen=True)
 class Case:
-    """A plant, the drive range it is used in, whether it leads, and what `hystgen.identify` is told to look for.
+    """A plant, the drive range it is used in, whether it leads, and the model that `hystgen.identify` fits.
 
     The output of a leading plant runs ahead of its input. As a play sum it would need negative weights, which
     `identify` does not give; but its inverse lags. So the records are handed over with input and output exchanged, and

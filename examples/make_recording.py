@@ -121,7 +121,7 @@ def measure(drive: list[float], seed: int) -> list[tuple[float, float, float]]:
 
 
 def ramps(corners: list[float], samples: list[int]) -> Iterator[float]:
-    """Straight lines from corner to corner, each in so many samples."""
+    """Straight lines from corner to corner, each in the number of samples given."""
     for (start, stop), count in zip(itertools.pairwise(corners), samples, strict=True):
         for k in range(count):
             yield start + (stop - start) * k / count

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from hystgen.plays import density as density
     from hystgen.plays import elastoplastic as elastoplastic
     from hystgen.plays import operators as operators
-    from hystgen.report.diagnosed import diagnose as diagnose
-    from hystgen.report.fit import report_fit as report_fit
-    from hystgen.report.planned import plan as plan
+    from hystgen.report.diagnosis import diagnose as diagnose
+    from hystgen.report.identification import report_fit as report_fit
+    from hystgen.report.plan import plan as plan
     from hystgen.verification.run import verify as verify
 
 # Where each public name is, imported when it is first used: `hystgen emit` has to start fast. A test holds this to the
@@ -60,14 +60,14 @@ _PLACES = {
     "ParameterError": "basics.problems",
     "Session": "compensator.session",
     "TanhEnvelope": "front.tanh.model",
-    "diagnose": "report.diagnosed",
+    "diagnose": "report.diagnosis",
     "differences": "emission.calls",
     "emit": "emission.calls",
     "identify": "identification",
     "identify_batch": "fleet.batch",
     "load": "model",
-    "plan": "report.planned",
-    "report_fit": "report.fit",
+    "plan": "report.plan",
+    "report_fit": "report.identification",
     "schema": "parameters.schema",
     "verify": "verification.run",
 }

@@ -42,9 +42,9 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         with pytest.raises(SystemExit) as stopped:
             main([str(a) for a in arguments])
         out, err = capfd.readouterr()
-        # Kernels may have to be compiled first, which is told
-        told = [line for line in err.splitlines() if not line.startswith("compiling")]
-        return int(stopped.value.code or 0), out, "\n".join(told)
+        # Kernels may have to be compiled first, which is reported
+        printed = [line for line in err.splitlines() if not line.startswith("compiling")]
+        return int(stopped.value.code or 0), out, "\n".join(printed)
 
     return call
 
@@ -71,7 +71,7 @@ def in_short_form(item: pytest.Item) -> bool:
     """Whether a test runs without HYSTGEN_WHOLE: of a slow one a case in `one_in`, and none without that number.
 
     Which ones, the places of its parameters in their lists decide by their sum: where there are several lists, each
-    value of the one comes up with one in so many of another.
+    value of the one comes up with every n-th value of another.
     """
     slow = item.get_closest_marker("slow")
     if slow is None:

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings.kinds import Finding, Structure
 from hystgen.diagnosis.findings.result import Errors, Gap, Inverse, NamedEffect, Result
-from hystgen.diagnosis.search import merit, screening
+from hystgen.diagnosis.search import screening, selection
 from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ class Hypothesis:
 
 
 class World:
-    """Which hypotheses there are, and how much of what is missing each leaves; those not told leave everything."""
+    """Which hypotheses there are, and how much of what is missing each leaves; those not listed leave everything."""
 
     to_fit, held, noise = (0, 1, 2), (3, 4, 5), NOISE
     one_loop = one_speed = False
@@ -118,7 +118,7 @@ def first_of(best: Made, other: Made, effect: str | None = None) -> str:
         for made in (best, other)
     ]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    first: Any = merit.simplest_first(tried, records)[0].fitted
+    first: Any = selection.simplest_first(tried, records)[0].fitted
     return str(first.name)
 
 

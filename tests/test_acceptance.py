@@ -5,7 +5,10 @@
 
 from __future__ import annotations
 
+import ast
+import csv
 import itertools
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -20,41 +23,46 @@ from scipy.signal import lfilter
 from scipy.stats import wilcoxon
 
 from hystgen.diagnosis import Diagnosis
-from hystgen.diagnosis.data import (
-    bad_samples,
-    channels,
-    disturbances,
-    drives,
-    held_out,
-    lines,
-    periodic,
-    ripple,
-    spectra,
-    starts,
-    stick_slip,
-    thinning,
-)
+from hystgen.diagnosis.data import disturbances, preparing, signals
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.data.noise_floor import noise_floor
+from hystgen.diagnosis.data.items import needed as needed_samples
 from hystgen.diagnosis.data.preparing import Prepared, prepare
-from hystgen.diagnosis.findings import content, residual, stretches
+from hystgen.diagnosis.data.signals import noise_floor
+from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
-from hystgen.diagnosis.search import acceptance, fits, merit, nominal, options, screening, selection
-from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search import acceptance, fits, hypothesis, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
-from hystgen.diagnosis.search.options import Option
-from hystgen.diagnosis.search.structure import Structure
+from hystgen.diagnosis.search.hypothesis import Actuator, Structure
+from hystgen.diagnosis.search.screening import Option
 from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.front.dead_zone.model import DeadZone
-from hystgen.identification.fronts import Kept
+from hystgen.identification.joint import Kept
+from hystgen.identification.quality import correlation_time
 from hystgen.identification.reduction import settled
-from hystgen.identification.uncertainty import correlation_time
 from hystgen.records import Record
 
 pytestmark = pytest.mark.thorough
 
 Array = NDArray[np.float64]
+
+
+NOTICED = [
+    (name, factor, test)
+    for name, tests in threshold_mutants.recorded().items()
+    for factor, test in tests.items()
+    if test
+]
+"""Numbers, factors, and the tests that notice them, of `docs/thresholds.csv`."""
+
+ON_MEASURED = ("tests/test_diagnosis.py::test_flexure_stage_with_its_start",)
+"""Those of the tests that need the measured records."""
+
+
+def short(test: str) -> str:
+    """The name of a test as the texts of the numbers have it, without its case."""
+    file, *path = test.partition("[")[0].split("::")
+    return "::".join([file.removeprefix("tests/test_").removesuffix(".py"), *path])
 
 
 class TestTheModule:
@@ -65,6 +73,13 @@ class TestTheModule:
             assert text.startswith("["), name
             assert any(words in text for words in ("Set by:", "Changed by:", "Derived")), name
 
+    def test_the_tests_it_names_are_those_of_the_table(self) -> None:
+        """Numbers that stand together have one text."""
+        table, texts = threshold_mutants.recorded(), threshold_mutants.documented()
+        for text in set(texts.values()):
+            notice = {short(test) for name in texts if texts[name] == text for test in table[name].values() if test}
+            assert set(re.findall(r"\w+(?:::\w+)+", text)) <= notice, text
+
     def test_every_number_is_read_somewhere(self) -> None:
         sources = "".join(path.read_text() for path in (threshold_mutants.ROOT / "hystgen").rglob("*.py"))
         inside = threshold_mutants.read_inside()
@@ -74,13 +89,35 @@ class TestTheModule:
     def test_only_the_known_ones_go_unnoticed(self) -> None:
         assert set(threshold_mutants.UNNOTICED) <= set(threshold_mutants.names())
 
-    @pytest.mark.parametrize("name", ["NOISE", "FAR_ABOVE_NOISE", "P_SURE", "P_DIFFERENT"])
-    @pytest.mark.parametrize("factor", threshold_mutants.FACTORS)
-    def test_a_mutant_is_noticed(self, name: str, factor: float) -> None:
-        """The script itself, on tests of a moment."""
-        here = [f"tests/test_acceptance.py::{each}" for each in ("test_noise", "test_chance")]
-        assert threshold_mutants.noticed(name, factor, here)
-        assert not threshold_mutants.noticed(name, 1.0, here)
+    def test_the_table_of_runs_is_complete(self) -> None:
+        """A row for each number as it is now, with a test that notices it times two or a half, and that there is."""
+        with threshold_mutants.TABLE.open(newline="", encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        assert tuple(head) == threshold_mutants.HEAD
+        assert [row[:3] for row in rows] == [
+            [name, str(getattr(acceptance, name)), threshold_mutants.unit(name)] for name in threshold_mutants.names()
+        ], "run python -m tests.threshold_mutants --write"
+        noticing = {row[0]: [test for test in row[3:] if test] for row in rows}
+        assert {name for name, tests in noticing.items() if not tests} == set(threshold_mutants.UNNOTICED)
+        for test in itertools.chain(*noticing.values()):
+            file_name, *path = test.partition("[")[0].split("::")
+            body: Any = ast.parse((threshold_mutants.ROOT / file_name).read_text(encoding="utf-8"))
+            for name in path:
+                found = [each for each in body.body if getattr(each, "name", None) == name]
+                assert found, f"{test} is not there; run python -m tests.threshold_mutants --write"
+                body = found[0]
+
+    @pytest.mark.slow(one_in=20)
+    @pytest.mark.parametrize(("name", "factor", "test"), [row for row in NOTICED if row[2] not in ON_MEASURED])
+    def test_the_table_of_runs_is_right(self, name: str, factor: float, test: str) -> None:
+        assert threshold_mutants.noticed(name, factor, [test]) == test
+        assert not threshold_mutants.noticed(name, 1.0, [test])
+
+    @pytest.mark.data
+    @pytest.mark.slow
+    @pytest.mark.parametrize(("name", "factor", "test"), [row for row in NOTICED if row[2] in ON_MEASURED])
+    def test_it_is_right_about_measured_records(self, name: str, factor: float, test: str) -> None:
+        assert threshold_mutants.noticed(name, factor, [test]) == test
 
 
 @pytest.mark.parametrize(
@@ -101,12 +138,12 @@ def test_chance(held_out: float, fitted: float, named: bool, monkeypatch: pytest
     better = Made("better", 1, (0.5, 0.5))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    monkeypatch.setattr(merit, "difference", lambda _, after: held_out if after is best.errors else fitted)
-    assert (merit.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    monkeypatch.setattr(selection, "difference", lambda _, after: held_out if after is best.errors else fitted)
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
     for p_value, open_ in ((0.015, True), (0.007, False)):
-        monkeypatch.setattr(merit, "difference", lambda *_, p_value=p_value: p_value)
+        monkeypatch.setattr(selection, "difference", lambda *_, p_value=p_value: p_value)
         other: Any = SimpleNamespace(held_out=1.2, errors=[])
-        assert merit.alike(other, SimpleNamespace(held_out=1.0, errors=[]), 0.1) is open_  # type: ignore[arg-type]
+        assert selection.alike(other, SimpleNamespace(held_out=1.0, errors=[]), 0.1) is open_  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("fitted", "named"), [(0.98, False), (0.95, True)])
@@ -115,7 +152,7 @@ def test_an_effect_has_to_show_in_fitted_records(fitted: float, named: bool) -> 
     better = Made("better", 1, (fitted, 0.5))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (merit.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("memory", [1, 30])
@@ -129,7 +166,7 @@ def test_blocks_are_longer_than_errors_remember(memory: int) -> None:
     blocks = [np.mean(gain[k : k + size]) for k in range(0, 600 - size + 1, size)]
     assert size == (2 if memory == 1 else 30)
     expected = wilcoxon(blocks, alternative="greater").pvalue
-    assert merit.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
+    assert selection.difference([before], [after]) == pytest.approx(float(expected), rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize(("more", "first"), [(1.006, "lag"), (1.015, "delay")])
@@ -194,7 +231,7 @@ class TestForwardSelection:
 
         def step(*_: Any) -> Any:
             seen.append("asked")
-            return selection._Step(now, [], world.tried(now, "c"), merit.Merit(1.0, 1.0, 0.1, 0.0))
+            return selection._Step(now, [], world.tried(now, "c"), selection.Merit(1.0, 1.0, 0.1, 0.0))
 
         monkeypatch.setattr(selection, "_step", step)
         monkeypatch.setattr(selection, "_gives_way", lambda *_: True)
@@ -285,7 +322,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     """Steps that each option gets; `screen`: its held-out and fitted error, `joint`: its held-out error after that."""
     steps: dict[int, list[int]] = {k: [] for k in range(len(screen))}
 
-    class Crew:
+    class Pool:
         def each(self, tasks: Sequence[Any], _: Any) -> Any:
             for task in tasks:
                 steps[task.k].append(task.steps)
@@ -301,7 +338,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     pairs = [screening._Pair(option, option) for _ in screen]
     now: Any = SimpleNamespace(rms=1.0, weights=None)
     searches = screening._Searches(now, now, pairs, SimpleNamespace(tick=None, held=[]))  # type: ignore[arg-type]
-    screening._followed_up(searches, kept_ones, Crew())  # type: ignore[arg-type]
+    screening._followed_up(searches, kept_ones, Pool())  # type: ignore[arg-type]
     return steps
 
 
@@ -344,11 +381,11 @@ def test_plays_of_a_fit() -> None:
 class TestHeldOut:
     @pytest.mark.parametrize(("samples", "enough"), [(120, True), (80, False)])
     def test_enough_to_compare(self, samples: int, enough: bool) -> None:
-        assert held_out.enough([SimpleNamespace(used=samples)]) is enough  # type: ignore[list-item]
+        assert preparing.enough([SimpleNamespace(used=samples)]) is enough  # type: ignore[list-item]
 
     def test_the_end_of_a_record(self) -> None:
         """A little less than a third of it."""
-        (beginning,), (end,) = held_out.parted([sine(1000)])
+        (beginning,), (end,) = preparing.parted([sine(1000)])
         assert 200 < np.count_nonzero(end.known) < 334
         assert np.count_nonzero(beginning.known) + np.count_nonzero(end.known) == 1000
 
@@ -358,14 +395,14 @@ class TestHeldOut:
         v = np.linspace(0.0, 100.0, 101)
         rates = [1.0, rate, 0.1, 0.1, 0.1, 0.1]
         given = [Record(f"r{k}", np.arange(101) / rate, v, v) for k, rate in enumerate(rates)]
-        assert held_out.set_aside(given) == aside
+        assert preparing.set_aside(given) == aside
 
 
 class TestNominal:
     effect = ExponentialCreep(name="creep", time_constants=(0.1, 1.0, 10.0, 100.0), weights=(0.02,) * 4)
 
     def test_numbers_move_by_up_to_a_factor(self) -> None:
-        low, high = np.exp(nominal._near(self.effect).low), np.exp(nominal._near(self.effect).high)
+        low, high = np.exp(hypothesis._near(self.effect).low), np.exp(hypothesis._near(self.effect).high)
         assert np.all((low > 0.2) & (low < 0.5))
         assert np.all((high > 2.0) & (high < 5.0))
 
@@ -374,17 +411,17 @@ class TestNominal:
         effect = ExponentialCreep(
             name="creep", time_constants=tuple(10.0**k for k in range(number)), weights=(0.02,) * number
         )
-        assert len(nominal._near(effect).start) == factors
+        assert len(hypothesis._near(effect).start) == factors
 
     @pytest.mark.parametrize(("excess", "kept_as_it_is"), [(0.7e-6, False), (1.5e-6, True)])
     def test_a_front_at_its_limit_is_refitted(self, excess: float, kept_as_it_is: bool) -> None:
-        family, shape = nominal.front_of([DeadZone((-1.0, 0.0, 1.0), (0.5, 1.0, 0.5))], (-2.0, 2.0))
+        family, shape = hypothesis.front_of([DeadZone((-1.0, 0.0, 1.0), (0.5, 1.0, 0.5))], (-2.0, 2.0))
 
         class Tight(type(family)):  # type: ignore[misc]
             def slack(self, _: Array) -> Array:
                 return np.array([-excess])
 
-        assert nominal._inside(Tight(family.drive, family.breaks), shape) is not kept_as_it_is
+        assert hypothesis._inside(Tight(family.drive, family.breaks), shape) is not kept_as_it_is
 
 
 def bent(*slopes: tuple[float, float]) -> Any:
@@ -418,7 +455,7 @@ BOTH_NAMES = "saturation", "asymmetry"
 )
 def test_what_a_front_is_called(curve: Any, names: tuple[str, ...]) -> None:
     front: Any = SimpleNamespace(stages=lambda _: [SimpleNamespace(forward=curve)])
-    assert options.front_names(front, np.empty(0), (0.0, 100.0)) == names
+    assert screening.front_names(front, np.empty(0), (0.0, 100.0)) == names
 
 
 def test_what_limits_the_start_of_an_effect() -> None:
@@ -437,7 +474,7 @@ def test_what_limits_the_start_of_an_effect() -> None:
 def needed(v: Array, y: Array, noise: float, column: Array | None = None) -> NDArray[np.bool_]:
     """Samples that are needed of a record that a model predicts exactly."""
     run = Run(np.arange(len(v)) * 1e-3, v, {} if column is None else {"temperature": column})
-    return thinning.needed([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
+    return needed_samples([Item("r", run, y, None, 10.0)], [np.zeros(len(v))], noise)[0]
 
 
 class TestThinning:
@@ -469,7 +506,7 @@ class TestThinning:
         left = np.zeros(65)
         left[1::2] = np.sqrt(2.0) * rms * 0.01
         item = Item("r", Run(np.arange(65) * 1e-3, self.v), 0.1 * self.v + left, None, 10.0)
-        (mask,) = thinning.needed([item], [left], 0.01)
+        (mask,) = needed_samples([item], [left], 0.01)
         assert (np.count_nonzero(mask) > 60) == seen
 
     def test_the_longest_stretch(self) -> None:
@@ -571,8 +608,8 @@ def good(width: float = 100.0) -> list[Record]:
     return [record(f"good{k}", width * smooth(k), 0.1 * width * smooth(k)) for k in range(3)]
 
 
-def kinds_of(records: Sequence[Record], predict: channels.Predict = straight) -> list[tuple[str, str]]:
-    return [(each.kind, str(each.entry()["record"])) for each in channels.checked(records, predict)[1]]
+def kinds_of(records: Sequence[Record], predict: preparing.Predict = straight) -> list[tuple[str, str]]:
+    return [(each.kind, str(each.entry()["record"])) for each in preparing.checked(records, predict)[1]]
 
 
 class TestWholeRecords:
@@ -632,7 +669,7 @@ class TestWholeRecords:
         area = 0.5 * abs(float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1])))
         noise = area / sigmas / (0.5 * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))))
         y = y + np.random.default_rng(1).normal(0.0, noise, len(y))
-        assert (channels._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
+        assert (preparing._against(record("r", v, y), late(record("", v, v))).sense > 0.0) is seen
 
     @pytest.mark.parametrize(
         ("share", "scatters", "left_out"),
@@ -642,16 +679,16 @@ class TestWholeRecords:
         random = np.random.default_rng(4)
         x = random.uniform(-1.0, 1.0, 4000)
         y = x + random.normal(0.0, 0.05, 4000)
-        without = channels._line(x, y)[1]
+        without = preparing._line(x, y)[1]
         y[: int(4000 * share)] = x[: int(4000 * share)] + 0.05 * scatters
-        assert (channels._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
+        assert (preparing._line(x, y)[1] == pytest.approx(without, abs=1e-3)) is left_out
 
     @pytest.mark.parametrize(("share", "kind"), [(0.007, "saturated"), (0.014, "held_samples")])
     def test_a_converter_ends_at_its_end(self, share: float, kind: str) -> None:
         """Another record goes beyond it by a share of the range."""
         items = [Item(name, Run(np.arange(3.0), np.arange(3.0)), np.array([0.0, 1.0, top]), None, 10.0)
                  for name, top in (("a", 10.0 * (1.0 - share)), ("b", 10.0))]  # fmt: skip
-        (each,) = bad_samples.not_at_the_end([Saturated("a", None, "largest", 10.0 * (1.0 - share), 5)], items)
+        (each,) = preparing.not_at_the_end([Saturated("a", None, "largest", 10.0 * (1.0 - share), 5)], items)
         assert each.kind == kind
 
     @pytest.mark.parametrize(("rest", "foreign"), [(0.14, False), (0.16, True)])
@@ -663,7 +700,7 @@ class TestWholeRecords:
             error = np.where(np.arange(400) < settled(v, 10.0), start, rest) * np.resize([1.0, -1.0], 400)
             return SimpleNamespace(reach=10.0, errors=lambda _: [error])
 
-        assert (starts.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
+        assert (preparing.bends([item], model(0.1, rest), model(1.0, 0.1)) is not None) is foreign
 
 
 def _orthogonal(x: Array, to: Array) -> Array:
@@ -700,7 +737,7 @@ def of_share(share: float) -> float:
 
 
 def heard(item: Item, error: Array) -> list[float]:
-    return sorted(frequency for _, frequency in spectra.peaks(item, error))
+    return sorted(frequency for _, frequency in signals.peaks(item, error))
 
 
 class TestSpectra:
@@ -779,45 +816,45 @@ class TestSpectra:
     @pytest.mark.parametrize(("apart", "number"), [(0.013, 1), (0.03, 2)])
     def test_ringing_at_nearly_the_same_frequency(self, apart: float, number: int) -> None:
         errors = [tone(f, 20_000) + 0.3 * hiss(20_000) for f in (100.0, 100.0 * (1.0 + apart))]
-        found = spectra.ringing([ramp(20_000), ramp(20_000)], errors, 5)
+        found = signals.ringing([ramp(20_000), ramp(20_000)], errors, 5)
         assert len([f for f in found if 99.0 < f < 104.0]) == number
 
     @pytest.mark.parametrize(("samples", "repeats"), [(80, True), (50, False)])
     def test_a_short_drive_does_not_repeat(self, samples: int, repeats: bool) -> None:
         v = np.cos(2.0 * np.pi * np.arange(samples) / 20.0)
-        assert (spectra.repetition(v) == 20) is repeats
+        assert (signals.repetition(v) == 20) is repeats
 
     @pytest.mark.parametrize(("noise", "repeats"), [(0.7, True), (1.4, False)])
     def test_a_noisy_drive_repeats(self, noise: float, repeats: bool) -> None:
         """Of a range of 100, rms between periods."""
         v = np.tile(np.interp(np.arange(500), [0, 100, 250, 400, 500], [0.0, 100.0, 20.0, 70.0, 0.0]), 6)
-        assert (spectra.repetition(v + noise / np.sqrt(2.0) * hiss(3000)) is not None) is repeats
+        assert (signals.repetition(v + noise / np.sqrt(2.0) * hiss(3000)) is not None) is repeats
 
     @pytest.mark.parametrize(("duty", "repeats"), [(0.05, True), (0.015, False)])
     def test_a_drive_that_mostly_rests(self, duty: float, repeats: bool) -> None:
         """It differs from itself by the root of twice that, rms."""
         v = np.tile(np.where(np.arange(400) < 400 * duty, 1.0, 0.0), 6)
-        assert (spectra.repetition(v) is not None) is repeats
+        assert (signals.repetition(v) is not None) is repeats
 
 
 class TestLines:
     @pytest.mark.parametrize(("share", "ruled"), [(0.4, True), (0.2, False)])
     def test_a_line_rules(self, share: float, ruled: bool) -> None:
         error = tone(130.0, 4000, of_share(share)) + hiss(4000)
-        assert bool(periodic.ruling([ramp(4000)], [error])[0]) is ruled
+        assert bool(disturbances.ruling([ramp(4000)], [error])[0]) is ruled
 
     @pytest.mark.parametrize(("share", "rules"), [(0.4, True), (0.2, False)])
     def test_a_line_in_a_few_records(self, share: float, rules: bool) -> None:
         """In one of ten, unless it rules that one."""
         items = [ramp(2000, name=f"r{k}") for k in range(10)]
         errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(share)) if k == 0 else 0.0) for k in range(10)]
-        assert bool(periodic.lines(items, errors)[0]) is rules
+        assert bool(disturbances.lines(items, errors)[0]) is rules
 
     @pytest.mark.parametrize(("having", "seen"), [(5, True), (3, False)])
     def test_a_line_in_many_records(self, having: int, seen: bool) -> None:
         items = [ramp(2000, name=f"r{k}") for k in range(10)]
         errors = [hiss(2000, k) + (tone(130.0, 2000, of_share(0.15)) if k < having else 0.0) for k in range(10)]
-        assert bool(periodic.lines(items, errors)[0]) is seen
+        assert bool(disturbances.lines(items, errors)[0]) is seen
 
     @pytest.mark.parametrize(("steady", "seen"), [(7, True), (5, False)])
     def test_steady_in_most_records(self, steady: int, seen: bool) -> None:
@@ -825,31 +862,31 @@ class TestLines:
         items = [ramp(2000, name=f"r{k}") for k in range(10)]
         fading = np.where(np.arange(2000) < 1000, 1.0, 0.0)
         errors = [3.0 * tone(130.0, 2000) * (1.0 if k < steady else fading) + hiss(2000, k) for k in range(10)]
-        assert (lines.steady(items, errors) is not None) is seen
+        assert (disturbances.steady(items, errors) is not None) is seen
 
     @pytest.mark.parametrize(("size", "seen"), [(0.46, True), (0.38, False)])
     def test_a_line_that_fades(self, size: float, seen: bool) -> None:
         """To this share of its amplitude: what one half predicts of the other is 0.58 or 0.39 of what that has."""
         error = tone(130.0, 4000) * np.where(np.arange(4000) < 2000, 1.0, size) + 0.05 * hiss(4000)
-        assert (lines.steady([ramp(4000)], [error]) is not None) is seen
+        assert (disturbances.steady([ramp(4000)], [error]) is not None) is seen
 
     def test_four_lines(self) -> None:
         error = sum(tone(50.0 + 40.0 * k, 4000) for k in range(6)) + 0.1 * hiss(4000)
-        assert len(periodic.lines([ramp(4000)], [error])[0]) == 4
+        assert len(disturbances.lines([ramp(4000)], [error])[0]) == 4
 
     @pytest.mark.parametrize(("rate", "size"), [(1080.0, 1.5), (945.0, 1.0)])
     def test_two_samples_a_period_do_not_show_an_amplitude(self, rate: float, size: float) -> None:
         """A line of 450 Hz, twice as large in the record with the other sampling rate."""
         items = [ramp(4000, 1.0 / 2000.0, "a"), ramp(4000, 1.0 / rate, "b")]
         errors = [tone(450.0, 4000, 1.0, 1.0 / 2000.0), tone(450.0, 4000, 2.0, 1.0 / rate)]
-        (line, *_), _ = periodic.lines(items, [e + 0.1 * hiss(4000, k) for k, e in enumerate(errors)])
+        (line, *_), _ = disturbances.lines(items, [e + 0.1 * hiss(4000, k) for k, e in enumerate(errors)])
         assert line.amplitude == pytest.approx(size, rel=0.1)
 
     @pytest.mark.parametrize(
         ("frequency", "mains"), [(50.08, 50.0), (50.15, None), (149.8, "3 x 50 Hz"), (59.97, 60.0)]
     )
     def test_mains(self, frequency: float, mains: object) -> None:
-        assert lines._mains(frequency, 1e-3) == mains
+        assert disturbances._mains(frequency, 1e-3) == mains
 
     @pytest.mark.parametrize(("frequency", "known"), [(103.0, True), (108.0, False)])
     def test_the_rest_of_a_line(self, frequency: float, known: bool) -> None:
@@ -877,7 +914,7 @@ def there_and_back(low: float, high: float, samples: int) -> Array:
 
 
 def pitches(made: Sequence[tuple[Item, Array]]) -> list[float]:
-    found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+    found = disturbances.in_position([item for item, _ in made], [error for _, error in made])
     return [] if found is None else [found.finding.place]
 
 
@@ -917,7 +954,7 @@ class TestRipple:
     @pytest.mark.parametrize(("beside", "step"), [(0.014, True), (0.03, False)])
     def test_a_pitch_of_the_converter(self, beside: float, step: bool) -> None:
         made = [rippled(there_and_back(0.0, 40.0, 2000), 1.0, k, 1.0 + beside) for k in range(3)]
-        found = ripple.in_position([item for item, _ in made], [error for _, error in made])
+        found = disturbances.in_position([item for item, _ in made], [error for _, error in made])
         assert found is not None
         assert found.finding.place == pytest.approx(1.0, rel=0.005)
         assert found.finding.entry()["converter_step"] is step
@@ -944,7 +981,7 @@ def slips(moves: Array, change: Array, noise: float) -> bool:
     """Whether stick-slip is seen where the prediction moves so from sample to sample, and the error changes so."""
     predicted, error = (np.concatenate([[0.0], np.cumsum(x)]) for x in (moves, change))
     item = Item("r", Run(np.arange(len(error)) * 1e-3, predicted), predicted + error, None, 10.0)
-    return bool(stick_slip.stick_slip([item], [error], noise))
+    return bool(disturbances.stick_slip([item], [error], noise))
 
 
 def pattern(pairs: int, stretches: int, stands: float = 0.0, leaps: float = 2.2) -> list[float]:
@@ -1010,22 +1047,22 @@ class TestDrives:
     @pytest.mark.parametrize(("turn", "number"), [(1.4, 0), (3.0, 2)])
     def test_a_small_turn(self, turn: float, number: int) -> None:
         v = np.interp(np.arange(300), [0, 100, 130, 299], [0.0, 50.0, 50.0 - turn, 100.0])
-        assert len(drives.reversals(v)) == number
+        assert len(signals.reversals(v)) == number
 
     @pytest.mark.parametrize(("top", "one"), [(93.0, True), (86.0, False)])
     def test_ends_of_loops(self, top: float, one: bool) -> None:
-        assert drives.one_loop([sweep(0, 100, 0, 100, 0), sweep(0, top, 0, top, 0)]) is one
+        assert signals.one_loop([sweep(0, 100, 0, 100, 0), sweep(0, top, 0, top, 0)]) is one
 
     @pytest.mark.parametrize(("slower", "one"), [(1.35, True), (1.8, False)])
     def test_speeds_of_loops(self, slower: float, one: bool) -> None:
-        assert drives.one_speed([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=slower)]) is one
+        assert signals.one_speed([sweep(0, 100, 0, 100, 0), sweep(0, 100, 0, 100, 0, seconds=slower)]) is one
 
     @pytest.mark.parametrize(("hold", "one"), [(50, True), (160, False)])
     def test_a_loop_that_stands_is_none(self, hold: int, one: bool) -> None:
         """Samples beside 200 of each move."""
         move = np.linspace(0.0, 100.0, 200)
         v = np.concatenate([move, np.full(hold, 100.0), move[::-1], np.zeros(hold)] * 3)
-        assert drives.one_loop([driven(v)]) is one
+        assert signals.one_loop([driven(v)]) is one
 
 
 def scattered(samples: int, seed: int = 0) -> Item:
@@ -1038,38 +1075,38 @@ class TestDescription:
     def test_a_variable_that_matters(self, share: float, matters: bool) -> None:
         item = scattered(20_000)
         error = of_share(share) * np.sin(2.0 * np.pi * item.run.v / 100.0) + hiss(20_000, 1)
-        assert ("drive" in residual.shares([item], [error])[1]) is matters
+        assert ("drive" in content.shares([item], [error])[1]) is matters
 
     def test_bins_of_a_variable(self) -> None:
         """Eight waves over the range, of which 24 bins see two thirds."""
         item = scattered(20_000)
-        shares = residual.shares([item], [np.sin(2.0 * np.pi * 8.0 * item.run.v / 100.0)])[1]
+        shares = content.shares([item], [np.sin(2.0 * np.pi * 8.0 * item.run.v / 100.0)])[1]
         assert 0.6 < shares["drive"] < 0.8
 
     def test_folds(self) -> None:
         """A drift is seen in half of the blocks of time alone: a bin is two thirds of one."""
         item = scattered(9600)
-        assert 0.25 < residual.shares([item], [np.linspace(-1.0, 1.0, 9600)])[1]["session time"] < 0.45
+        assert 0.25 < content.shares([item], [np.linspace(-1.0, 1.0, 9600)])[1]["session time"] < 0.45
 
     @pytest.mark.parametrize(("samples", "described"), [(300, True), (150, False)])
     def test_samples_of_a_description(self, samples: int, described: bool) -> None:
         item = scattered(samples)
-        assert (residual.shares([item], [item.run.v - 50.0])[0] > 0.0) is described
+        assert (content.shares([item], [item.run.v - 50.0])[0] > 0.0) is described
 
     @pytest.mark.parametrize(("free", "main"), [(0.6, "memory"), (0.45, "drive")])
     def test_memory_in_place_of_one_variable(self, free: float, main: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(residual, "shares", lambda *_: (0.4, {"drive": 0.4}))
-        monkeypatch.setattr(residual, "together", lambda *_: (free, 0.7))
-        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).main_variable == main
+        monkeypatch.setattr(content, "shares", lambda *_: (0.4, {"drive": 0.4}))
+        monkeypatch.setattr(content, "together", lambda *_: (free, 0.7))
+        assert content.described([scattered(500)], [hiss(500)], 1.0, ()).main_variable == main
 
     @pytest.mark.parametrize(("free", "rate_free"), [(0.8, True), (0.6, False)])
     def test_rate_free(self, free: float, rate_free: bool) -> None:
-        assert residual._rate_free(free, 1.0) is rate_free
+        assert content._rate_free(free, 1.0) is rate_free
 
     @pytest.mark.parametrize(("share", "repeatable"), [(0.6, True), (0.4, False)])
     def test_repeatable(self, share: float, repeatable: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(residual, "repeatable", lambda *_: share)
-        assert residual.described([scattered(500)], [hiss(500)], 1.0, ()).repeatable is repeatable
+        monkeypatch.setattr(content, "repeatable", lambda *_: share)
+        assert content.described([scattered(500)], [hiss(500)], 1.0, ()).repeatable is repeatable
 
     @pytest.mark.parametrize(
         ("share", "waves", "samples", "known"),
@@ -1082,18 +1119,18 @@ class TestDescription:
     def test_parity(self, share: float, waves: int, samples: int, known: bool) -> None:
         item = scattered(samples)
         error = of_share(share) * np.cos(2.0 * np.pi * waves * item.run.v / 100.0) + hiss(samples, 1)
-        assert (residual.even_share([item], [error]) is not None) is known
+        assert (content.even_share([item], [error]) is not None) is known
 
 
 class TestStretches:
     @pytest.mark.parametrize(("times", "listed"), [(1.6, True), (1.4, False)])
     def test_above_the_noise(self, times: float, listed: bool) -> None:
         error = np.where(np.arange(2400) < 300, times, 1.0) * np.resize([1.0, -1.0], 2400)
-        assert bool(stretches.worst([ramp(2400)], [error], 1.0)) is listed
+        assert bool(content.worst([ramp(2400)], [error], 1.0)) is listed
 
     def test_ends_of_the_range(self) -> None:
         """Windows of 4 % of the range: the third one is two fifths within a tenth of it."""
-        found = stretches.worst([ramp(2400)], [np.ones(2400)], 0.1)
+        found = content.worst([ramp(2400)], [np.ones(2400)], 0.1)
         assert {(each.kind, each.interval) for each in found} == {
             ("range_end", (0.0, 0.199)), ("moving", (0.2, 2.199)), ("range_end", (2.2, 2.399)),
         }  # fmt: skip
@@ -1102,7 +1139,7 @@ class TestStretches:
         """A third of the record is twice as fast as most of it, a twelfth ten times."""
         rates = np.repeat([1.0, 2.0, 1.0, 10.0, 1.0], [700, 800, 300, 200, 400])
         item = driven(np.cumsum(np.resize(np.repeat([1.0, -1.0], 25), 2400) * rates))
-        found = stretches.worst([item], [np.ones(2400)], 0.1)
+        found = content.worst([item], [np.ones(2400)], 0.1)
         assert [each.interval for each in found if each.kind == "fast"] == [(1.8, 1.999)]
 
 
@@ -1128,7 +1165,7 @@ def test_held_out_records_that_are_alone() -> None:
 class TestStarts:
     def front(self, label: str) -> Option:
         bare = Structure(np.array([0.0]), Kept())
-        (found,) = [each for each in options._fronts(bare, bare, (0.0, 100.0)) if each.label == label]
+        (found,) = [each for each in screening._fronts(bare, bare, (0.0, 100.0)) if each.label == label]
         return found
 
     def starts(self, label: str) -> list[Array]:
@@ -1179,5 +1216,5 @@ def test_surroundings_of_ringing_that_fades(first: int, last: int, seen: bool) -
     for k in range(8 * first, 8 * last):
         spectrum[[1024 - k, 1024 + k]] *= 30.0
     spectrum[1020:1028] *= 40.0
-    found = spectra._fading(ramp(4096), np.fft.irfft(spectrum, 4096))
+    found = signals._fading(ramp(4096), np.fft.irfft(spectrum, 4096))
     assert any(abs(frequency - 250.0) < 3.0 for _, frequency in found) is seen

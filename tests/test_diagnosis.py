@@ -27,16 +27,16 @@ import hystgen
 from hystgen.basics import parallel
 from hystgen.diagnosis import Diagnosis
 from hystgen.diagnosis.data import preparing
-from hystgen.diagnosis.data.held_out import set_aside
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.noise_floor import noise_floor
+from hystgen.diagnosis.data.preparing import set_aside
+from hystgen.diagnosis.data.signals import noise_floor
 from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import Line
 from hystgen.diagnosis.findings.result import Errors, Gap, Result
 from hystgen.diagnosis.run import _extended
-from hystgen.diagnosis.search import acceptance, merit, options, screening, selection, structure
-from hystgen.diagnosis.search.actuator import Actuator
+from hystgen.diagnosis.search import acceptance, hypothesis, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects.ageing.model import ExponentialAgeing
 from hystgen.effects.base import About, Candidate, Effect, Place, Run
 from hystgen.effects.creep.model import ExponentialCreep
@@ -44,7 +44,7 @@ from hystgen.effects.drift.model import LinearDrift
 from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
-from hystgen.identification.fronts import Bent, DeadZones, Ends, Kept
+from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record
 from hystgen.report import diagnosis as report
 from tests.plants import run as plants_run
@@ -68,13 +68,13 @@ def made(folder: Path, kind: str, seeds: int) -> list[tuple[Path, dict[str, Any]
 
 
 def diagnosed(case: Path) -> dict[str, Any]:
-    told = json.loads((case / "session.json").read_text())
+    spec = json.loads((case / "session.json").read_text())
     found = hystgen.diagnose(
         case / "params.yaml",
-        [case / name for name in told["fit"]],
-        holdout=[case / name for name in told["holdout"]],
-        history=told["history"],
-        rest=told["rest"] or 0.0,
+        [case / name for name in spec["fit"]],
+        holdout=[case / name for name in spec["holdout"]],
+        history=spec["history"],
+        rest=spec["rest"] or 0.0,
     )
     content: dict[str, Any] = found.content
     return content
@@ -119,7 +119,7 @@ class TestBlindPlants:
         (case, _), *_ = made(tmp_path, "none", 1)
         (tmp_path / "file").touch()
         (tmp_path / "taken" / "report.html").mkdir(parents=True)
-        monkeypatch.setattr("hystgen.report.diagnosed.diagnose", lambda *_, **__: pytest.fail("searched"))
+        monkeypatch.setattr("hystgen.report.diagnosis.diagnose", lambda *_, **__: pytest.fail("searched"))
         data = sorted(case.glob("r*.csv"))[:2]
         code, out, err = run("diagnose", case / "params.yaml", *data, "-o", tmp_path / place)
         assert (code, out) == (2, "")
@@ -129,11 +129,11 @@ class TestBlindPlants:
 
     def test_the_command(self, tmp_path: Path, run: Call) -> None:
         (case, _), *_ = made(tmp_path, "single", 1)
-        told = json.loads((case / "session.json").read_text())
-        words = ["diagnose", case / "params.yaml", *(case / name for name in told["fit"]), "-o", tmp_path / "out"]
-        words += [word for name in told["holdout"] for word in ("--holdout", case / name)]
-        words += [f"--history={','.join(map(str, told['history']))}"] if told["history"] else []
-        words += ["--rest", told["rest"] or 0.0]
+        spec = json.loads((case / "session.json").read_text())
+        words = ["diagnose", case / "params.yaml", *(case / name for name in spec["fit"]), "-o", tmp_path / "out"]
+        words += [word for name in spec["holdout"] for word in ("--holdout", case / name)]
+        words += [f"--history={','.join(map(str, spec['history']))}"] if spec["history"] else []
+        words += ["--rest", spec["rest"] or 0.0]
         code, out, err = run(*words)
         assert code == 0, err
         content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
@@ -167,7 +167,7 @@ class TestSeveralProcesses:
         return case
 
     def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(screening, "LARGE", 0)
+        monkeypatch.setattr(screening, "WORTH_PROCESSES", 0)
         found = []
         for cores in (1, 3):
             monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
@@ -182,7 +182,7 @@ class TestSeveralProcesses:
             "from hystgen.diagnosis.search import screening; "
             "from hystgen.basics.progress import Progress; tick = Progress.tick; "
             "Progress.tick = lambda bar, n: (print('fitted', flush=True), tick(bar, n)); "
-            "screening.LARGE = 0; parallel.cores = lambda: 2; "
+            "screening.WORTH_PROCESSES = 0; parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
         )
         with subprocess.Popen(
@@ -303,9 +303,9 @@ class TestNoise:
         before = [rng.normal(size=2000) for _ in range(3)]
         same = [rng.normal(size=2000) for _ in range(3)]
         less = [0.8 * e for e in before]
-        assert merit.difference(before, less) < 1e-6
-        assert merit.difference(before, same) > 1e-3
-        assert merit.difference(less, before) > 0.9
+        assert selection.difference(before, less) < 1e-6
+        assert selection.difference(before, same) > 1e-3
+        assert selection.difference(less, before) > 0.9
 
 
     def test_a_hold_that_rings_tells_nothing(self) -> None:
@@ -340,7 +340,7 @@ class TestNoise:
 def test_what_a_front_is_called(points: list[tuple[float, float]], names: tuple[str, ...]) -> None:
     x, y = np.array(points, dtype=np.float64).T
     front = DeadZones((x[0], x[-1]), tuple(x[1:-1].tolist()))
-    assert options.front_names(front, front.shape(np.diff(y) / np.diff(x)), front.drive) == names
+    assert screening.front_names(front, front.shape(np.diff(y) / np.diff(x)), front.drive) == names
 
 
 @pytest.mark.parametrize("drive", [(0.0, 100.0), (-50.0, 50.0), (-10.0, 100.0), (-120.0, -20.0)])
@@ -485,8 +485,8 @@ def test_a_start_state_explains_no_more_than_it_can_be(weight: float, left: floa
     assert np.sqrt(np.mean(error**2) / np.mean(ramp**2)) == pytest.approx(left, abs=0.02)
 
 
-def _only(actuator: Actuator) -> structure.Structure:
-    return structure.Structure(actuator.thresholds, Kept(), tuple(map(structure.kept, actuator.effects)))
+def _only(actuator: Actuator) -> hypothesis.Structure:
+    return hypothesis.Structure(actuator.thresholds, Kept(), tuple(map(hypothesis.kept, actuator.effects)))
 
 
 @pytest.mark.parametrize("curve", [None, 0.3])
@@ -670,7 +670,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
 
 @pytest.mark.parametrize("held_out", [True, False])
 def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> None:
-    """Held out alone, others judge in its place; among others, it is told that it is not compared."""
+    """Held out alone, others judge in its place; among others, a note says that it is not compared."""
     rng = np.random.default_rng(1)
     ends = [rng.permutation(np.linspace(0, 100, 11)) for _ in "abcd"]
     drives = [np.concatenate([[50, 100, 0], np.interp(np.arange(900), np.arange(0, 901, 90), x)]) for x in ends]
@@ -681,10 +681,10 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     ]
     held = made[4:] if held_out else made[3:]
     found = hystgen.diagnose(_model(tmp_path), made[: 4 if held_out else 3], holdout=held)
-    told = " ".join(found.notes)
-    assert ("sweep: there is too little to judge by" in told) is held_out
-    assert ("that can judge: c set aside" in told) is held_out
-    assert ("sweep: says next to nothing, 1 sample" in told) is not held_out
+    spec = " ".join(found.notes)
+    assert ("sweep: there is too little to judge by" in spec) is held_out
+    assert ("that can judge: c set aside" in spec) is held_out
+    assert ("sweep: says next to nothing, 1 sample" in spec) is not held_out
     assert found.verdict == "nothing_missing"
 
 
@@ -705,7 +705,7 @@ def test_no_records_to_judge_by(tmp_path: Path) -> None:
 def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: Effect) -> None:
     """Though the play of the largest threshold has no weight: stretches are measured in it."""
     places, weights = np.array([0.0, 10.0, 20.0, 30.0]), np.array([1.0, 0.5, 0.25, 0.0])
-    form = structure.Structure(places, Kept(), (structure.kept(effect),))
+    form = hypothesis.Structure(places, Kept(), (hypothesis.kept(effect),))
     v = np.concatenate([np.linspace(0.0, 40.0, 60), 40.0 + (wander(3, 40) - 40.0)])
     run = Run(np.arange(len(v)) * 1e-3, v)
     item = Item("made", run, v, (0.0,), 100.0)
@@ -993,10 +993,10 @@ def test_no_name_beside_one_that_explains_far_more(monkeypatch: pytest.MonkeyPat
     def step(*held_out: float) -> object:
         """The first of them is unsure, the second sure."""
         tried = [SimpleNamespace(held_out=left) for left in held_out]
-        worth = merit.Merit(1.0, 1.0, 0.5, 1e-6)
-        monkeypatch.setattr(merit, "simplest_first", lambda found, _: found)
-        monkeypatch.setattr(merit, "merit_of", lambda _, best, *__: None if best is tried[0] else worth)
-        monkeypatch.setattr(merit, "removes", lambda *_: removes)
+        worth = selection.Merit(1.0, 1.0, 0.5, 1e-6)
+        monkeypatch.setattr(selection, "simplest_first", lambda found, _: found)
+        monkeypatch.setattr(selection, "merit_of", lambda _, best, *__: None if best is tried[0] else worth)
+        monkeypatch.setattr(selection, "removes", lambda *_: removes)
         records = SimpleNamespace(extensions=lambda *_: tried, gap=1.0)
         found = selection._step(object(), 1.0, records)  # type: ignore[arg-type]
         assert found is not None

@@ -16,19 +16,18 @@ from recordings import brute_output, wander
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.diagnosis.data import bad_samples, channels, periodic, spectra, stick_slip
-from hystgen.diagnosis.data.drives import one_loop, one_speed, reversals
+from hystgen.diagnosis.data import disturbances, preparing, signals
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.findings import intervals, residual
+from hystgen.diagnosis.data.signals import one_loop, one_speed, reversals
+from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, Saturated
 from hystgen.diagnosis.findings.kinds import Structure as Remaining
-from hystgen.diagnosis.search import fits, nominal
-from hystgen.diagnosis.search.actuator import Actuator
-from hystgen.diagnosis.search.structure import Part, Structure
+from hystgen.diagnosis.search import fits, hypothesis
+from hystgen.diagnosis.search.hypothesis import Actuator, Part, Structure
 from hystgen.effects import shapes
 from hystgen.effects.base import About, Run
-from hystgen.identification import stretches
-from hystgen.identification.fronts import Kept
+from hystgen.identification import faults
+from hystgen.identification.joint import Kept
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -97,21 +96,21 @@ class TestSilence:
         items = session(colour)
         if grain:
             items = [changed(item, grain * np.round(item.y / grain)) for item in items]
-        same, told = bad_samples.without_faults(items, [])
-        assert told == []
+        same, reported = preparing.without_faults(items, [])
+        assert reported == []
         assert same == items
-        assert [stretches.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
-        assert periodic.lines(items, errors(items))[0] == []
-        assert stick_slip.stick_slip(items, errors(items), NOISE) == []
+        assert [faults.rails(item.y, item.run.v) for item in items] == [[]] * len(items)
+        assert disturbances.lines(items, errors(items))[0] == []
+        assert disturbances.stick_slip(items, errors(items), NOISE) == []
 
     def test_without_noise(self) -> None:
         """Holds of a simulation are equal samples, and no fault."""
         items = [changed(item, plant(item.run.v)) for item in session()]
-        assert bad_samples.without_faults(items, [])[1] == []
+        assert preparing.without_faults(items, [])[1] == []
 
     def test_records_as_they_should_be(self) -> None:
-        kept, told = check(records())
-        assert told == []
+        kept, reported = check(records())
+        assert reported == []
         assert [one.name for one in kept if one is not None] == [each.name for each in records()]
 
 
@@ -125,10 +124,10 @@ class TestWrongSamples:
             for a, b in runs:
                 y[a:b] = -3.0 if constant else -3.0 + noise(b - a, a)
             items[k] = changed(items[k], y)
-        clean, told = bad_samples.without_faults(items, [])
-        assert [each.record for each in told] == ["r0.csv", "r2.csv", "r3.csv"]
+        clean, reported = preparing.without_faults(items, [])
+        assert [each.record for each in reported] == ["r0.csv", "r2.csv", "r3.csv"]
         for k, runs in places.items():
-            each = of_kind(DropOuts, told, f"r{k}.csv")
+            each = of_kind(DropOuts, reported, f"r{k}.csv")
             assert each.count == len(runs)
             assert each.samples == sum(b - a for a, b in runs)
             assert each.first == items[k].run.t[runs[0][0]]
@@ -144,10 +143,10 @@ class TestWrongSamples:
         v = np.repeat([0.0, 80.0, 20.0, 100.0, 40.0], 4000)
         y = lfilter([sum(down)], down, plant(v)) + noise(len(v), 5)
         item = Item("steps.csv", Run(np.arange(len(v)) * STEP, v), y, HISTORY, float(np.ptp(y)))
-        assert bad_samples.without_faults([item], [])[1] == []
+        assert preparing.without_faults([item], [])[1] == []
         y = y.copy()
         y[6000:6030] = -30.0
-        (each,) = bad_samples.without_faults([changed(item, y)], [])[1]
+        (each,) = preparing.without_faults([changed(item, y)], [])[1]
         assert (each.kind, each.samples) == ("drop_outs", 30)
 
     def test_held_samples(self) -> None:
@@ -157,8 +156,8 @@ class TestWrongSamples:
         for a, b in runs:
             y[a:b] = y[a]
         items[0] = changed(items[0], y)
-        clean, told = bad_samples.without_faults(items, [])
-        (each,) = told
+        clean, reported = preparing.without_faults(items, [])
+        (each,) = reported
         assert (each.kind, each.record, each.count) == ("held_samples", "r0.csv", 3)
         assert each.samples == sum(b - a for a, b in runs)
         assert each.first == items[0].run.t[200]
@@ -166,12 +165,12 @@ class TestWrongSamples:
 
     def test_a_converter_at_its_end(self) -> None:
         items = [changed(item, np.minimum(item.y, 9.0)) for item in session()]
-        found = [stretches.rails(item.y, item.run.v) for item in items]
+        found = [faults.rails(item.y, item.run.v) for item in items]
         assert found[0] == [("largest", 9.0)]
         repaired = [Saturated("r0.csv", None, "largest", 9.0, 1)]
-        assert bad_samples.not_at_the_end(repaired, items) == repaired
-        clean, told = bad_samples.without_faults(items, repaired)
-        assert {each.kind for each in told} == {"saturated"}
+        assert preparing.not_at_the_end(repaired, items) == repaired
+        clean, reported = preparing.without_faults(items, repaired)
+        assert {each.kind for each in reported} == {"saturated"}
         for item, left in zip(items, clean, strict=True):
             at = np.flatnonzero(item.y == 9.0)
             assert np.count_nonzero(np.isnan(left.y)) >= np.count_nonzero(np.diff(at) == 1)
@@ -179,7 +178,7 @@ class TestWrongSamples:
     def test_held_at_the_top_is_no_end_of_the_converter(self) -> None:
         items = session()
         repaired = [Saturated("r2.csv", None, "largest", 6.0, 30)]
-        (each,) = bad_samples.not_at_the_end(repaired, items)
+        (each,) = preparing.not_at_the_end(repaired, items)
         assert each == HeldSamples("r2.csv", None, 1, 30)
 
 
@@ -191,7 +190,7 @@ class TestPeriodic:
         items[:4] = [
             changed(item, item.y + 0.03 * np.sin(2 * np.pi * frequency * item.run.t + 1.0)) for item in humming
         ]
-        (line,), left = periodic.lines(items, errors(items))
+        (line,), left = disturbances.lines(items, errors(items))
         assert line.kind == "line"
         assert line.frequency == pytest.approx(frequency, abs=0.05)
         assert line.amplitude == pytest.approx(0.03, rel=0.06)
@@ -203,7 +202,7 @@ class TestPeriodic:
         items = [
             changed(item, item.y + 0.05 * np.sin(2 * np.pi * plant(item.run.v) / 0.4 + 0.7)) for item in session(0.5)
         ]
-        (ripple,), left = periodic.lines(items, errors(items))
+        (ripple,), left = disturbances.lines(items, errors(items))
         assert ripple.kind == "ripple"
         assert ripple.pitch == pytest.approx(0.4, rel=0.003)
         assert ripple.amplitude == pytest.approx(0.05, rel=0.06)
@@ -216,18 +215,18 @@ class TestPeriodic:
         v = np.repeat([0.0, 60.0, 20.0, 100.0, 40.0, 80.0, 0.0, 30.0], 5000)
         still = Item("still.csv", Run(np.arange(len(v)) * STEP, v), plant(v) + noise(len(v), 7), HISTORY, 10.0)
         items = [*moving, still]
-        (ripple,), left = periodic.ruling(items, errors(items))
+        (ripple,), left = disturbances.ruling(items, errors(items))
         assert (ripple.pitch, ripple.amplitude) == (pytest.approx(0.4, rel=0.003), pytest.approx(0.05, rel=0.06))
         assert ripple.records == tuple(item.name for item in moving)
         assert np.std(np.concatenate(left[:-1])) == pytest.approx(NOISE, rel=0.1)
 
     def test_codes_of_a_converter_are_no_interpolation_error(self) -> None:
         items = [changed(item, 0.1 * np.round(item.y / 0.1)) for item in session(0.5)]
-        (ripple,), _ = periodic.lines(items, errors(items))
+        (ripple,), _ = disturbances.lines(items, errors(items))
         assert (ripple.pitch, ripple.converter_step) == (pytest.approx(0.1, rel=0.003), True)
         assert ripple.sentence("um").endswith("its pitch is the step of the converter")
         finer = [changed(item, item.y + 0.01 * np.sin(2 * np.pi * plant(item.run.v) / 0.1)) for item in session(0.5)]
-        (ripple,), _ = periodic.lines(finer, errors(finer))
+        (ripple,), _ = disturbances.lines(finer, errors(finer))
         assert ripple.converter_step is False
         assert "interpolation error" in ripple.sentence("um")
 
@@ -243,7 +242,7 @@ class TestPeriodic:
                 way = np.sign(np.gradient(v)) if ways == "turned" else 1.0
                 y = plant(v) + way * ripple + noise(len(t), k)
                 items.append(Item(f"r{k}", Run(t, v), y, HISTORY, 10.0))
-            made[ways] = [each for each in periodic.lines(items, errors(items))[0] if each.kind == "ripple"]
+            made[ways] = [each for each in disturbances.lines(items, errors(items))[0] if each.kind == "ripple"]
         assert len(made["both"]) == 1
         assert made["turned"] == []
 
@@ -256,11 +255,11 @@ class TestPeriodic:
         left = np.diff(v, prepend=0.0)[(np.arange(len(t)) // 2500) * 2500] * 0.05
         left = left * np.exp(-damping * omega * since) * np.cos(omega * since) + noise(len(t), 3)
         item = Item("steps.csv", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        (heard, *_) = spectra.ringing([item], [left], 3)
+        (heard, *_) = signals.ringing([item], [left], 3)
         assert heard == pytest.approx(47.0, rel=0.01)
-        assert periodic.ruling([item], [left])[0] == []
+        assert disturbances.ruling([item], [left])[0] == []
         steady = 0.2 * np.sin(2 * np.pi * 47.0 * t) + noise(len(t), 3)
-        (line,), rest = periodic.ruling([item], [steady])
+        (line,), rest = disturbances.ruling([item], [steady])
         assert line.frequency == pytest.approx(47.0, abs=0.01)
         assert np.std(rest[0]) == pytest.approx(NOISE, rel=0.02)
 
@@ -269,18 +268,18 @@ class TestPeriodic:
         v = 50.0 - 50.0 * np.cos(2 * np.pi * 5.0 * t)
         left = 0.05 * np.cos(2 * np.pi * 15.0 * t) + 0.03 * np.sin(2 * np.pi * 25.0 * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        assert [each for each in periodic.lines([item], [left])[0] if each.kind == "line"] == []
+        assert [each for each in disturbances.lines([item], [left])[0] if each.kind == "line"] == []
 
     @pytest.mark.parametrize(("frequency", "seen"), [(10.6, False), (13.0, True), (50.0, True)])
     def test_harmonics_of_a_drive_that_swells_are_no_lines(self, frequency: float, seen: bool) -> None:
         """It never repeats itself."""
         t = np.asarray(np.arange(4000) * STEP, dtype=np.float64)
         v = 50.0 - np.linspace(10.0, 50.0, len(t)) * np.cos(2 * np.pi * 5.3 * t)
-        assert spectra.repetition(v) is None
+        assert signals.repetition(v) is None
         left = 0.05 * np.cos(2 * np.pi * frequency * t) + noise(len(t), 1)
         item = Item("a", Run(t, v), plant(v) + left, HISTORY, 10.0)
-        told = [each.frequency for each in periodic.lines([item], [left])[0] if each.kind == "line"]
-        assert told == ([pytest.approx(frequency, abs=0.01)] if seen else [])
+        reported = [each.frequency for each in disturbances.lines([item], [left])[0] if each.kind == "line"]
+        assert reported == ([pytest.approx(frequency, abs=0.01)] if seen else [])
 
 
 def sticking(y: Array, distance: float, seed: int) -> tuple[Array, list[int]]:
@@ -319,7 +318,7 @@ def test_stick_slip() -> None:
     for k in (0, 1):
         y, jumps[k] = sticking(plant(items[k].run.v), 0.3, k)
         items[k] = changed(items[k], y + noise(len(y), k))
-    found = stick_slip.stick_slip(items, errors(items), NOISE)
+    found = disturbances.stick_slip(items, errors(items), NOISE)
     assert [each.record for each in found] == ["r0.csv", "r1.csv"]
     for k, each in zip((0, 1), found, strict=True):
         assert each.count == pytest.approx(len(jumps[k]), rel=0.15)
@@ -330,9 +329,9 @@ def test_stick_slip() -> None:
 @pytest.mark.parametrize("tau", [5.0, 40.0])
 def test_a_lag_and_ringing_are_no_stick_slip(tau: float) -> None:
     items = [changed(item, lfilter(*_smooth(tau), item.y)) for item in session()]
-    assert stick_slip.stick_slip(items, errors(items), NOISE) == []
+    assert disturbances.stick_slip(items, errors(items), NOISE) == []
     ringing = [changed(item, lfilter([0.15], [1.0, -1.8, 0.95], item.y)) for item in session()]
-    assert stick_slip.stick_slip(ringing, errors(ringing), NOISE) == []
+    assert disturbances.stick_slip(ringing, errors(ringing), NOISE) == []
 
 
 def records() -> list[Record]:
@@ -347,7 +346,7 @@ def check(
 ) -> tuple[list[Record | None], list[Finding]]:
     """Against a nominal model that is 20 % off."""
     model = Actuator(np.array(THRESHOLDS), (), ()), 1.2 * np.array(weights)
-    return channels.checked(given, lambda record: nominal.predicted(record, *model, HISTORY))
+    return preparing.checked(given, lambda record: hypothesis.predicted(record, *model, HISTORY))
 
 
 class TestWholeRecords:
@@ -391,9 +390,9 @@ class TestWholeRecords:
     def test_exchanged_columns_are_put_right(self, which: set[int]) -> None:
         given = records()
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
-        kept, told = check(wrong)
-        assert {each.record for each in told} == {f"r{k}.csv" for k in which}
-        assert {each.kind for each in told} == {"swapped_channels"}
+        kept, reported = check(wrong)
+        assert {each.record for each in reported} == {f"r{k}.csv" for k in which}
+        assert {each.kind for each in reported} == {"swapped_channels"}
         for one, right in zip(kept, given, strict=True):
             assert one is not None
             np.testing.assert_array_equal(one.v, right.v)
@@ -412,9 +411,9 @@ class TestWholeRecords:
             out = brute_output(np.concatenate([HISTORY, record.v]), THRESHOLDS, tuple(nominal_weights.tolist()), 0.0)
             given.append(replace(record, y=out[len(HISTORY) :] + gain * noise(len(record.v), 30 + k)))
         wrong = [replace(r, v=np.asarray(r.y), y=r.v) if k in which else r for k, r in enumerate(given)]
-        kept, told = check(wrong, nominal_weights)
-        assert [each.record for each in told] == [f"r{k}.csv" for k in sorted(which)]
-        assert {each.kind for each in told} == {"swapped_channels"}
+        kept, reported = check(wrong, nominal_weights)
+        assert [each.record for each in reported] == [f"r{k}.csv" for k in sorted(which)]
+        assert {each.kind for each in reported} == {"swapped_channels"}
         assert all(one is not None and np.array_equal(one.v, r.v) for one, r in zip(kept, given, strict=True))
 
     def test_exchanged_columns_without_a_loop(self) -> None:
@@ -427,8 +426,8 @@ class TestWholeRecords:
     def test_outputs_exchanged_between_records(self) -> None:
         given = records()
         given[1], given[4] = replace(given[1], y=given[4].y), replace(given[4], y=given[1].y)
-        kept, told = check(given)
-        assert [(each.kind, each.record, each.other) for each in told] == [
+        kept, reported = check(given)
+        assert [(each.kind, each.record, each.other) for each in reported] == [
             ("exchanged_records", "r1.csv", "r4.csv"),
             ("exchanged_records", "r4.csv", "r1.csv"),
         ]
@@ -439,7 +438,7 @@ class TestDescription:
     def described(self, left: Sequence[Array]) -> Remaining:
         items = session()
         with_noise = [e + noise(len(e), k) for k, e in enumerate(left)]
-        return residual.described(items, with_noise, NOISE, ())
+        return content.described(items, with_noise, NOISE, ())
 
     def test_even_in_the_drive(self) -> None:
         found = self.described([0.1 * (((item.run.v - 50.0) / 50.0) ** 2 - 0.35) for item in session()])
@@ -475,7 +474,7 @@ class TestDescription:
 
     def test_loop_centre(self) -> None:
         v = np.concatenate([np.linspace(0, 100, 101), np.linspace(99, 60, 40), np.linspace(61, 80, 20)])
-        centre = residual.loop_centre(v)
+        centre = content.loop_centre(v)
         assert centre[-1] == pytest.approx(80.0, abs=1.5)
         assert reversals(v) == pytest.approx([100, 140], abs=2)
 
@@ -506,7 +505,7 @@ class TestIntervals:
         (candidate,) = kind.candidates(about)
         form = Structure(np.array(THRESHOLDS), Kept(), (Part("lag", candidate),))
         found = fits.fit(form, items, form.start, np.array(WEIGHTS))
-        (sure,) = intervals.intervals(found, items).parts
+        (sure,) = fits.intervals(found, items).parts
         (effect,) = form.effects(found.shape)
         return effect.time_constant, sure["time_constant"]  # type: ignore[attr-defined]
 
@@ -537,7 +536,7 @@ class TestIntervals:
 
 
 def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
-    """Drop-outs do not spoil the fit, hum is told and nothing is named, and the page says so."""
+    """Drop-outs do not spoil the fit, hum is reported and nothing is named, and the page says so."""
     given, hum = records(), records()
     for k, record in enumerate(hum):
         hum[k] = replace(record, y=np.asarray(record.y) + 0.06 * np.sin(2 * np.pi * 50.0 * record.t))

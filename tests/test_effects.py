@@ -26,8 +26,9 @@ from hystgen.basics import parallel
 from hystgen.basics.problems import EffectsError
 from hystgen.cascade import PI, Cascade
 from hystgen.chain.chain import VISIT, Chain, in_order, join
-from hystgen.effects import About, Effect, Place, Run, recursions
+from hystgen.effects import About, Effect, Place, Run
 from hystgen.effects.base import Compensated
+from hystgen.effects.rate_dependence import model as rate_dependence
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 
@@ -97,7 +98,7 @@ def uneven(n: int = 1500, seed: int = 1) -> tuple[Array, Array]:
 
 
 def rounding(steps: int, size: float) -> float:
-    """Bound on what rounding does to a linear filter that remembers so many steps, of numbers up to `size`.
+    """Bound on the rounding of a linear filter that remembers a number of steps, of numbers up to `size`.
 
     A step rounds its states and the output 12 times at most, each time by half the spacing of numbers at `size`, and a
     stable filter does not enlarge an error that it has (Higham, Accuracy and Stability of Numerical Algorithms, 2002,
@@ -590,7 +591,7 @@ def test_relaxing_plays_that_threads_share_are_those_computed_one_by_one(monkeyp
     assert len(shared) > 1
     for i in range(1, 12):
         expected = np.empty((1, 3000))
-        recursions.relaxing_plays(
+        rate_dependence.relaxing_plays(
             w, np.diff(t), thresholds[i : i + 1], 4e-3, 1.4, float(thresholds[-1]), np.zeros(1), expected
         )
         assert np.array_equal(found[i], expected[0])
@@ -608,7 +609,7 @@ def test_a_relaxation_over_moves_of_some_roundings(exponent: float) -> None:
         state = x - side * (r + rng.integers(-3, 1000) * 1.8e-15)
         moves.append((x, x + rng.integers(-3, 4) * 1.8e-15, state))
     for x, target, state in moves:
-        left = float(recursions.relaxed(x, target, 0.01, r, tau, exponent, 2.0, state))
+        left = float(rate_dependence.relaxed(x, target, 0.01, r, tau, exponent, 2.0, state))
         assert abs(target - left) <= max(r, abs(x - state)) + 2e-14
 
 

@@ -22,11 +22,10 @@ from recordings import brute_output, columns, noisy, record, wander, write_csv, 
 
 import hystgen
 from hystgen.basics.problems import RecordError
-from hystgen.diagnosis.findings import intervals
-from hystgen.diagnosis.search import nominal
+from hystgen.diagnosis.search import fits, hypothesis
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import IdentificationError, faults, pi, prepared
-from hystgen.identification.fronts import Tanh
+from hystgen.identification import IdentificationError, faults, prepared
+from hystgen.identification.joint import Tanh
 from hystgen.records import Record, no_value, read_record
 
 pytestmark = pytest.mark.thorough
@@ -188,8 +187,8 @@ class TestNoneInCleanRecords:
         for name, v in drives.items():
             y = output(np.asarray(v), noise)
             y = np.round(y / grain) * grain if grain else y
-            (item,), told = prepared.courses([record(np.asarray(v), y)], [0.0], 0)
-            assert told == [], name
+            (item,), reported = prepared.courses([record(np.asarray(v), y)], [0.0], 0)
+            assert reported == [], name
             assert np.array_equal(item.v, v), name
             assert np.isfinite(item.y).all(), name
             courses = [item]
@@ -202,8 +201,8 @@ class TestNoneInCleanRecords:
         sticks = np.floor(output(v, 0.0) / 0.4) * 0.4 + np.random.default_rng(1).normal(0.0, NOISE, len(v))
         backlash = brute_output(v, (0.0, 8.0), (0.0, 0.2), 0.0)
         for y in (sticks, backlash):
-            (item,), told = prepared.courses([record(v, y)], [0.0], 0)
-            assert told == []
+            (item,), reported = prepared.courses([record(v, y)], [0.0], 0)
+            assert reported == []
             assert np.isfinite(item.y).all()
 
     @pytest.mark.data
@@ -213,8 +212,8 @@ class TestNoneInCleanRecords:
         assert len(files) > 3
         for path in [*files, *EXAMPLES.glob("*.csv")]:
             given = read_record(path)
-            made, told = prepared.courses([given], (0.0,), 0)
-            assert told == [], path.name
+            made, reported = prepared.courses([given], (0.0,), 0)
+            assert reported == [], path.name
             assert all(np.isfinite(each.y).all() for each in made), path.name
             assert np.array_equal(np.concatenate([each.v for each in made]), given.v), path.name
 
@@ -415,7 +414,7 @@ class TestTanh:
             size, curvature = rng.uniform(5.0, 40.0, 2), 10.0 ** rng.uniform(-2.0, 1.0, 2)
             up, down = ((size[k], curvature[k], rng.uniform(-4.0, 4.0), 0.0) for k in (0, 1))
             stage = TanhEnvelope(up, down if rng.random() < 0.5 else None)
-            front, shape = nominal.front_of([stage], (0.0, 3.6))
+            front, shape = hypothesis.front_of([stage], (0.0, 3.6))
             (made,) = front.stages(shape)
             assert isinstance(made, TanhEnvelope)
             searched += isinstance(front, Tanh)
@@ -436,7 +435,7 @@ class TestTanh:
         low, high = front.bounds
         for _ in range(200):
             drawn = np.clip(shape + rng.normal(0.0, 4.0, len(shape)), low, high)
-            near = intervals._admissible(Found, drawn)  # type: ignore[arg-type]
+            near = fits._admissible(Found, drawn)  # type: ignore[arg-type]
             assert np.all(front.slack(near) >= np.minimum(front.slack(shape), 0.0))
             front.stages(near)
 
@@ -532,4 +531,4 @@ def test_what_a_file_without_values_is_called(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match=r"2000 of 2000 samples are without a value.*such as .* count as none"):
         read_record(write_csv(tmp_path / "a.csv", v, (y + 10.0) * 1e300))
     with pytest.raises(IdentificationError, match=r"y moves by .* which is no movement in any unit; convert it"):
-        pi.course(record(v, y * 1e-300), None, 0)
+        prepared.course_of(record(v, y * 1e-300), None, 0)

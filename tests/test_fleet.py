@@ -107,17 +107,17 @@ def test_the_command(units: Path, fleet: Path, tmp_path: Path, run: Run) -> None
     code, out, err = run("identify", "--batch", units / "*.csv", "-o", output, "--jobs", 2)
     assert (code, out.split()) == (1, [str(output / "summary.csv")])
     assert tree(output) == tree(fleet)
-    told = err.splitlines()
+    printed = err.splitlines()
     table = rows(output)
     marked = {name: row["outlier_in"] for name, row in table.items() if row["outlier"] == "yes"}
-    assert told[0] == (
+    assert printed[0] == (
         f"{SOUND + 2} units: {SOUND} done (0 by an earlier call), {len(marked)} of them outliers; 2 failed"
     )
     failed = [["failed", name, *table[name]["message"].split()] for name in ("garbage", "nothing")]
-    assert [line.split() for line in told[1:-1]] == [
+    assert [line.split() for line in printed[1:-1]] == [
         *failed, *(["outlier", name, *words.split()] for name, words in marked.items())
     ]  # fmt: skip
-    assert told[-1] == f"error: 2 of {SOUND + 2} units failed"
+    assert printed[-1] == f"error: 2 of {SOUND + 2} units failed"
 
 
 @pytest.mark.parametrize("stem", ["SN-100", ODD])
@@ -179,8 +179,8 @@ def test_outliers_by_hand_with_the_planted_ones_among_them(fleet: Path) -> None:
     assert any(words.startswith("held-out") for words in expected["SN_109"])
     for name, row in done.items():
         assert row["outlier"] == ("yes" if name in expected else "no")
-        told = {part.rsplit(" (z ", 1)[0] for part in row["outlier_in"].split("; ")} - {""}
-        assert told == {part.rsplit(" (z ", 1)[0] for part in expected.get(name, ())}
+        printed = {part.rsplit(" (z ", 1)[0] for part in row["outlier_in"].split("; ")} - {""}
+        assert printed == {part.rsplit(" (z ", 1)[0] for part in expected.get(name, ())}
 
 
 def test_few_units_are_not_judged(few: Path, tmp_path: Path, run: Run) -> None:
@@ -496,7 +496,7 @@ def test_without_dask_one_line_says_what_to_install(
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "printed"),
     [
         (["--batch", "none/*.csv", "-o", "new"], "no file matches none/*.csv"),
         (["--batch", "few", "--batch", "none.csv", "-o", "new"], "no file matches none.csv"),
@@ -515,7 +515,7 @@ def test_without_dask_one_line_says_what_to_install(
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_usage(words: list[str], told: str, few: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_usage(words: list[str], printed: str, few: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(few.parent)
     Path("clash").mkdir()
     for name in ("a-1.csv", "a_1.csv", "b.csv"):
@@ -523,7 +523,7 @@ def test_usage(words: list[str], told: str, few: Path, run: Run, monkeypatch: py
     before = tree(few.parent)
     code, out, err = run("identify", *words)
     assert (code, out) == (2, "")
-    assert told in err
+    assert printed in err
     assert "Traceback" not in err
     assert tree(few.parent) == before
     assert not Path("new").exists()

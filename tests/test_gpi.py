@@ -25,7 +25,7 @@ from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 import hystgen
-from hystgen.identification import Fit, constrained, segments
+from hystgen.identification import Fit, pi, reduction
 from hystgen.identification.pi import IdentificationError
 from hystgen.records import Record
 from hystgen.verification import compilers
@@ -258,7 +258,7 @@ class TestSolvers:
         inside = rng.normal(size=k)
         bounds = rng.normal(size=(m, k))
         limits = bounds @ inside - rng.uniform(0.0, 0.5, m)
-        found = constrained.least_squares(matrix, target, bounds, limits)
+        found = pi.least_squares(matrix, target, bounds, limits)
         assert np.all(bounds @ found >= limits - 1e-8)
         other = minimize(
             lambda x: float(np.sum((matrix @ x - target) ** 2)),
@@ -271,14 +271,14 @@ class TestSolvers:
         np.testing.assert_allclose(found, other.x, rtol=0, atol=1e-5)
 
     def test_inequalities_that_contradict_each_other(self) -> None:
-        with pytest.raises(constrained.InfeasibleError):
-            constrained.least_squares(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([1.0, 1.0]))
+        with pytest.raises(pi.InfeasibleError):
+            pi.least_squares(np.eye(1), np.zeros(1), np.array([[1.0], [-1.0]]), np.array([1.0, 1.0]))
 
     @pytest.mark.parametrize("height", [1e6, 1e7, 1e8, 1e9])
     def test_inequalities_that_meet_far_away(self, height: float) -> None:
         """Two lines that meet at (0, height): no more is lost than rounding takes of the angle between them."""
         lines = np.array([[1.0, 1.0 / height], [-1.0, 1.0 / height]])
-        x, y = constrained.least_squares(np.eye(2), np.zeros(2), lines, np.ones(2))
+        x, y = pi.least_squares(np.eye(2), np.zeros(2), lines, np.ones(2))
         eps = np.finfo(np.float64).eps
         assert abs(x) <= 4.0 * eps * height**2
         assert y == pytest.approx(height, rel=16.0 * eps * height)
@@ -294,7 +294,7 @@ class TestSolvers:
         expected = np.column_stack([np.ones(len(v)), brute_plays(v, THRESHOLDS, start), y])
         parts = []
         for a, b in ((0, 100), (100, 101), (101, len(v))):
-            parts.append(segments.rows(v[a:b], y[a:b], np.array(THRESHOLDS), states, True))
+            parts.append(reduction.segment_rows(v[a:b], y[a:b], np.array(THRESHOLDS), states, True))
         found = np.concatenate(parts)
         np.testing.assert_allclose(found.T @ found, expected.T @ expected, rtol=1e-11)
         assert len(found) <= len(v) + 3

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
+import os
 import pydoc
 import subprocess
 import sys
@@ -205,3 +206,25 @@ def test_the_package_itself_imports_nothing() -> None:
     code = "import sys, hystgen; print(*(m for m in sys.modules if m.split('.')[0] in ('hystgen', 'numpy', 'numba')))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert set(loaded) == {"hystgen", "hystgen.basics", "hystgen.basics.version"}
+
+
+# Walks
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("walk", "most"),
+    [
+        ("a recording's column v to weights", 28),
+        ("a weight to its digit in float32 C", 31),
+        ("a sample through the bit reference", 8),
+        ("a recording to a named effect", 59),
+    ],
+)
+def test_walks_stay_short(walk: str, most: int) -> None:
+    """Files of the package that a number passes through on its way: a reader has to follow it."""
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": str(int("bit reference" in walk))}
+    script = Path(__file__).parents[1] / "benchmarks" / "walks.py"
+    run = subprocess.run([sys.executable, script, "--one", walk], capture_output=True, text=True, check=True, env=plain)
+    files = int(run.stdout.removeprefix(walk).split()[0])
+    assert 3 < files <= most, "python benchmarks/walks.py -v lists them"

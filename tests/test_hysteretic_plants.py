@@ -426,7 +426,7 @@ def test_duhem_asks_for_its_slope_along_the_input_alone(allowed: list[float]) ->
 
 
 def test_coleman_and_hodgdon_of_a_small_output() -> None:
-    """In other units of the output, told as its scale, every digit of the tolerance is the same."""
+    """In other units of the output, given as its scale, every digit of the tolerance is the same."""
     size = 2.0**-30
     whole, small = (
         plants.Duhem.coleman_hodgdon(0.8, lambda v, s=s: s * 1.5 * v, lambda _, s=s: s * 0.6, scale=s)

@@ -281,8 +281,8 @@ class TestWeights:
         )
         assert cost(p) == pytest.approx(best.fun, rel=1e-7)
         assert np.sqrt(cost(p)) <= 1.05 * np.sqrt(cost(p_free))
-        (told,) = [text for text in fit.warnings if "p_0" in text]
-        assert told.startswith(f"p_0 was raised from {p_free[0]:.3g} to {p[0]:.3g} so that the model has a usable inv")
+        (warned,) = [text for text in fit.warnings if "p_0" in text]
+        assert warned.startswith(f"p_0 was raised from {p_free[0]:.3g} to {p[0]:.3g} so that the model has a usable")
         assert not any("raised" in text for text in free.warnings)
 
     @pytest.mark.parametrize("sigma", [0.0, 0.02])
@@ -292,8 +292,8 @@ class TestWeights:
         y = noisy(brute_output(v, THRESHOLDS, (0.0, *WEIGHTS[1:]), 0.0), sigma)
         fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS, history=())
         assert fitted(fit)[1][0] == 0.0
-        (told,) = fit.warnings
-        assert told.startswith("p_0 is 0: after each reversal the output stands still")
+        (warned,) = fit.warnings
+        assert warned.startswith("p_0 is 0: after each reversal the output stands still")
         fit.write(tmp_path / "a.yaml")
         with pytest.raises(NotInvertibleError):
             hystgen.load(tmp_path / "a.yaml").inverse()
@@ -765,13 +765,13 @@ class TestRefused:
             hystgen.identify(record(SINE, SINE), **options)
 
     def test_arrays(self) -> None:
-        for v, y, told in (
+        for v, y, warned in (
             (SINE, None, "no measured column y"),
             (SINE, SINE[1:], "400 samples of v and 399 of y"),
             (SINE, NOTHING, "samples without a value"),
             (SINE * 0.0, SINE, "the drive is constant"),
         ):
-            with pytest.raises(IdentificationError, match=told):
+            with pytest.raises(IdentificationError, match=warned):
                 hystgen.identify(Record("made", np.arange(400.0), v, y))
         with pytest.raises(ValueError, match="there is no record to fit"):
             hystgen.identify([])

@@ -182,53 +182,53 @@ class TestMisprints:
     v = np.round((1 + 3 * np.sin(2 * np.pi * T)) * 2**20) / 2**20  # whose sums are not rounded
 
     @pytest.fixture
-    def told(self, request: pytest.FixtureRequest) -> str:
+    def errata(self, request: pytest.FixtureRequest) -> str:
         """The rows of the page that name the test."""
         named = f"::{request.node.name}`"
         return "\n".join(" | ".join(row) for row in rows("Misprints and gaps", 5) if named in row[4])
 
-    def test_stop_4(self, told: str) -> None:
+    def test_stop_4(self, errata: str) -> None:
         play = operators.play(self.v, 1.0, 0.375)
         printed = [np.clip(self.v[0] - 0.375, -1, 1)]
         for x in self.v[1:]:
             printed.append(np.clip(x - self.v[0] + printed[-1], -1, 1))
-        assert "M0 = 0.375, play and stop add up to v as (26) demands only with the right one" in told
-        assert f"the printed one is off by up to {off(printed + play, self.v):.2g} |" in told
+        assert "M0 = 0.375, play and stop add up to v as (26) demands only with the right one" in errata
+        assert f"the printed one is off by up to {off(printed + play, self.v):.2g} |" in errata
         assert (operators.stop(self.v, 1.0, 0.375) + play).tolist() == self.v.tolist()
 
-    def test_stop_5(self, told: str) -> None:
+    def test_stop_5(self, errata: str) -> None:
         play, stop = operators.play(self.v, 1.0, 0.375)[0], operators.stop(self.v, 1.0, 0.375)[0]
         wrong = np.clip(self.v[0] + 0.375, -1, 1) + play - self.v[0]
-        assert f"the printed one is off by M0 = {wrong} at t = 0 |" in told
+        assert f"the printed one is off by M0 = {wrong} at t = 0 |" in errata
         assert stop + play == self.v[0]
 
-    def test_series_element_16(self, told: str) -> None:
+    def test_series_element_16(self, errata: str) -> None:
         strain, modulus, r = np.array([0.125, 0.25, 0.5]), 1.0, 1.0
         printed = r * np.sign(np.diff(strain, prepend=0.0))
         right = elastoplastic.series(strain, modulus, r)
-        assert f"at a strain of {strain[0]}, with E = r = {r:g}, the printed one puts the stress" in told
-        assert f"at the yield stress {printed[0]:g}, where (17) has {right.stress[0]}" in told
+        assert f"at a strain of {strain[0]}, with E = r = {r:g}, the printed one puts the stress" in errata
+        assert f"at the yield stress {printed[0]:g}, where (17) has {right.stress[0]}" in errata
         given = -printed[0] * (strain - printed / modulus)[0]
-        assert f"its slider gives an energy of {given} instead of taking any |" in told
+        assert f"its slider gives an energy of {given} instead of taking any |" in errata
         assert right.stress.tolist() == (modulus * strain).tolist()
         assert operators.stop(modulus * strain, r).tolist() == (modulus * strain).tolist()
 
-    def test_width_32(self, told: str) -> None:
+    def test_width_32(self, errata: str) -> None:
         p, r = np.array(EXAMPLE_1.weights), np.array(EXAMPLE_1.thresholds)
         printed = 2 * p[1:] @ r[1:] / p[1:].sum()
-        assert f"Example 1: the printed formula gives {printed:.3f}, the right one {EXAMPLE_1.width:.3f}," in told
+        assert f"Example 1: the printed formula gives {printed:.3f}, the right one {EXAMPLE_1.width:.3f}," in errata
 
-    def test_total_variation(self, told: str) -> None:
+    def test_total_variation(self, errata: str) -> None:
         v = np.array([0.0, *[1.0, -1.0] * 10])
         variation = np.abs(np.diff(v)).sum()
         assert variation > 7 * 2 * EXAMPLE_1.thresholds[-1]
-        assert f"ten swings of +-1 have a total variation of {variation:g}, seven times what is asked" in told
+        assert f"ten swings of +-1 have a total variation of {variation:g}, seven times what is asked" in errata
         high, low = (PI(EXAMPLE_1.thresholds, EXAMPLE_1.weights, start).simulate(v)[-1] for start in (1.0, -1.0))
         rounding = error_bounds(Cascade(EXAMPLE_1, (), 0.0, (-1.0, 1.0)), "float64", "corners").forward
         assert high - low == pytest.approx(0.9, rel=0, abs=rounding)
-        assert "starts of 1 and -1 still give outputs that are 0.9 apart |" in told
+        assert "starts of 1 and -1 still give outputs that are 0.9 apart |" in errata
 
-    def test_start_of_the_inverse(self, told: str) -> None:
+    def test_start_of_the_inverse(self, errata: str) -> None:
         model, u = PI(EXAMPLE_1.thresholds, EXAMPLE_1.weights, 1.0), 10 * np.sin(2 * np.pi * self.T)
         right = model.inverse()
         errors = []
@@ -238,39 +238,39 @@ class TestMisprints:
             errors.append(np.max(np.abs(error)))
             assert np.max(np.abs(error[1000:])) < 1e-13, "wiped"
         assert errors[0] < 1e-14
-        assert "with that start the composition is exact to 1e-14," in told
-        assert f"with 0 it is off by {errors[1]:.3f}, with M0 itself by {errors[2]:.3f}, until" in told
+        assert "with that start the composition is exact to 1e-14," in errata
+        assert f"with 0 it is off by {errors[1]:.3f}, with M0 itself by {errors[2]:.3f}, until" in errata
 
-    def test_example_4_sign(self, told: str) -> None:
+    def test_example_4_sign(self, errata: str) -> None:
         printed = PI(R4, [0.65 * float(np.exp(7.75e-4 * r)) for r in R4]).inverse()
         right = PI_4.inverse()
         z = [inverse.thresholds[6] for inverse in (printed, right)]
-        assert f"z_6 is {z[0]:.3f} with the printed sign and {z[1]:.3f} with the other, and 6.139 is printed" in told
-        assert f"likewise q_1, {printed.weights[1]:.4f} and {right.weights[1]:.4f} |" in told
-        assert f"z_5 = 4.386 | {right.thresholds[5]:.3f} | {right.thresholds[5]:.5f} from the printed numbers" in told
+        assert f"z_6 is {z[0]:.3f} with the printed sign and {z[1]:.3f} with the other, and 6.139 is printed" in errata
+        assert f"likewise q_1, {printed.weights[1]:.4f} and {right.weights[1]:.4f} |" in errata
+        assert f"z_5 = 4.386 | {right.thresholds[5]:.3f} | {right.thresholds[5]:.5f} from the printed numbers" in errata
 
-    def test_example_4_mu(self, told: str) -> None:
+    def test_example_4_mu(self, errata: str) -> None:
         inverse = DEAD_ZONE_4.inverse_map()
         assert inverse.weights[-1] == inverse.weights[0]
-        assert f"mu_j up to 10.226 | {inverse.weights[-1]:.3f} |" in told
+        assert f"mu_j up to 10.226 | {inverse.weights[-1]:.3f} |" in errata
         assert abs(10.226 / inverse.weights[-1] - 1) < 0.12
         eta = np.array([4.765, *ETA])
-        assert f"the slope at the end is only {sum(Decimal(str(x)) for x in eta)}:" in told
+        assert f"the slope at the end is only {sum(Decimal(str(x)) for x in eta)}:" in errata
         moved = []
         for step in 0.5e-3 * np.eye(12):
             other = DeadZone([0, *RHO], (eta + step).tolist()).inverse_map()
             moved.append([other.weights[-1] / inverse.weights[-1], other.thresholds[-1] / inverse.thresholds[-1]])
         most = 100 * np.abs(np.array(moved) - 1).sum(axis=0)
-        assert f"moves mu_11 by up to {most[0]:.1f} %, tau by {most[1]:.1f} % |" in told
+        assert f"moves mu_11 by up to {most[0]:.1f} %, tau by {most[1]:.1f} % |" in errata
 
-    def test_condition_43(self, told: str) -> None:
+    def test_condition_43(self, errata: str) -> None:
         printed = sum(Decimal(str(x)) for x in DEAD_ZONE_4.weights[:11])
-        assert f"the printed sum is {printed}, and the inverse exists |" in told
+        assert f"the printed sum is {printed}, and the inverse exists |" in errata
         assert DEAD_ZONE_4.inverse_problems(-5, 5) == []
         w = DEAD_ZONE_4.forward(np.linspace(-5, 5, 1001))
         assert np.all(np.diff(w) > 0)
 
-    def test_plateau_45_57(self, told: str) -> None:
+    def test_plateau_45_57(self, errata: str) -> None:
         a0, a1, gap = 2.0, 0.5, 0.3
         u = np.array([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.4])
         v = [np.arctanh(x / a0) / a1 if up else np.arctanh((x - gap) / a0) / a1 for x, up in
@@ -282,8 +282,8 @@ class TestMisprints:
         assert error.max() == pytest.approx(gap, rel=0, abs=small)
         assert np.flatnonzero(error > small).tolist() == [4, 5, 8, 9, 10]
         rising, falling = (("first", "second", "third")[np.argmax(error[begin:] > small)] for begin in (2, 7))
-        assert f"branches {gap} apart: from the {rising} sample of a rising plateau on, or the {falling} of a" in told
-        assert f"falling one, the composition is off by {gap}, with the right rule by rounding |" in told
+        assert f"branches {gap} apart: from the {rising} sample of a rising plateau on, or the {falling} of a" in errata
+        assert f"falling one, the composition is off by {gap}, with the right rule by rounding |" in errata
         envelope = TanhEnvelope((a0, a1, 0.0, 0.0), (a0, a1, 0.0, gap))
         model = Cascade(PI([0.0], [1.0]), (envelope,), 0.0, (-2.0, 2.0))
         assert off(model.simulate(model.inverse().simulate(u)), u) <= small

@@ -90,7 +90,7 @@ class TestEach:
                 os.kill(process, 0)
 
 
-class TestCrew:
+class TestPool:
     @pytest.mark.parametrize("jobs", [1, 2, 3])
     def test_what_follows_from_a_result_is_done_in_the_order_of_a_plain_loop(self, jobs: int) -> None:
         def work(k: int) -> int:
@@ -102,8 +102,8 @@ class TestCrew:
             return [10 * k, 10 * k + 1] if k % 2 and k < 100 else []
 
         ticks: list[int] = []
-        with parallel.Crew(work, jobs) as crew:
-            found = crew.each([1, 2, 3, 5], lambda: ticks.append(1), then)
+        with parallel.Pool(work, jobs) as pool:
+            found = pool.each([1, 2, 3, 5], lambda: ticks.append(1), then)
         order = [1, 2, 3, 5, 10, 11, 30, 31, 50, 51, 110, 111, 310, 311, 510, 511]
         assert found == [(k, k * k) for k in order]
         assert len(ticks) == len(order)
@@ -115,10 +115,10 @@ class TestCrew:
             here.append(k)
             return os.getpid(), len(here)
 
-        with parallel.Crew(work, 2) as crew:
-            first = crew.each(range(6))
-            second = crew.each(range(6, 20))
-            assert crew.each([]) == []
+        with parallel.Pool(work, 2) as pool:
+            first = pool.each(range(6))
+            second = pool.each(range(6, 20))
+            assert pool.each([]) == []
         done = {process: 0 for _, (process, _) in first}
         for _, (process, n) in [*first, *second]:
             assert n == done[process] + 1
@@ -137,9 +137,9 @@ class TestCrew:
                 os.kill(os.getpid(), signal.SIGKILL)
             return os.getpid() == first
 
-        with parallel.Crew(work, 2) as crew:
-            crew.each(range(2))
-            later = crew.each(range(5, 15))
+        with parallel.Pool(work, 2) as pool:
+            pool.each(range(2))
+            later = pool.each(range(5, 15))
         assert [k for k, _ in later] == list(range(5, 15))
         assert sum(here for _, here in later) == 0
 
@@ -162,8 +162,8 @@ class TestCrew:
 
     @pytest.mark.parametrize("jobs", [1, 2])
     def test_a_failure_of_what_follows_is_raised(self, jobs: int) -> None:
-        with parallel.Crew(lambda k: 1 // (3 - k), jobs) as crew, pytest.raises(ZeroDivisionError):
-            crew.each([0, 1], then=lambda k, _: [k + 2])
+        with parallel.Pool(lambda k: 1 // (3 - k), jobs) as pool, pytest.raises(ZeroDivisionError):
+            pool.each([0, 1], then=lambda k, _: [k + 2])
 
 
 class TestThreads:
@@ -186,15 +186,15 @@ class TestThreads:
             parallel.in_threads(lambda k: 1 // k, [1, 0, 2])
 
 
-    def test_none_beside_a_crew_at_work(self) -> None:
+    def test_none_beside_a_pool_at_work(self) -> None:
         def work(seconds: float) -> int:
             time.sleep(seconds)
             threads: set[int] = set()
             parallel.in_threads(lambda _: threads.add(threading.get_ident()) or time.sleep(0.05), range(4))  # type: ignore[func-returns-value]
             return len(threads)
 
-        with parallel.Crew(work, 2) as crew:
-            assert crew.each([0.0, 1.0]) == [(0.0, 1), (1.0, 2)]
+        with parallel.Pool(work, 2) as pool:
+            assert pool.each([0.0, 1.0]) == [(0.0, 1), (1.0, 2)]
 
 
 class TestInterrupt:
@@ -240,7 +240,7 @@ class TestInterrupt:
 
 class TestCores:
     def test_those_of_this_process(self) -> None:
-        assert parallel.cores() in (1, min(len(os.sched_getaffinity(0)), parallel.MOST))
+        assert parallel.cores() in (1, min(len(os.sched_getaffinity(0)), parallel.MOST_PROCESSES))
 
     def test_one_beside_another_thread(self) -> None:
         done = threading.Event()

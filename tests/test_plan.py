@@ -18,7 +18,7 @@ import hystgen
 from hystgen import effects
 from hystgen.basics.problems import PlanError
 from hystgen.planning import plan as plans
-from hystgen.report.planned import Plan
+from hystgen.report.plan import Plan
 from tests.plants.__main__ import main as plants
 from tests.plants.effects import catalogue
 
@@ -254,14 +254,14 @@ class TestSeparation:
         (case,) = (tmp_path / "cases").iterdir()
         label = json.loads((tmp_path / "labels" / f"{case.name}.json").read_text())
         assert [effect["name"] for effect in label["effects"]] == [name]
-        told = json.loads((case / "session.json").read_text())
-        assert [d.held_out for d in found.drives] == [f"r{k:02d}.csv" in told["holdout"] for k in range(1, 16)]
-        assert tuple(told["history"]) == found.history
-        assert told["rest"] == pytest.approx(found.rest)
+        spec = json.loads((case / "session.json").read_text())
+        assert [d.held_out for d in found.drives] == [f"r{k:02d}.csv" in spec["holdout"] for k in range(1, 16)]
+        assert tuple(spec["history"]) == found.history
+        assert spec["rest"] == pytest.approx(found.rest)
         content = hystgen.diagnose(
             case / "params.yaml",
-            [case / each for each in told["fit"]],
-            holdout=[case / each for each in told["holdout"]],
+            [case / each for each in spec["fit"]],
+            holdout=[case / each for each in spec["holdout"]],
             history=found.history,
             rest=found.rest,
         ).content

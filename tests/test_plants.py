@@ -97,13 +97,13 @@ class TestApart:
     def test_no_leak_into_what_the_workflow_reads(self, tmp_path: Path) -> None:
         for kind in case.KINDS:
             home = labels.write(case.make(kind, 6, 300), tmp_path, with_rivals=False)
-            told = files(home)
-            assert all(name in ("params.yaml", "session.json") or name.startswith("r") for name in told)
-            assert set(json.loads(told["session.json"])) == {"fit", "holdout", "history", "rest"}
-            texts = told["session.json"] + told["params.yaml"] + home.name.encode()
+            spec = files(home)
+            assert all(name in ("params.yaml", "session.json") or name.startswith("r") for name in spec)
+            assert set(json.loads(spec["session.json"])) == {"fit", "holdout", "history", "rest"}
+            texts = spec["session.json"] + spec["params.yaml"] + home.name.encode()
             words = [*NAMES, *foreign.FAULTS, *case.KINDS, "noise", "seed", "effects"]
             assert not [word for word in words if word.encode() in texts]
-            for name, content in told.items():
+            for name, content in spec.items():
                 if name.endswith(".csv"):
                     assert content.split(b"\n")[0] in (b"t,v,y", b"t,v,y,temperature")
         assert {path.name for path in tmp_path.iterdir()} == {"cases", "labels"}
@@ -114,12 +114,12 @@ class TestApart:
         for kind, seed in (("single", 12), ("pair", 1), ("none", 0), ("poor", 0)):
             made = case.make(kind, seed, 400)
             home = labels.write(made, tmp_path, with_rivals=False)
-            told = json.loads((home / "session.json").read_text())
-            assert told["fit"]
-            assert told["holdout"]
-            assert (told["history"] is None) == (told["rest"] is None)
-            assert sorted(path.name for path in home.glob("*.csv")) == sorted(told["fit"] + told["holdout"])
-            for name in told["fit"] + told["holdout"]:
+            spec = json.loads((home / "session.json").read_text())
+            assert spec["fit"]
+            assert spec["holdout"]
+            assert (spec["history"] is None) == (spec["rest"] is None)
+            assert sorted(path.name for path in home.glob("*.csv")) == sorted(spec["fit"] + spec["holdout"])
+            for name in spec["fit"] + spec["holdout"]:
                 record = read_record(home / name)
                 columns = made.measured[int(name[1:3]) - 1]
                 assert record.notes == ()
@@ -290,13 +290,13 @@ class TestEffects:
         for kind, seed in (("single", NAMES.index("slew_limit")), ("pair", 2)):
             found = made(kind, seed)
             held_out = np.array([record.held_out for record in found.session.records])
-            for item, told in zip(found.present, labels.label(found, with_rivals=False)["effects"], strict=True):
+            for item, spec in zip(found.present, labels.label(found, with_rivals=False)["effects"], strict=True):
                 alone = Plant(found.plant.hysteresis, (item.effect,))
                 fine = alone.respond(found.session)
                 clean = tuple(found.session.sampled(fine, record) for record in found.session.records)
                 assert self.left(replace(found, clean=clean), ~held_out) == pytest.approx(item.to_fit, rel=0.15)
-                assert told["ratio_fit"] == pytest.approx(item.to_fit / found.noise(False))
-                assert told["ratio_fit"] > 1.5
+                assert spec["ratio_fit"] == pytest.approx(item.to_fit / found.noise(False))
+                assert spec["ratio_fit"] > 1.5
 
     def test_strength_is_wanted_in_both_groups_of_records(self) -> None:
         effect = Effect("slew_limit", "current", 1.0, {})
@@ -596,13 +596,13 @@ class TestCommands:
         results = tmp_path / "results"
         assert run.diagnose(home, results, 60.0, (sys.executable, "-c", FAKE)) == 0
         seen = json.loads((results / home.name / "diagnosis.json").read_text())["seen"]
-        told = json.loads((home / "session.json").read_text())
+        spec = json.loads((home / "session.json").read_text())
         assert seen["labels"] == []
         assert seen["files"] == sorted(path.name for path in home.iterdir())
-        assert seen["words"][: len(told["fit"]) + 4] == ["diagnose", "params.yaml", *told["fit"], "-o", "out"]
-        assert [seen["words"][k + 1] for k, w in enumerate(seen["words"]) if w == "--holdout"] == told["holdout"]
+        assert seen["words"][: len(spec["fit"]) + 4] == ["diagnose", "params.yaml", *spec["fit"], "-o", "out"]
+        assert [seen["words"][k + 1] for k, w in enumerate(seen["words"]) if w == "--holdout"] == spec["holdout"]
         history = [w.removeprefix("--history=") for w in seen["words"] if w.startswith("--history=")]
-        assert [[float(x) for x in h.split(",")] for h in history] == ([told["history"]] if told["history"] else [])
+        assert [[float(x) for x in h.split(",")] for h in history] == ([spec["history"]] if spec["history"] else [])
         kept = (results / home.name / "run.json").read_text()
         assert json.loads(kept)["exit"] == 0
         # A case with a result is not run again, so the package is not asked

@@ -31,10 +31,19 @@ from ruamel.yaml import YAML
 from hystgen import cli, identify
 from hystgen.basics import extras
 from hystgen.basics.progress import Progress
-from hystgen.records import LARGEST, Record, RecordError, agreed_units, hdf5, parquet, parse_columns, read_record
+from hystgen.records import (
+    LARGEST,
+    Record,
+    RecordError,
+    agreed_units,
+    csv_file,
+    hdf5,
+    parquet,
+    parse_columns,
+    read_record,
+)
 from hystgen.records import headers as with_units
-from hystgen.records import text as record_text
-from hystgen.records.units import split_unit
+from hystgen.records.columns import split_unit
 
 N = 50
 T = np.arange(N) * 0.001
@@ -152,8 +161,8 @@ def test_names_are_mapped_and_faults_counted_in_every_format(
     kept = np.delete(np.arange(N), [7, 20])
     check(record, t[kept], v[kept], Y[kept])
     where = ("in line 9", "in line 22") if name == "a.csv" else ("at index 7", "at index 20")
-    told = [note for note in record.notes if "dropped" in note]
-    assert told == [
+    reported = [note for note in record.notes if "dropped" in note]
+    assert reported == [
         f"1 sample without a value in v or y or t dropped, the first {where[0]}",
         f"1 sample not later than the sample before dropped, the first {where[1]}",
     ]
@@ -226,12 +235,12 @@ def test_datasets_by_path_and_by_their_last_name(tmp_path: Path) -> None:
     )
     record = read_record(path, parse_columns("t=session2/t,v=here,y=session2/y"))
     check(record, y=2 * Y)
-    told = problems(path, columns={"v": "drive"})
-    assert told[0] == (
+    reported = problems(path, columns={"v": "drive"})
+    assert reported[0] == (
         '2 columns may be meant by "drive": session1/drive, session2/drive; name one with --columns '
         '"v=session1/drive"'
     )
-    assert len(told) == 3
+    assert len(reported) == 3
     (problem,) = problems(path, columns=parse_columns("t=session1/t,v=session1/title,y=session1/y"))
     assert problem.startswith('"session1/title" is no column of numbers; ')
     (problem,) = problems(path, columns=parse_columns("t=session1/t,v=session1/driev,y=session1/y"))
@@ -380,8 +389,8 @@ def test_fields_of_structs_in_both_kinds_of_mat(tmp_path: Path) -> None:
         nothing.attrs["MATLAB_class"] = np.bytes_("double")
         nothing.attrs["MATLAB_empty"] = np.uint8(1)
     for name in ("v5.mat", "v73.mat"):
-        told = problems(tmp_path / name)
-        assert told == [
+        reported = problems(tmp_path / name)
+        assert reported == [
             '2 columns may be meant by "v": data.info.v, data.v; name one with --columns "v=data.info.v"'
             if name == "v73.mat"
             else '2 columns may be meant by "v": data.v, data.info.v; name one with --columns "v=data.v"'
@@ -429,8 +438,8 @@ def test_nulls_and_text_in_parquet(tmp_path: Path) -> None:
 
 def test_columns_called_alike_in_parquet(tmp_path: Path) -> None:
     pq.write_table(pa.Table.from_arrays([pa.array(T), pa.array(V), pa.array(Y)], ["t", "v", "v"]), tmp_path / "a.pq")
-    told = problems(tmp_path / "a.pq")
-    assert told[0] == '2 columns are called "v"; give them different names'
+    reported = problems(tmp_path / "a.pq")
+    assert reported[0] == '2 columns are called "v"; give them different names'
 
 
 @pytest.mark.parametrize("unit", ["s", "ms", "us", "ns"])
@@ -740,19 +749,19 @@ def test_units_that_records_agree_on() -> None:
         [],
     )
     assert agreed_units([record("a", v="V", y="um")], {"input": "V", "output": ""})[0] == {"input": "V", "output": "um"}
-    units, told = agreed_units([record("a.csv", v="V", y="um"), record("b.csv", v="mV", y="um")])
+    units, reported = agreed_units([record("a.csv", v="V", y="um"), record("b.csv", v="mV", y="um")])
     assert units == {"input": "V", "output": "um"}
-    assert told == [
+    assert reported == [
         'the unit of v is "V" in a.csv and "mV" in b.csv; no number was converted, check that they agree'
     ]
-    units, told = agreed_units([record("a.csv", y="nm")], {"output": "um"})
+    units, reported = agreed_units([record("a.csv", y="nm")], {"output": "um"})
     assert units == {"output": "um"}
-    assert told == [
+    assert reported == [
         'the unit of y is "um" given and "nm" in a.csv; no number was converted, check that they agree'
     ]
-    units, told = agreed_units([record("a.csv", v="x" * 41, y="a\nb")])
+    units, reported = agreed_units([record("a.csv", v="x" * 41, y="a\nb")])
     assert units == {}
-    assert len(told) == 2
+    assert len(reported) == 2
 
 
 def swept(path: Path, header: Sequence[str]) -> Path:
@@ -778,15 +787,15 @@ def test_identify_takes_the_units_of_the_records(tmp_path: Path) -> None:
         assert result.exit_code == 0, result.stderr
         return YAML(typ="safe").load(target.read_text()), result.stderr
 
-    content, told = run(one)
+    content, reported = run(one)
     assert content["units"] == {"input": "V", "output": "um"}
-    assert "unit" not in told
-    content, told = run(one, "--holdout", two)
+    assert "unit" not in reported
+    content, reported = run(one, "--holdout", two)
     assert content["units"] == {"input": "V", "output": "um"}
-    assert 'warning: the unit of v is "V" in one.csv and "mV" in two.csv; no number was converted' in told
-    content, told = run(one, "--units", "V,nm")
+    assert 'warning: the unit of v is "V" in one.csv and "mV" in two.csv; no number was converted' in reported
+    content, reported = run(one, "--units", "V,nm")
     assert content["units"] == {"input": "V", "output": "nm"}
-    assert 'warning: the unit of y is "nm" given and "um" in one.csv' in told
+    assert 'warning: the unit of y is "nm" given and "um" in one.csv' in reported
     fit = identify(one, thresholds=2)
     assert (fit.parameters.units.input, fit.parameters.units.output) == ("V", "um")
 
@@ -852,7 +861,7 @@ def test_blocks_of_any_size_give_the_same_numbers(
     cells = awkward(400)
     cells = [row for row in cells if max(map(len, row)) < 25]
     (tmp_path / "a.csv").write_bytes(b"# one" + end.encode() + written(cells, "t,v,y", end))
-    monkeypatch.setattr(record_text, "BLOCK", block)
+    monkeypatch.setattr(csv_file, "BLOCK", block)
     record = read_record(tmp_path / "a.csv")
     check(record, *(np.array([float(row[k]) for row in cells]) for k in range(3)))
     assert len(cells) > 390
@@ -868,8 +877,8 @@ def test_both_ways_through_a_block_round_as_python_does(tmp_path: Path) -> None:
 
 
 def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The places told are those of the file, whichever blocks they are in."""
-    monkeypatch.setattr(record_text, "BLOCK", 256)
+    """The places reported are those of the file, whichever blocks they are in."""
+    monkeypatch.setattr(csv_file, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5)), "ok"] for k in range(2000)]
     header = "t,v,y,state"
     (tmp_path / "good.csv").write_bytes(written(cells, header))
@@ -904,7 +913,7 @@ def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_column_that_turns_out_to_be_text_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record_text, "BLOCK", 256)
+    monkeypatch.setattr(csv_file, "BLOCK", 256)
     cells = [[repr(k * 0.001), repr(float(k % 7)), str(k), repr(float(k % 5))] for k in range(500)]
     cells[300][2] = "fault, \u00b5"
     cells[300][2] = '"' + cells[300][2] + '"'
@@ -946,7 +955,7 @@ def test_a_row_too_long_and_one_too_short_do_not_make_up_for_each_other(tmp_path
 
 
 def test_latin_1_and_binary_parts_far_into_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record_text, "BLOCK", 256)
+    monkeypatch.setattr(csv_file, "BLOCK", 256)
     text = written([[repr(k * 0.001), repr(float(k % 7)), repr(float(k % 5))] for k in range(500)], "t,v,y")
     (tmp_path / "a.csv").write_bytes(text + b"# 20 \xb0C\n# 21 \xb0C\n")
     record = read_record(tmp_path / "a.csv")

@@ -269,10 +269,10 @@ class TestRefuse:
         assert "between cells" in read_record(path).read_as
 
     def test_unusable_delimiter_and_sample_time(self, tmp_path: Path) -> None:
-        told = problems(write(tmp_path / "a.csv", rows()), delimiter=";;", sample_time=-1.0)
-        assert len(told) == 2
-        assert 'the delimiter ";;" is not usable' in told[0]
-        assert "the sample time -1 is not positive" in told[1]
+        reported = problems(write(tmp_path / "a.csv", rows()), delimiter=";;", sample_time=-1.0)
+        assert len(reported) == 2
+        assert 'the delimiter ";;" is not usable' in reported[0]
+        assert "the sample time -1 is not positive" in reported[1]
 
     def test_cells_that_are_no_numbers_each_with_its_place(self, tmp_path: Path) -> None:
         cells = rows()
@@ -281,13 +281,13 @@ class TestRefuse:
         cells[11] = ["1"]
         path = write(tmp_path / "a.csv", cells)
         column = len(cells[4][0]) + 2
-        told = problems(path)
-        assert told[0] == (
+        reported = problems(path)
+        assert reported[0] == (
             f':6:{column}: error: "abc" in column "v" is no number; write a number, or nothing where there is no value'
         )
-        assert told[1].startswith(f":11:{len(','.join(cells[9][:2])) + 2}: error: ")
-        assert told[2] == ":13:1: error: 1 column where the header has 3; complete or remove the line"
-        assert len(told) == 3
+        assert reported[1].startswith(f":11:{len(','.join(cells[9][:2])) + 2}: error: ")
+        assert reported[2] == ":13:1: error: 1 column where the header has 3; complete or remove the line"
+        assert len(reported) == 3
 
     def test_decimal_commas(self, tmp_path: Path) -> None:
         cells = [[cell.replace(".", ",") for cell in row] for row in rows()]

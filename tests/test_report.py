@@ -407,18 +407,18 @@ class TestCommand:
     ) -> None:
         a, _ = self.files(tmp_path)
         monkeypatch.setitem(sys.modules, "matplotlib", None)
-        code, said, told = run("identify", a, "-o", tmp_path / "a.yaml", "--report", tmp_path / "out")
+        code, said, printed = run("identify", a, "-o", tmp_path / "a.yaml", "--report", tmp_path / "out")
         assert (code, said) == (2, "")
-        assert extras.install("plot") in told
+        assert extras.install("plot") in printed
         assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "b.csv"}
 
     def test_a_file_in_the_way_and_an_input_in_the_folder(self, run: Run, tmp_path: Path) -> None:
         a, _ = self.files(tmp_path)
         assert run("identify", a, "-o", tmp_path / "a.yaml", "--report", a / "below")[0] == 2
         a.rename(tmp_path / "loop.png")
-        code, _, told = run("identify", tmp_path / "loop.png", "-o", tmp_path / "a.yaml", "--report", tmp_path)
+        code, _, printed = run("identify", tmp_path / "loop.png", "-o", tmp_path / "a.yaml", "--report", tmp_path)
         assert code == 2
-        assert "would be overwritten" in told
+        assert "would be overwritten" in printed
         assert {path.name for path in tmp_path.iterdir()} == {"loop.png", "b.csv"}
 
 

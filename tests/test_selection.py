@@ -10,7 +10,7 @@ import pytest
 from made_up import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.search import merit, screening, selection
+from hystgen.diagnosis.search import screening, selection
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(bare: bool, eno
     """A first effect removes 0.6 times what it leaves, a further one as much as it leaves; neither less than noise."""
     now: Any = SimpleNamespace(bare=bare)
     records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: left * NOISE)
-    assert merit.leaves_enough(now, records) is (left > enough)
+    assert selection.leaves_enough(now, records) is (left > enough)
 
 
 def test_an_effect_that_needs_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +101,7 @@ def test_one_loop_leaves_open_what_fitted_records_explain_unless_others_bear_it_
         SimpleNamespace(name=name, fitted=SimpleNamespace(rms=0.02), held_out=left, errors=[np.full(100, left)])
         for name, left in (("a", held_out), ("b", 0.8))
     ]
-    assert merit.left_open(now, tried[0], tried, records) == open_  # type: ignore[arg-type]
+    assert selection.left_open(now, tried[0], tried, records) == open_  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("left", "named"), [(0.45, True), (0.55, False)])
@@ -257,9 +257,9 @@ def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.Mon
     def made(name: str, fitted: float) -> Any:
         return SimpleNamespace(name=name, fitted=SimpleNamespace(rms=fitted))
 
-    monkeypatch.setattr(merit, "rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
+    monkeypatch.setattr(selection, "rivals", lambda *_: [made("b", 1.1), made("c", 1.3)])
     now, records = made("", 2.0), SimpleNamespace(noise=NOISE, one_loop=False)
-    assert merit.left_open(now, made("a", 1.0), [], records) == ["b"]  # type: ignore[arg-type]
+    assert selection.left_open(now, made("a", 1.0), [], records) == ["b"]  # type: ignore[arg-type]
 
 
 def test_what_a_shape_leaves_free_is_part_of_the_effect() -> None:
@@ -272,16 +272,16 @@ def test_what_a_shape_leaves_free_is_part_of_the_effect() -> None:
 def test_a_small_share_of_edges_is_a_name_by_the_fitted_records() -> None:
     """Held-out records ruled by what another effect makes of their edges, of which fitted ones have hardly any."""
     records: Any = SimpleNamespace(gap=1.0)
-    assert merit.Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
-    assert merit.Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
-    assert not merit.Merit(0.06, 0.06, 0.9, 1e-9).worth(1.0, records)
+    assert selection.Merit(0.08, 0.0, 0.9, 1e-9).worth(1.0, records)
+    assert selection.Merit(0.06, 0.5, 0.9, 1e-9).worth(1.0, records)
+    assert not selection.Merit(0.06, 0.06, 0.9, 1e-9).worth(1.0, records)
 
 
 def test_nearly_all_that_is_left_is_worth_a_name() -> None:
     """Beside a resonance of some hundred times the noise, say, of which another effect is a few per cent."""
     records: Any = SimpleNamespace(gap=1.0)
-    assert merit.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
-    assert not merit.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
+    assert selection.Merit(0.06, 0.06, 0.15, 1e-9).worth(1.0, records)
+    assert not selection.Merit(0.06, 0.06, 0.4, 1e-9).worth(1.0, records)
 
 
 @pytest.mark.parametrize(("left", "first", "further"), [(0.6, True, True), (0.8, True, False), (0.9, False, False)])
@@ -293,7 +293,7 @@ def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, 
     for bare, accepted in ((True, first), (False, further)):
         now: Any = Made("now", 1, (1.0, 1.0))
         now.bare = bare
-        assert (merit.merit_of(now, best, records) is not None) is accepted
+        assert (selection.merit_of(now, best, records) is not None) is accepted
 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])
@@ -303,7 +303,7 @@ def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> Non
     option: Any = SimpleNamespace(name="better")
     best = screening.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (merit.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (selection.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("own", "accepted"), [(1.0, True), (0.5, False)])
@@ -313,4 +313,4 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     option: Any = SimpleNamespace(name="better")
     best = screening.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (merit.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (selection.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]

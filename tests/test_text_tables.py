@@ -13,9 +13,8 @@ from click.testing import CliRunner
 
 from hystgen import cli
 from hystgen.records import Record, RecordError, parse_columns, read_record, read_records
-from hystgen.records.cells import Dialect
-from hystgen.records.clock import Clock, is_time
-from hystgen.records.units import unit_alone
+from hystgen.records.cells import Clock, Dialect, is_time
+from hystgen.records.columns import unit_alone
 
 N = 60
 T = np.arange(N) * 0.0005

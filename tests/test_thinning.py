@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from hystgen.chain import chain
-from hystgen.diagnosis.data import thinning
-from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.data.items import Item, thinned
+from hystgen.diagnosis.data.items import needed as needed_samples
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Effect, Run
 from hystgen.effects.delay.model import Delay
@@ -53,7 +53,7 @@ def item(v: Array, left: Array, name: str = "made") -> Item:
 
 def needed(v: Array, left: Array) -> NDArray[np.intp]:
     """Places of the samples that are needed."""
-    (mask,) = thinning.needed([item(v, left)], [left], NOISE)
+    (mask,) = needed_samples([item(v, left)], [left], NOISE)
     return np.flatnonzero(mask)
 
 
@@ -64,7 +64,7 @@ def white(number: int) -> Array:
 
 @pytest.mark.parametrize("name", drives())
 def test_plays_at_the_needed_samples_are_those_of_all_samples(name: str) -> None:
-    """A turn that is passed over moves the drive that plays see by so much, and none of them by more (their map is
+    """A turn that is passed over moves the drive that plays see by this amount, and none of them by more (their map is
     Lipschitz)."""
     v = drives()[name]
     at = needed(v, white(len(v)))
@@ -134,7 +134,7 @@ def test_a_column_that_changes_is_kept() -> None:
     column[2001:] = 3.0
     made = item(v, left)
     made = Item("made", Run(made.run.t, v, {"temperature": column}), made.y, (0.0,), 1.0)
-    (mask,) = thinning.needed([made], [left], NOISE)
+    (mask,) = needed_samples([made], [left], NOISE)
     assert mask[2000]
     assert mask[2001]
     assert np.count_nonzero(mask) < 400
@@ -156,12 +156,12 @@ class TestThinned:
             for each, run, part in zip(made, runs, session.parts, strict=True)
         ]
         errors = [each.y - plays(each.run.v) for each in items]
-        masks = thinning.needed(items, errors, NOISE)
+        masks = needed_samples(items, errors, NOISE)
         return [[items[0], items[2]], [items[1]]], [[masks[0], masks[2]], [masks[1]]]
 
     def test_every_so_many_th_is_compared(self) -> None:
         groups, masks = self.groups()
-        for group, few in zip(groups, thinning.thinned(groups, 1000, masks), strict=True):
+        for group, few in zip(groups, thinned(groups, 1000, masks), strict=True):
             step = -(-sum(len(each.y) for each in group) // 1000)
             for each, less in zip(group, few, strict=True):
                 assert np.array_equal(less.y[less.known], each.y[::step])
@@ -170,7 +170,7 @@ class TestThinned:
 
     def test_records_lie_in_the_session_where_they_did(self) -> None:
         groups, masks = self.groups()
-        few = thinning.thinned(groups, 1000, masks)
+        few = thinned(groups, 1000, masks)
         sessions = {id(less.session) for group in few for less in group}
         assert len(sessions) == 1
         for less in (less for group in few for less in group):
@@ -184,15 +184,15 @@ class TestThinned:
         front, end = whole.y.copy(), whole.y.copy()
         front[5600:], end[:5600] = np.nan, np.nan
         groups = [[Item("a", whole.run, y, whole.history, 10.0)] for y in (front, end)]
-        masks = [thinning.needed(group, [group[0].y - plays(v)], NOISE) for group in groups]
-        (first,), (second,) = thinning.thinned(groups, 500, masks)
+        masks = [needed_samples(group, [group[0].y - plays(v)], NOISE) for group in groups]
+        (first,), (second,) = thinned(groups, 500, masks)
         assert first.run is second.run
         assert np.array_equal(first.y[first.known], front[np.isfinite(front)][::12])
         assert np.count_nonzero(second.known) <= 500
 
     def test_few_samples_stay_as_they_are(self) -> None:
         groups, masks = self.groups()
-        assert thinning.thinned(groups, 100_000, masks) == groups
+        assert thinned(groups, 100_000, masks) == groups
 
     def test_what_adds_up_does_over_all_samples(self) -> None:
         """Even where the drive's own noise is passed over."""

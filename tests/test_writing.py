@@ -63,7 +63,7 @@ def test_the_folder_of_a_process_that_lives_stays(tmp_path: Path) -> None:
 
 
 def test_a_folder_goes_though_a_copy_of_the_process_lives(tmp_path: Path) -> None:
-    """Workers of a crew are forks, which inherit the lock."""
+    """Workers of a pool are forks, which inherit the lock."""
     reading, finish = os.pipe()
     with writing.staging(tmp_path) as folder:
         child = os.fork()

@@ -1,10 +1,11 @@
 """The numbers of `hystgen.diagnosis.search.acceptance`, doubled and halved: which fast tests of the diagnosis notice?
 
-    python -m tests.threshold_mutants [--only NAME]... [--tests FILE]... [--seconds 3] [--json FILE]
+    python -m tests.threshold_mutants [--only NAME]... [--tests FILE]... [--seconds 3] [--write]
 
 All fast tests are run once to learn which numbers each of them reads and how long it takes; then, for each number and
-factor, those that read it, the shortest first, until one fails. Exits with 1 if a number is noticed by no test and is
-not in `UNNOTICED`.
+factor, those that read it, the one that noticed before and the shortest first, until one fails. `--write` keeps their
+names in `docs/thresholds.csv`, the runs that would change the numbers. Exits with 1 if a number is noticed by no test
+and is not in `UNNOTICED`.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from __future__ import annotations
 import argparse
 import ast
 import contextlib
+import csv
 import itertools
-import json
 import multiprocessing
 import os
 import signal
@@ -32,6 +33,9 @@ from hystgen.diagnosis.search import acceptance
 ROOT = Path(__file__).parent.parent
 FILES = tuple(f"tests/test_{name}.py" for name in ("acceptance", "selection", "disturbances", "thinning", "diagnosis"))
 FACTORS = (2.0, 0.5)
+
+TABLE = ROOT / "docs" / "thresholds.csv"
+HEAD = ("number", "value", "unit", "noticed when doubled by", "noticed when halved by")
 
 UNNOTICED: dict[str, str] = {}
 """Numbers that no fast test notices, with the reason."""
@@ -151,17 +155,66 @@ def table(files: Sequence[str], seconds: float) -> dict[str, tuple[float, list[s
     return apart(run) or {}
 
 
-def noticed(name: str, factor: float, tests: Sequence[str]) -> bool:
-    """Whether one of the tests fails with the number changed; one file after the other, in the order of the tests."""
+class Failed:
+    """A pytest plugin: the first test that fails."""
+
+    def __init__(self) -> None:
+        self.test = ""
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Keep the name of a test whose call fails, not of one that cannot be prepared."""
+        if report.failed and report.when == "call":
+            self.test = self.test or report.nodeid
+
+
+def noticed(name: str, factor: float, tests: Sequence[str]) -> str:
+    """The test that fails with the number changed, empty for none; one file after the other, in the tests' order."""
     files: dict[str, list[str]] = {}
     for test in tests:
         files.setdefault(test.partition("::")[0], []).append(test)
 
-    def run(chosen: Sequence[str]) -> int:
+    def run(chosen: Sequence[str]) -> str:
         setattr(acceptance, name, changed(getattr(acceptance, name), factor))
-        return int(pytest.main(["-q", "-x", "-p", "no:cacheprovider", *chosen]))
+        failed = Failed()
+        pytest.main(["-q", "-x", "-p", "no:cacheprovider", *chosen], plugins=[failed])
+        return failed.test
 
-    return any(apart(partial(run, chosen)) == pytest.ExitCode.TESTS_FAILED for chosen in files.values())
+    return next((test for chosen in files.values() if (test := apart(partial(run, chosen)))), "")
+
+
+# The table ---------------------------------------------------------------------------------------------------
+
+
+def unit(name: str) -> str:
+    """The unit that stands before the text below a number; of several numbers with a text in common its own."""
+    text = documented()[name]
+    units = [part.partition("]")[0].removeprefix("[") for part in text.split(", [")] if text.startswith("[") else []
+    body = ast.parse(Path(acceptance.__file__).read_text()).body
+    for each in body:
+        if isinstance(each, ast.Assign) and isinstance(each.targets[0], ast.Tuple):
+            together = [target.id for target in each.targets[0].elts if isinstance(target, ast.Name)]
+            if name in together and len(units) == len(together):
+                return units[together.index(name)]
+    return units[0]
+
+
+def recorded() -> dict[str, dict[float, str]]:
+    """Of each number in the table, the test that noticed it times each factor."""
+    if not TABLE.exists():
+        return {}
+    with TABLE.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return {row[HEAD[0]]: {f: row[k] for f, k in zip(FACTORS, HEAD[3:], strict=True)} for row in rows}
+
+
+def write(found: dict[str, dict[float, str]]) -> None:
+    """Write the table of all numbers, in their order."""
+    with TABLE.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(HEAD)
+        for name in names():
+            tests = found.get(name, {})
+            table.writerow([name, getattr(acceptance, name), unit(name), *(tests.get(f, "") for f in FACTORS)])
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -170,7 +223,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--only", action="append", default=[], metavar="NAME")
     parser.add_argument("--tests", action="append", default=[], metavar="FILE")
     parser.add_argument("--seconds", type=float, default=3.0, help="processor time of a fast test")
-    parser.add_argument("--json", type=Path)
+    parser.add_argument("--write", action="store_true", help=f"keep the names of the tests in {TABLE.name}")
     given = parser.parse_args(arguments)
     wrong = set(given.only) - set(names())
     if wrong:
@@ -180,22 +233,25 @@ def main(arguments: Sequence[str]) -> int:
         pytest.main(["--collect-only", "-q", "-p", "no:cacheprovider", *(given.tests or FILES)])
     fast = table(given.tests or FILES, given.seconds)
     print(f"{len(fast)} fast tests, {sum(seconds for seconds, _ in fast.values()):.0f} s")
-    inside, results = read_inside(), {}
+    inside, before = read_inside(), recorded()
     quickest = sorted(fast, key=lambda test: fast[test][0])
     if not given.tests:
         quickest.sort(key=lambda test: FILES.index(test.partition("::")[0]))
+    results: dict[str, dict[float, str]] = {}
     for name in given.only or names():
         readers = [test for test in quickest if name in fast[test][1] or name in inside]
-        found = {str(factor): noticed(name, factor, readers) for factor in FACTORS
-                 if changed(getattr(acceptance, name), factor) != getattr(acceptance, name)}  # fmt: skip
-        results[name] = {"tests": len(readers), **found}
-        said = ", ".join(f"x {factor} {'noticed' if seen else 'NOT noticed'}" for factor, seen in found.items())
+        results[name] = {}
+        for factor in FACTORS:
+            if changed(getattr(acceptance, name), factor) == getattr(acceptance, name):
+                continue
+            known = before.get(name, {}).get(factor, "")
+            results[name][factor] = noticed(name, factor, sorted(readers, key=lambda test: test != known))
+        said = ", ".join(f"x {factor:g} {test or 'NOT noticed'}" for factor, test in results[name].items())
         print(f"{name}: read by {len(readers)} tests; {said}", flush=True)
-        if given.json:
-            given.json.write_text(json.dumps(results, indent=1) + "\n")
-    silent = [name for name, found in results.items() if not any(found[str(f)] for f in FACTORS if str(f) in found)]
-    half = [name for name, found in results.items() if name not in silent and not all(
-        found[str(f)] for f in FACTORS if str(f) in found)]  # fmt: skip
+        if given.write:
+            write(before | results)
+    silent = [name for name, tests in results.items() if not any(tests.values())]
+    half = [name for name, tests in results.items() if name not in silent and not all(tests.values())]
     print(f"{len(results) - len(silent) - len(half)} noticed both ways, {len(half)} one way, {len(silent)} not at all")
     print("not at all: " + (", ".join(silent) or "none"))
     return int(bool(set(silent) - set(UNNOTICED)))

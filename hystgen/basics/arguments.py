@@ -44,7 +44,7 @@ def known_options(call: str, function: Callable[..., Any], given: Iterable[str])
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """The public call with a TypeError that says what was meant where it is given an option that it does not have."""
+    """The public call with a TypeError that suggests the right option where it is given one that it does not have."""
     needed = [each.name for each in inspect.signature(function).parameters.values() if each.default is each.empty]
 
     @functools.wraps(function)
@@ -56,7 +56,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def taking(options_of: Callable[..., Any], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """The same for a call that hands its `**options` on to `options_of`: its signature shows them; `name` is said."""
+    """The same for a call that passes its `**options` to `options_of`; shown in its signature; `name`: for messages."""
     handed = [
         each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for each in inspect.signature(options_of).parameters.values()
@@ -89,7 +89,7 @@ def path(name: str, value: object) -> str:
 
 
 def choice(name: str, value: object, known: Sequence[str]) -> None:
-    """Raise ValueError for what is none of the known words."""
+    """Raise ValueError for a word that is not among the known ones."""
     if not (isinstance(value, str) and value in known):
         raise ValueError(f"{name} {printable(repr(value))} is none of {', '.join(known)}")
 
@@ -104,7 +104,7 @@ def words(name: str, value: object, example: str) -> tuple[str, ...]:
 
 
 def real(name: str, value: object, unit: str) -> float:
-    """A number, whatever its value. Raises TypeError."""
+    """A number of any value. Raises TypeError."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise TypeError(f"{name} is a number of {unit}, not {kind(value)}")
     return float(value)
@@ -155,7 +155,7 @@ def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[s
 
 
 def signal(name: str, value: object) -> NDArray[Any]:
-    """Samples (N,) of real numbers, of whatever type they have. Raises TypeError, and ValueError for another shape."""
+    """Samples (N,) of real numbers, of any type. Raises TypeError, and ValueError for another shape."""
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths

@@ -1,4 +1,4 @@
-"""What the command line does about the terminal, pipe or file behind it, and about the signals that end a process."""
+"""Output of the command line to terminals, pipes and files, and the signals that end its process."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class OutputError(click.ClickException):
 def say(result: str | bytes) -> None:
     """Print a line, or data as they are, on standard output.
 
-    Raises OutputError, and BrokenPipeError where nobody reads any more.
+    Raises OutputError, and BrokenPipeError if the reader is gone.
     """
     with _output():
         click.echo(result, nl=isinstance(result, str))
@@ -61,7 +61,7 @@ def _output() -> Iterator[None]:
 
 
 def _discard(stream: Any) -> None:
-    """Have what is left for a stream thrown away, else the interpreter tries once more when it ends."""
+    """Have the remaining output of a stream thrown away, else the interpreter tries once more when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -69,7 +69,7 @@ def _discard(stream: Any) -> None:
 
 
 class Commands(click.Group):
-    """A command line that ends in good order, whatever is behind its output and whoever ends it.
+    """A command line that ends in good order, for any kind of output and whoever ends it.
 
     SIGTERM and SIGHUP end it as an exception does, so that nothing unfinished is left behind, with the exit code of a
     process that the signal ended. A character that the terminal's code page lacks is written as an escape.
@@ -87,7 +87,7 @@ class Commands(click.Group):
                 sys.exit(2)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an error of the system that is not caught there comes of the output."""
+        """Run the command; an error of the system that it does not catch is one of the output."""
         with _output():
             return super().invoke(ctx)
 

@@ -25,7 +25,7 @@ from typing import Any, Generic, ParamSpec, TypeVar, overload
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# Called once, before the first function is compiled that is not in the cache, with a word to the user
+# Called once, with a message to the user, before the first function that is not in the cache is compiled
 announce: Callable[[str], None] | None = None
 
 ONCE = "compiling for this machine, once: about 20 s"
@@ -65,7 +65,7 @@ class Jit(Generic[P, R]):
 
     @functools.cached_property
     def dispatcher(self) -> Any:
-        """What numba makes of it."""
+        """The function compiled by numba."""
         import numba
 
         _listen()
@@ -88,7 +88,7 @@ class Jit(Generic[P, R]):
 
     @functools.cached_property
     def mark(self) -> str:
-        """What its compiled code depends on, as a word: its source and that of all that it calls, and constants."""
+        """A hash of all that its compiled code depends on: its source and that of all that it calls, and constants."""
         text, functions = repr(OPTIONS), [self]
         for function in functions:
             text += inspect.getsource(function.py_func) + repr(function.targetoptions)

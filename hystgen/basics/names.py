@@ -1,4 +1,4 @@
-"""What a user's words may become in C: the model's name and the text of comments."""
+"""A user's words in C: the model's name and the text of comments."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def name_problem(name: str) -> str | None:
 
     A name is the prefix of every emitted symbol (`NAME_...`) and, in upper case, of every macro, and it names
     the files `NAME.h`, `NAME.c` and `NAME_selftest.h/.c`. Case is ignored in every comparison, because macros
-    are in upper case and some file systems do not tell cases apart.
+    are in upper case and some file systems do not distinguish cases.
     """
     if not name:
         return "is empty; give a name such as stage_x"

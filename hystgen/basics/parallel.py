@@ -22,19 +22,20 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import ForkProcess
 
+
 T = TypeVar("T")
 R = TypeVar("R")
 
-MOST = 16
+MOST_PROCESSES = 16
 """Processes at most; each has its own results in memory."""
 
 _at_work: Sequence[int] | memoryview[int] = (0,)
-"""How many of the crew that this process is one of are at work."""
+"""Number of busy workers in this process's pool."""
 
 def cores() -> int:
-    """How many processes may run here; 1 where they cannot be copied.
+    """Largest number of processes here; 1 where they cannot be copied.
 
-    A lock that another thread holds would stay locked in a copy, and libraries of other systems do not bear it.
+    A lock that another thread holds would stay locked in a copy, and some system libraries do not survive a fork.
     """
     import multiprocessing
 
@@ -45,19 +46,19 @@ def cores() -> int:
 
 def _cores() -> int:
     available = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    return min(available, MOST)
+    return min(available, MOST_PROCESSES)
 
 
 def each(
     work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None] = lambda: None
 ) -> list[R]:
-    """`[work(item) for item in items]` by so many processes; results are pickled, `tick` is called for each of them.
+    """`[work(item) for item in items]` by `jobs` processes; results are pickled, `tick` is called for each of them.
 
     What fails in a process, or takes it down, is repeated here: an exception is raised as in a plain loop.
     """
-    crew: Crew[int, R] = Crew(lambda k: work(items[k]), jobs)
-    with crew:
-        return [result for _, result in crew.each(range(len(items)), tick)]
+    pool: Pool[int, R] = Pool(lambda k: work(items[k]), jobs)
+    with pool:
+        return [result for _, result in pool.each(range(len(items)), tick)]
 
 
 @dataclass(eq=False)
@@ -68,24 +69,24 @@ class _Task(Generic[T, R]):
     after: list[_Task[T, R]] = field(default_factory=list)
 
 
-class Crew(Generic[T, R]):
-    """Up to so many processes for the same work on things that come up one after the other; `with` lets them go.
+class Pool(Generic[T, R]):
+    """Up to `jobs` processes for the same work on items that come up one after the other; `with` ends them.
 
     They are made when the first things come, and see what this process had then; things and results are pickled.
     """
 
     def __init__(self, work: Callable[[T], R], jobs: int) -> None:
         self._work, self._jobs = work, jobs
-        self._hands: dict[Connection, ForkProcess] = {}
+        self._workers: dict[Connection, ForkProcess] = {}
         self._at_work = memoryview(mmap.mmap(-1, mmap.PAGESIZE)).cast("i")  # shared with the copies
 
-    def __enter__(self) -> Crew[T, R]:
+    def __enter__(self) -> Pool[T, R]:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for process in self._hands.values():
+        for process in self._workers.values():
             process.kill()
-        for reach, process in self._hands.items():
+        for reach, process in self._workers.items():
             process.join()
             reach.close()
 
@@ -97,7 +98,7 @@ class Crew(Generic[T, R]):
     ) -> list[tuple[T, R]]:
         """All the things with their results, in the order of a plain loop; `tick` is called for each of them.
 
-        `then`: what is to be done too, from a result; it goes first. What fails in a process, or takes it down, is
+        `then`: further tasks that follow from a result; they go first. What fails in a process, or takes it down, is
         repeated here: an exception is raised as in a plain loop.
         """
         tasks = [_Task[T, R](item) for item in items]
@@ -108,7 +109,7 @@ class Crew(Generic[T, R]):
             tick()
             return task.after
 
-        if self._hands or min(self._jobs, len(tasks)) > 1:
+        if self._workers or min(self._jobs, len(tasks)) > 1:
             self._elsewhere(deque(tasks), finish)
         found = []
         for task in tasks:  # which grows
@@ -123,7 +124,7 @@ class Crew(Generic[T, R]):
         from multiprocessing import connection
 
         self._gather(len(waiting))
-        free = list(self._hands)
+        free = list(self._workers)
         busy: dict[Connection, _Task[T, R]] = {}
         failed = False
         while True:
@@ -141,7 +142,7 @@ class Crew(Generic[T, R]):
                 try:
                     result, failing = reach.recv()
                 except (EOFError, ConnectionResetError):
-                    self._hands.pop(reach).join()
+                    self._workers.pop(reach).join()
                     reach.close()
                     continue
                 free.append(reach)
@@ -150,16 +151,16 @@ class Crew(Generic[T, R]):
                     waiting.extendleft(finish(task, result))
 
     def _gather(self, most: int) -> None:
-        """Make processes as long as there are fewer than things to do."""
+        """Make processes while there are fewer than tasks."""
         import multiprocessing
 
         fork = multiprocessing.get_context("fork")
         # An interrupt is for this process; a copy that got it before it can ignore it would say so
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            while len(self._hands) < min(self._jobs, most):
+            while len(self._workers) < min(self._jobs, most):
                 here, there = fork.Pipe()
-                others = [here, *self._hands]
+                others = [here, *self._workers]
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 try:
                     process.start()
@@ -168,7 +169,7 @@ class Crew(Generic[T, R]):
                     return
                 finally:
                     there.close()
-                self._hands[here] = process
+                self._workers[here] = process
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
@@ -179,9 +180,9 @@ def _serve(
     global _at_work
     _at_work = at_work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for ending in (signal.SIGTERM, signal.SIGHUP):  # what this process does at these is for its original to do
+    for ending in (signal.SIGTERM, signal.SIGHUP):  # the original process answers these signals
         signal.signal(ending, signal.SIG_DFL)
-    gc.freeze()  # looking through what is the parent's would take long, and copy all of it
+    gc.freeze()  # a garbage collection would copy all of the parent's memory
     for each in others:  # its ends, which would keep one copy waiting for the other when the parent is gone
         each.close()
     while True:
@@ -199,7 +200,7 @@ def _serve(
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
     """`work(item)` for all items, in threads that are gone when it is done; compiled work runs side by side there.
 
-    Where other cores have nothing else to do, as when the last of a crew is left with a long task; else a plain loop.
+    Where other cores are idle, as when the last worker of a pool has a long task; else a plain loop.
     """
     room = min(len(items), _cores() // max(1, _at_work[0]))
     if room < 2:
@@ -212,3 +213,13 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
         for _ in pool.map(work, items):
             pass
 
+
+# Threads of the linear algebra -------------------------------------------------------------------------------
+
+
+def one_thread() -> Any:
+    """Context in which linear algebra uses a single thread: on small matrices several wait for each other."""
+    import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
+    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+    return threadpool_limits(1)

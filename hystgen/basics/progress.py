@@ -40,7 +40,7 @@ class Progress:
             self._bar.stop()
 
     def tick(self, work: float) -> None:
-        """So much more is done."""
+        """More work is done, in the unit of `total`."""
         self._done += work
         now = time.monotonic()
         if not self._shown or now < self._next:

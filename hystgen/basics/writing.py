@@ -1,8 +1,8 @@
-"""Files that appear complete or not at all, and folders for what is under way.
+"""Files that appear complete or not at all, and folders for work under way.
 
 Whatever is written is made in a staging folder beside its place and then renamed. The folder goes when the work ends,
 however it ends; what a killed process leaves is removed by the next one that writes to the same place. A lock in it,
-which the system releases with the process, tells the two apart.
+which the system releases with the process, distinguishes the two.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PREFIX = ".hystgen-"
-"""What the names of staging folders begin with."""
+"""Prefix of the names of staging folders."""
 
 _LOCK, _FILES = "lock", "files"
 
 _swept: set[str] = set()
-"""Folders that this process has looked through for what others left."""
+"""Folders in which this process has already looked for leftovers."""
 
 
 @contextlib.contextmanager
@@ -87,7 +87,7 @@ def _new(around: Path) -> tuple[Path, int | None]:
             return place, None
         if lock is not None:
             return place, lock
-        # Another process has taken it for one that was left behind, between its making and its lock
+        # Another process took it for a leftover before it was locked
 
 
 def _hold(place: Path) -> int | None:
@@ -115,7 +115,7 @@ def _hold(place: Path) -> int | None:
 
 
 def destination(path: str | os.PathLike[str]) -> Path:
-    """What is written for `path`: where a link leads, whether or not there is anything. Raises OSError."""
+    """The path to write for `path`: the target of a link, which need not exist. Raises OSError."""
     target = Path(os.path.realpath(path))
     if target.is_symlink():
         raise OSError(errno.ELOOP, "leads back to itself; choose another output", os.fspath(path))
@@ -152,7 +152,7 @@ def try_folder(folder: Path, path: str | os.PathLike[str]) -> None:
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None:
     """Write a file, text as UTF-8, so that it is either the old one or complete.
 
-    A link stays a link, and what is no regular file (a pipe, a terminal) is written to in place. Raises OSError.
+    A link stays a link, and anything but a regular file (a pipe, a terminal) is written in place. Raises OSError.
     """
     target = place_for(path)
     data = content.encode() if isinstance(content, str) else content

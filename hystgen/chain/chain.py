@@ -21,8 +21,8 @@ VISIT = 10.0
 
 VISIT_SAMPLES = 200
 
-GAP = 10.0
-"""Between two records of a session the drive holds if that many median steps lie between them, else it is straight."""
+SESSION_GAP = 10.0
+"""Median steps between two records of a session from which the drive holds in between; else it is straight."""
 
 _BEHIND_OFFSET = 6
 
@@ -56,10 +56,10 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
     """The runs of a session on one time axis.
 
     A record whose times lie behind those before it keeps them (session time), unless a rest would not fit between; any
-    other starts one median step after the record before and its rest. In rests and in gaps of more than `GAP` steps the
-    drive holds, until one step before the next record. The values of `history` are visited before the first record,
-    each on a straight move of `VISIT` seconds from the one before, and the last is held for its rest. Raises ValueError
-    for records of no samples.
+    other starts one median step after the record before and its rest. In rests and in gaps of more than `SESSION_GAP`
+    steps the drive holds, until one step before the next record. The values of `history` are visited before the first
+    record, each on a straight move of `VISIT` seconds from the one before, and the last is held for its rest. Raises
+    ValueError for records of no samples.
     """
     if not runs or any(len(run.t) == 0 for run in runs):
         raise ValueError("a session has records, and each of them samples")
@@ -95,7 +95,7 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
             if times[0] <= end or (run.rest > 0.0 and times[0] < wanted):
                 times = times + (wanted - times[0])
         pause = float(times[0] - t[-1][-1]) if count else 0.0
-        if pause > GAP * step or (run.rest > 0.0 and pause > 1.5 * step):
+        if pause > SESSION_GAP * step or (run.rest > 0.0 and pause > 1.5 * step):
             held = {name: extra[name][-1][-1:] for name in names}
             put(np.array([times[0] - step]), v[-1][-1:], held)
         parts.append(slice(count, count + len(times)))
@@ -173,7 +173,7 @@ class Chain:
 
 
 def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-    """Rows (n+1, N) that the weights sum: the plays as the one effect that moves them says, behind all that bend them.
+    """Rows (n+1, N) that the weights sum: the plays, moved by the one effect that does so, behind all that bend them.
 
     `effects`: those of Place.PLAYS, in order.
     """

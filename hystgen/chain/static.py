@@ -149,13 +149,13 @@ class StaticModel:
 
     @property
     def start_is_defined(self) -> bool:
-        """Whether `G_R^-1`, and with it the drive that a start memory stands for, is unique."""
+        """Whether `G_R^-1`, and with it the drive of a start memory, is unique."""
         pairs = zip(self.stages, self.stage_ranges(True), strict=True)
         return not any(stage.inverse_problems(*ends) for stage, ends in pairs if isinstance(stage, DeadZone))
 
     @cached_property
     def branch_gap(self) -> float:
-        """Bound of how far the branches of G lie apart within `input_range`; 0 with one branch.
+        """Bound of the distance between the branches of G within `input_range`; 0 with one branch.
 
         Both rise, so that between two drives a < b they are nowhere farther apart than L(b) - R(a).
         """

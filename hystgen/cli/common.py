@@ -65,7 +65,7 @@ def guarded(path: str, action: Callable[[], Any]) -> Any:
 
 
 def _reason(error: ValueError | OSError) -> str:
-    """What an error says; of the system's own the file and what is wrong with it."""
+    """The text of an error; for errors of the system the file and the reason."""
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
@@ -116,7 +116,7 @@ def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
 
 
 def keep_inputs(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> None:
-    """Refuse to write over what is read."""
+    """Refuse to overwrite inputs."""
     read = {os.path.realpath(path) for path in inputs}
     for path in outputs:
         if path and os.path.realpath(path) in read:

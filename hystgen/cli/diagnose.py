@@ -25,7 +25,7 @@ from hystgen.cli.common import (
 def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | None, sample_time: float | None) -> None:
     """Write the drive records that a diagnosis needs; prints the files and the command to run on the measured ones."""
     from hystgen.report import drawing
-    from hystgen.report.planned import plan
+    from hystgen.report.plan import plan
 
     def run() -> None:
         drawing.require()
@@ -81,7 +81,8 @@ def diagnose(
     from hystgen import diagnosis
     from hystgen.effects import load_user_effects
     from hystgen.emission import files
-    from hystgen.report import diagnosed, drawing
+    from hystgen.report import diagnosis as report
+    from hystgen.report import drawing
 
     model = load_model(params, effects)
     guarded(params, drawing.require)
@@ -92,7 +93,7 @@ def diagnose(
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
-        found = diagnosed.diagnose(
+        found = report.diagnose(
             model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
         )
         for note in (*found.notes, *found.warnings):

@@ -31,8 +31,7 @@ from typing import Any
 import numpy as np
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.problems import FormatError, Path
-from hystgen.basics.words import counted
+from hystgen.basics.problems import FormatError, Path, counted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import error_bounds, largest_sum
 from hystgen.compensator.layout import FixedTables, first_moves

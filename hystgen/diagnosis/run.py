@@ -10,26 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, threads
-from hystgen.diagnosis.data import channels, disturbances, preparing, starts
+from hystgen.basics import arguments, parallel
+from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.disturbances import Cleaned
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.noise_floor import NoiseFloor, noise_floor
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.findings import intervals
+from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import OtherHistory
 from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
-from hystgen.diagnosis.search import nominal, selection
+from hystgen.diagnosis.search import fits, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
 from hystgen.effects.base import Place
-from hystgen.identification import P0_FLOOR, remarks, stage_content
+from hystgen.identification import P0_FLOOR, quality, stage_content
 from hystgen.identification.fit import visited
-from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError
-from hystgen.identification.thresholds import rounded
-from hystgen.identification.weights import Weights
+from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError, Weights, rounded
 from hystgen.records import Record, Source, read_records, several
 
 if TYPE_CHECKING:
@@ -83,9 +80,9 @@ def diagnose(
         raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
     before = None if history is None else visited(history)
-    with threads.alone(), Progress(STEPS, progress, "diagnosing") as bar:
-        first = nominal.as_given(model.cascade, given)
-        usable, odd = channels.checked(read, lambda record: nominal.predicted(record, *first, before))
+    with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
+        first = hypothesis.as_given(model.cascade, given)
+        usable, odd = preparing.checked(read, lambda record: hypothesis.predicted(record, *first, before))
         to_fit, to_hold = (
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
@@ -108,7 +105,7 @@ def diagnose(
             _inverse(extended, made),
         )
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
-    notes += [*remarks.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
+    notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += done.cleaned.notes(unit)
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
 
@@ -141,7 +138,7 @@ class _Task:
         wrong = self._foreign(history)
         if wrong is None:
             done = self._searched(history)
-            wrong = starts.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
+            wrong = preparing.contradicted(done.cleaned.clean.to_fit, done.found.fitted)
         if wrong is not None or done is None:
             try:
                 done = self._searched(None)
@@ -153,8 +150,8 @@ class _Task:
     def _begun(self, history: History) -> tuple[Prepared, Callable[[Prepared], Fitted]]:
         """The records as they are compared, and how the nominal model is refitted to such records."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest)
-        base, start = nominal.structure_of(self.cascade, self.given, ready)
-        weights = nominal.nominal_weights(self.cascade, base)
+        base, start = hypothesis.structure_of(self.cascade, self.given, ready)
+        weights = hypothesis.nominal_weights(self.cascade, base)
         return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
 
     def _foreign(self, history: History) -> OtherHistory | None:
@@ -166,7 +163,7 @@ class _Task:
             others, refit_others = self._begun(None)
         except IdentificationError:  # everything that is compared depends on it
             return None
-        return starts.bends(ready.to_fit, refit(ready), refit_others(others))
+        return preparing.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
         ready, refit = self._begun(history)
@@ -193,7 +190,7 @@ def _inverse(extended: Parameters, made: Weights) -> Inverse:
     from hystgen.model import cascade_of
 
     problems = cascade_of(extended).inverse_problems()
-    warnings = remarks.about_inverse(np.array(extended.model.pi.weights), made)
+    warnings = quality.about_inverse(np.array(extended.model.pi.weights), made)
     if problems and extended.model.pi.weights[0] > 0.0:
         warnings = [*warnings, f"the model has no inverse: {'; '.join(problems)}"]
     return Inverse(not problems, tuple(warnings))
@@ -240,7 +237,7 @@ def _extended(
             "pi": plays,
             "memoryless": [stage_content(stage) for stage in actuator.stages],
             "output_offset": offset,
-            "effects": [{"name": effect.name, **intervals.entry(effect)} for effect in actuator.effects],
+            "effects": [{"name": effect.name, **fits.entry(effect)} for effect in actuator.effects],
         },
     }
     return make_parameters(content, user_effects=user)

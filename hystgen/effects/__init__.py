@@ -64,6 +64,17 @@ def shapes(name: str) -> tuple[type[Effect], ...]:
     return found
 
 
+def load_compiled() -> None:
+    """Have the compiled parts of all models compiled, or read from the cache, in this process before it forks."""
+    from hystgen.effects import base
+
+    base.load()
+    for name in CATALOGUE:
+        model = importlib.import_module(f"hystgen.effects.{name}.model")
+        if hasattr(model, "load"):
+            model.load()
+
+
 def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from hystgen.basics.words import counted
-from hystgen.effects import watched
+from hystgen.basics.jit import jit
+from hystgen.basics.problems import counted
+from hystgen.effects import guarded
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -219,7 +220,7 @@ class Effect(BaseModel):
     place: ClassVar[Place]
     order: ClassVar[int] = 0
     selector: ClassVar[str] = "shape"
-    """key that tells the shapes of one name apart"""
+    """key that distinguishes the shapes of one name"""
     repeatable: ClassVar[bool] = False
     """whether a model may have several of this name"""
     timed: ClassVar[bool] = True
@@ -231,7 +232,7 @@ class Effect(BaseModel):
     fades: ClassVar[bool] = False
     """whether its start state is at rest behind the pause before a record whose history is known"""
     settled: ClassVar[tuple[str, ...]] = ()
-    """keys of conventions, and of numbers that a fit cannot tell from others: a refit leaves them as they are"""
+    """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"
@@ -241,10 +242,10 @@ class Effect(BaseModel):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """A user's own effect may fail or answer anything, and is watched."""
+        """A user's own effect may fail or answer anything, and is guarded."""
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):
-            watched.watch(cls, Effect, str(words[0]))
+            guarded.guard(cls, Effect, str(words[0]))
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""
@@ -301,7 +302,7 @@ class Effect(BaseModel):
         return y
 
     def added(self, run: Run) -> Array:
-        """ADDED: what is added to the output (N,)."""
+        """ADDED: the term added to the output (N,)."""
         return np.zeros(len(run.t))
 
     def transients(self, run: Run) -> Array:
@@ -350,3 +351,33 @@ def decays(steps: Array, time_constant: float) -> tuple[Array, Array, Array]:
         # 1 - (1 - E)/s loses its digits for short steps
         late = np.where(s < 1e-3, s * (0.5 - s * (1.0 / 6.0 - s / 24.0)), 1.0 - mean)
     return decay, 1.0 - late - decay, late
+
+
+# Recursions of several effects, compiled when first used ------------------------------------------------------
+
+
+@jit
+def follow(u: Array, decay: Array, early: Array, late: Array, x: float, out: Array) -> None:
+    """First-order filter from the state `x`: `x_(k+1) = decay_k x_k + early_k u_k + late_k u_(k+1)`."""
+    out[0] = x
+    for k in range(len(u) - 1):
+        x = decay[k] * x + early[k] * u[k] + late[k] * u[k + 1]
+        out[k + 1] = x
+
+
+@jit
+def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Array) -> None:
+    """Add `weight` times `scale xi^2 (c_2 + c_3 xi + ..)`, `xi = u/scale`, to `total`."""
+    for k in range(len(u)):
+        xi = u[k] / scale
+        value = 0.0
+        for c in coefficients[::-1]:
+            value = c + value * xi
+        total[k] += weight * (scale * xi * xi * value)
+
+
+def load() -> None:
+    """Have these compiled, or read from the cache, on two samples."""
+    u, step, out = np.arange(2.0), np.ones(1), np.empty(2)
+    follow(u, step, step, step, 0.0, out)
+    curve(u, 1.0, step, 1.0, out)

@@ -40,7 +40,7 @@ SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
 """Files that are taken from a folder."""
 
 KEPT_IN = ".hystgen"
-"""Folder, inside the output folder, of what is known of every unit that is done."""
+"""Folder, inside the output folder, with the results of finished units."""
 
 FIGURES = (
     "kind", "plays", "p_0", "width", "gain", "output_low", "output_high", "fit_rms", "fit_rms_percent",
@@ -88,7 +88,7 @@ class Fleet:
         return tuple(unit for unit in self.units if unit.outlier)
 
     def summary(self) -> str:
-        """One CSV row a unit: the same bytes in whatever order and by whatever number of processes they were fitted."""
+        """One CSV row a unit: the same bytes for any order and number of processes."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(COLUMNS)
@@ -123,7 +123,7 @@ class Fleet:
 
 @dataclass(frozen=True)
 class _Job:
-    """What is to be done for a unit; `key`: hash of all that its outputs depend on."""
+    """The work for a unit; `key`: hash of everything that its outputs depend on."""
 
     unit: str
     file: str
@@ -283,7 +283,7 @@ def _digest(path: Path) -> str | None:
 
 
 def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
-    """The units that an earlier call left done; a warning where what it noted of some cannot be read."""
+    """The units finished by an earlier call; a warning if its notes on some cannot be read."""
     rows = {}
     unreadable = []
     for job in jobs:
@@ -302,7 +302,7 @@ def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
 
 
 def _kept(folder: Path, job: _Job) -> Unit | None:
-    """The unit as an earlier call left it; None if it left nothing, or anything has changed since.
+    """The unit as an earlier call finished it; None if it did not, or anything has changed since.
 
     Raises OSError, ValueError or RecursionError for notes that no call has written so.
     """
@@ -327,7 +327,7 @@ def _kept(folder: Path, job: _Job) -> Unit | None:
 
 
 def _keep(folder: Path, job: _Job, result: Result) -> Unit:
-    """Write what a unit gave, and last that it is done."""
+    """Write the files of a unit, and last the note that it is done."""
     message = result.message
     try:
         written = []

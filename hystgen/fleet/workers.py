@@ -43,7 +43,7 @@ class SchedulerError(OSError):
 
 @dataclass(frozen=True)
 class Task:
-    """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and what is wanted.
+    """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and the results wanted.
 
     `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
     """
@@ -59,7 +59,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a task: text of the parameter file, C files by name, figures; `message` says what failed."""
+    """The result of a task: text of the parameter file, C files by name, figures; `message` says what failed."""
 
     unit: str
     message: str = ""
@@ -72,7 +72,7 @@ Work = Callable[[Task], Result]
 
 
 def fit_unit(task: Task) -> Result:
-    """Fit and emit one unit. Never raises an Exception: whatever goes wrong is the result's message."""
+    """Fit and emit one unit. Never raises an Exception: a failure is the result's message."""
     if task.version != __version__:
         return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same")
     with writing.temporary() as folder:
@@ -110,7 +110,7 @@ def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
 
 
 def _line(failure: Exception) -> str:
-    """What went wrong, in one line."""
+    """The reason of a failure, in one line."""
     from hystgen.basics.problems import NotInvertibleError
 
     if isinstance(failure, NotInvertibleError):
@@ -146,7 +146,7 @@ def _figures(fit: Any, model: Any) -> dict[str, Any]:
 
 
 def _begin(folder: str, parent: int) -> None:
-    """Set a process up for work: whoever started it, `parent`, ends it and clears up behind it.
+    """Set a process up for work: the process that started it, `parent`, ends it and cleans up.
 
     Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
     a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
@@ -206,13 +206,13 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
             sent.clear()
         finally:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that tasks are given up, where nobody waits for them any more
+                warnings.simplefilter("ignore")  # that tasks are cancelled whose results nobody waits for
                 results.close()
 
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the libraries of a cluster from logging, with tracebacks, what an exception says in one line."""
+    """Keep the libraries of a cluster from logging tracebacks of errors that are reported in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
     before = {logger: logger.level for logger in map(logging.getLogger, [*names, "asyncio"])}
     for logger in before:
@@ -236,7 +236,7 @@ def cluster(address: str) -> Iterator[Any]:
         try:
             get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
             client = Client(address, timeout=PATIENCE, set_as_default=False)
-        except Exception as failure:  # of as many kinds as there are protocols
+        except Exception as failure:  # each protocol has its own
             reason = (str(failure).splitlines() or [type(failure).__name__])[0]
             raise SchedulerError(f"no Dask scheduler answers at {address}: {reason}") from None
         with client:

@@ -17,19 +17,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, threads
+from hystgen.basics import arguments, parallel
 from hystgen.basics.progress import Progress
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.identification import gpi, pi, prepared, reduction, remarks, uncertainty, used
-from hystgen.identification.fit import HELD_OUT, Fit, visited
+from hystgen.identification import gpi, pi, prepared, quality, reduction
+from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import Fitted
-from hystgen.identification.pi import IdentificationError
+from hystgen.identification.pi import IdentificationError, rounded
+from hystgen.identification.quality import Row
 from hystgen.identification.reduction import Course
-from hystgen.identification.report import Row
-from hystgen.identification.thresholds import rounded
-from hystgen.identification.used import Used
 from hystgen.plays import memory
 from hystgen.records import SHORTEST, Record, Source, agreed_units, read_records, several
 
@@ -46,11 +44,13 @@ NEAR_ZERO = 0.01
 """Share of the drive range by which a loading curve may miss 0 and fall back."""
 
 PASSES = 60.0
-"""About so many times the search for a front runs through all samples, for the progress bar."""
+"""Approximate number of times that the search for a front runs through all samples, for the progress bar."""
+
+MOST_PLAYS = 1000
 
 MOST_BREAKS = 64
 
-PARSIMONY = 1.03
+MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
 
@@ -89,11 +89,11 @@ def identify(
     changes nothing here. `name`: C identifier of the model. `units`: `input` and `output`, by default those of the
     records. `skip`: samples at the start of every record that are not compared, though their drive counts.
     `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and nothing
-    is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `weights.fit`; 0 leaves p_0 as it
+    is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as it
     comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
-    actuator: no record tells in which state the firmware will find it. Raises RecordError for unusable files,
+    actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
     """
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
@@ -103,7 +103,7 @@ def identify(
     if not fit_records:
         raise ValueError("there is no record to fit")
     reported = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
-    reported += remarks.repeated(fit_records, held_records)
+    reported += quality.repeated(fit_records, held_records)
     units, conflicts = agreed_units(read, units)
     reported += conflicts
     for record in fit_records if loading_curve else ():
@@ -114,7 +114,7 @@ def identify(
     kinds = gpi.KINDS if model == "auto" else (model,)
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
-    with threads.alone(), Progress(passes * samples, progress, "fitting") as bar:
+    with parallel.one_thread(), Progress(passes * samples, progress, "fitting") as bar:
         prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         if held:
             tried = [_try(courses, held, kind, how, bar) for kind in kinds]
@@ -127,17 +127,17 @@ def identify(
             if reason:
                 reported.append(reason)
             fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, bar.tick)
-    masks = used.of_records(fit_records, compared, False)
+    masks = used_of(fit_records, compared, False)
     if held:
-        masks += used.of_records(held_records, done.held, True)
+        masks += used_of(held_records, done.held, True)
     reported += [text for each in masks for text in each.sentences()]
     errors = [_compare(item, fitted) for item in compared]
-    own = pi.row("fit" if held or not rows else "all", "written", errors)
+    own = Row.of("fit" if held or not rows else "all", "written", errors)
     rows.append(own)
     drive = (min(item.drive_range[0] for item in compared), max(item.drive_range[1] for item in compared))
     if held:
         rows.append(done.held_out)
-        reported += [text for item in held if (text := remarks.outside(item.name, item.v, drive))]
+        reported += [text for item in held if (text := quality.outside(item.name, item.v, drive))]
     reported += [
         f"{item.name}: only {item.used} samples are left once its start memory is known; it hardly counts"
         for item in compared
@@ -145,10 +145,10 @@ def identify(
     ]
     if not loading_curve:  # all of one depends on the start
         largest = float(fitted.solution.thresholds[-1])
-        reported += [text for each in errors if (text := remarks.about_start(each, largest))]
-    reported += remarks.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
-    with threads.alone():
-        sure = uncertainty.intervals(fitted, compared, errors, held_errors)
+        reported += [text for each in errors if (text := quality.about_start(each, largest))]
+    reported += quality.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
+    with parallel.one_thread():
+        sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
     return Fit(
         _parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(reported), sure, masks, before
@@ -167,10 +167,10 @@ def check_options(
     units: Mapping[str, str] | None = None,
     **_: object,
 ) -> tuple[_How, tuple[float, ...] | None]:
-    """What is asked of a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
+    """The request for a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
     arguments.choice("model", model, MODELS)
     p0_floor = arguments.real("p0_floor", p0_floor, "the sum of weights, as a share")
-    how = _How(pi.checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
+    how = _How(_checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
     before = None if history is None else visited(history)
     if loading_curve:
         if before:
@@ -215,7 +215,7 @@ def _try(
     """Fit one kind to courses and compare it with others."""
     fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
     largest = float(fitted.solution.thresholds[-1])
-    settled = [replace(item, first=pi.resettled(fitted.inner(item), largest).first) for item in held]
+    settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in held]
     for item in settled:
         if item.used < SHORTEST:
             raise IdentificationError(
@@ -223,12 +223,12 @@ def _try(
                 f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
             )
     errors = [_compare(item, fitted) for item in settled]
-    return _Tried(fitted, compared, settled, errors, pi.row("held out", "written", errors))
+    return _Tried(fitted, compared, settled, errors, Row.of("held out", "written", errors))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
     """The first, that is the simplest, whose held-out error is about as small as any."""
-    enough = PARSIMONY * min(each.held_out.rms for each in tried)
+    enough = MODEL_PARSIMONY * min(each.held_out.rms for each in tried)
     return next(k for k, each in enumerate(tried) if each.held_out.rms <= enough)
 
 
@@ -245,6 +245,24 @@ def _check_loading_curve(record: Record) -> None:
             f"{record.name} is no initial loading curve: the drive has to rise all the way from 0; give the part of "
             "the record up to the first turn, or leave loading_curve out"
         )
+
+
+def _checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[float, ...] | None:
+    """None, a number of plays, or a list of thresholds that begins with 0. Raises ValueError."""
+    if wanted is None:
+        return None
+    if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool):
+        if not 0 <= wanted <= MOST_PLAYS:
+            raise ValueError(f"thresholds is a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
+        return int(wanted)
+    if isinstance(wanted, str | float | bool):
+        raise ValueError("thresholds is a whole number of plays or a list of thresholds")
+    places = arguments.numbers("thresholds", wanted, "[0, 1.5, 3]")
+    if not places or places[0] != 0.0:
+        places = (0.0, *places)
+    if any(b <= a for a, b in itertools.pairwise(places)):
+        raise ValueError("thresholds are finite, not negative, and rise strictly")
+    return places
 
 
 def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | tuple[float, ...] | None:
@@ -279,7 +297,7 @@ def _trial(
     fronts, ends = [], []
     for item in courses:
         split = round(len(item.v) * (1.0 - HELD_OUT))
-        front = pi.resettled(replace(item, last=split), math.inf)
+        front = replace(item, last=split).resettled(math.inf)
         if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
             return [], kinds[0], [], f"{item.name}: {short}{instead}"
         fronts.append(front)
@@ -290,7 +308,7 @@ def _trial(
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)
     best = tried[chosen]
-    own = pi.row("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
+    own = Row.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
     # of an amplitude that fades the end alone is a smaller range, and no measure for the errors of both
@@ -363,7 +381,7 @@ def identifier_from(text: str) -> str:
 
 __all__ = [
     "MODELS",
-    "PARSIMONY",
+    "MODEL_PARSIMONY",
     "Fit",
     "IdentificationError",
     "Row",

@@ -1,4 +1,4 @@
-"""Faults of a recording that a fit has to be kept from: isolated wrong samples, and gaps.
+"""Faults of a recording that a fit has to be kept from: isolated wrong samples, gaps, and stretches of the output.
 
 Samples that are not compared have no `y` (NaN) in a course; their drive still runs through the plays.
 """
@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.words import counted
-from hystgen.identification.stretches import runs_of
+from hystgen.basics.problems import counted
 from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]
@@ -22,48 +21,48 @@ Flags = NDArray[np.bool_]
 LONGEST = 4
 """Most samples in a row that count as an isolated fault; more are something that the actuator or the sensor did."""
 
-FAR = 8.0
-"""An outlier lies so many standard deviations of its surroundings' scatter from their median."""
+OUTLYING = 8.0
+"""Standard deviations of its surroundings' scatter by which an outlier is off their median."""
 
 LITTLE = 5e-4
 """Least scatter, as a share of the peak-to-peak output: a model of a simulation leaves next to nothing but at its
-kinks, and an error of `FAR` times that in a single sample spoils no fit."""
+kinks, and an error of `OUTLYING` times that in a single sample spoils no fit."""
 
 WINDOW = 15
 """Samples of the running median, more than twice `LONGEST`."""
 
 AROUND, CLEAR = 6, 2.5
-"""It jumps away and back by more than so many times what so many samples on either side move in a step."""
+"""An outlier jumps away and back by more than `CLEAR` times the steps of the `AROUND` samples on either side."""
 
 AT_ONCE = 0.7
-"""Each of the two jumps is at least so much of how far the samples lie from the line between their neighbours."""
+"""Least share of an outlier's distance from the line between its neighbours that each of the two jumps makes up."""
 
 TAIL, NORMAL_TAIL = 0.98, 2.326
 """A quantile of the deviations, and what it is for normal ones of standard deviation one."""
 
 STEP, STEP_OF_RANGE = 3.0, 0.02
-"""A step of the drive is so many times nearly all of its moves (`TAIL`), and such a share of its range."""
+"""A step of the drive is `STEP` times the quantile `TAIL` of its moves, and at least this share of its range."""
 
-MOST = 0.01
+MOST_OUTLIERS = 0.01
 """Largest share of samples that is left out as outliers; beyond it they are no outliers."""
 
 FEW = 2
-"""So many samples are left out of a record in any case: its first and its last."""
+"""Number of samples that may be left out of a record of any length: its first and its last."""
 
-LOST = 25.0
-"""After a gap of so many median steps the drive in between, and with it the memory, counts as unknown."""
+LONG_GAP = 25.0
+"""Median steps of a gap after which the drive in between, and with it the memory, counts as unknown."""
 
 SEEN, SIGMAS = 0.05, 4.0
-"""The output takes notice of a pulse of the drive where it moves by this share of what the drive's range makes it move,
-and by so many standard deviations of its noise."""
+"""The output responds to a pulse of the drive where it moves by this share of the expected motion, and by this number
+of standard deviations of its noise."""
 
 OUT_OF_SCALE = 3.0
-"""Outputs that lie so many ranges of the others beyond them are wrong where the drive does nothing of the kind."""
+"""Outputs this many ranges of the others beyond them are wrong, unless the drive is as far out."""
 
 
 def most(samples: int) -> int:
     """Most samples of a record that are left out as isolated."""
-    return max(FEW, math.ceil(MOST * samples))
+    return max(FEW, math.ceil(MOST_OUTLIERS * samples))
 
 
 def outliers(error: Array, v: Array, swing: float) -> Flags:
@@ -99,7 +98,7 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
         return []
     e = error[known]
     from_middle = np.abs(e - median_filter(e, WINDOW, mode="mirror"))
-    far = from_middle > FAR * max(_scatter(from_middle, FEW), LITTLE * swing)
+    far = from_middle > OUTLYING * max(_scatter(from_middle, FEW), LITTLE * swing)
     return [
         (int(known[first]), int(known[last - 1]) + 1)
         for first, last in runs_of(far)
@@ -108,8 +107,8 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
 
 
 def _scatter(sizes: Array, faulty: int) -> float:
-    """Standard deviation of a normal distribution with the same middle, or tail, as sizes of which the largest may be
-    faulty: a model that misses sharp corners has wide tails, and so has a drive that makes them."""
+    """Standard deviation of a normal distribution with the same median, or tail, as these sizes without the `faulty`
+    largest: a model that misses sharp corners has wide tails, and so has a drive with sharp corners."""
     tail = float(np.quantile(np.sort(sizes)[:-faulty], TAIL)) / NORMAL_TAIL
     return max(1.4826 * float(np.median(sizes)), tail)
 
@@ -196,8 +195,8 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     step = np.abs(np.diff(v))
     # three of them are not small at a sample that stands apart
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
-    least = max(STEP_OF_RANGE * span, FAR * usual_bend)
-    # of as many steps around the two jumps at most `LONGEST` + 1 belong to the pulse, and two to another one
+    least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
+    # at most `LONGEST` + 1 of the steps around the two jumps belong to the pulse, and two to another one
     usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="nearest")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
     n = len(v)
@@ -216,7 +215,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
     """How far the output leaves the line through its surroundings at samples [first, last), and soon after.
 
-    `follows`: what the drive without the pulse makes the output do, about; as much is no notice of the pulse.
+    `follows`: the output's motion expected without the pulse, which is no response to it.
     """
     at_once = _bent(y[max(first - 1, 0) : last + 1])
     near = slice(max(first - 1, 0), last + LONGEST)
@@ -254,14 +253,14 @@ def smooth(record: Record) -> Record:
 
 
 def _beyond(x: Array, times: float) -> Flags:
-    """Samples that lie so many ranges of all but the outermost ones beyond these."""
+    """Samples that lie `times` ranges beyond all but the outermost ones."""
     low, high = _ends(x)
     away = times * (high - low)
     return np.asarray((x < low - away) | (x > high + away))
 
 
 def _ends(x: Array) -> tuple[float, float]:
-    """Least and largest but for as many as may be isolated faults."""
+    """Least and largest sample, not counting as many as may be isolated faults."""
     x = np.sort(x)
     return float(x[min(most(len(x)), len(x) // 2)]), float(x[max(len(x) - 1 - most(len(x)), len(x) // 2)])
 
@@ -293,9 +292,9 @@ class Piece:
 
 
 def between_gaps(record: Record) -> list[Piece]:
-    """The record, cut where so much time is missing that nothing is known of the drive in between."""
+    """The record, cut where the time missing is so long that the drive in between is unknown."""
     steps = np.diff(record.t)
-    cuts = [0, *(np.flatnonzero(steps > LOST * record.sample_time) + 1).tolist(), len(record)]
+    cuts = [0, *(np.flatnonzero(steps > LONG_GAP * record.sample_time) + 1).tolist(), len(record)]
     if len(cuts) == 2:
         return [Piece(record, 0, False)]
     return [
@@ -311,3 +310,156 @@ BRIDGED, NOT_COMPARED = "v jump away and back unseen by y, bridged", "y far from
 def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
     """The sentence that counts isolated wrong samples, given where they are."""
     return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"
+
+
+# Stretches of the output: drop-outs, held samples, a converter at its end ------------------------------------
+
+
+FEWEST_HELD = 6
+"""Fewest equal samples in a row, while the drive moves, that count as held."""
+
+CHANCE = 1e-6
+"""Largest probability of a run of equal samples by chance, in a whole record."""
+
+RAIL = 12
+"""Fewest samples at the very end of the output's range that count as saturated."""
+
+SHARP, USUAL = 8.0, 0.98
+"""A drop-out begins and ends with a step of `SHARP` times the quantile `USUAL` of the steps."""
+
+SWINGS = 0.4
+"""A step beside steps of more than this share of it, but for one, is part of a swing."""
+
+LONGEST_DROP_OUT = 200
+"""Most samples of a drop-out, though never more than a twentieth of the record."""
+
+SHORT = 3
+"""Fewer samples are isolated ones, which the fit leaves out by itself."""
+
+MOVES_ON = 0.01
+"""Least share of its range by which the drive goes on outwards while the output stands at a converter's end."""
+
+SUDDEN = 4.0
+"""A converter's end is reached in steps of less than this many times the steps that the drive makes."""
+
+GRAINS = 8.0
+"""A coarse output is held where the drive moves it by this many of its steps."""
+
+NEAR = 4
+"""Equal samples are counted over this many lengths of the run on either side too: where the drive is slow for a while,
+a coarse converter repeats its codes."""
+
+NOISE_FREE = 1e-9
+"""Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""
+
+
+def sensitivity(y: Array, v: Array) -> float:
+    """Robust sensitivity: the output's spread over the drive's, from quartiles."""
+    spread = float(np.subtract(*np.quantile(v, (0.75, 0.25))))
+    return float(np.subtract(*np.quantile(y, (0.75, 0.25)))) / spread if spread > 0.0 else 0.0
+
+
+def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
+    """Runs [a, b) over which the output leaves at a step, stays away and comes back at a step, as the drive does not.
+
+    What rings does so in several steps.
+
+    `y`: NaN where it is not compared.
+    """
+    known = np.flatnonzero(np.isfinite(y))
+    if len(known) < 100:
+        return []
+    e, w = y[known], v[known]
+    move = sensitivity(e, w) * np.diff(w)
+    level = e - sensitivity(e, w) * w
+    step = np.diff(level)
+    size = np.abs(step)
+    edges = np.flatnonzero(size > SHARP * float(np.quantile(size, USUAL))).tolist()
+    most = min(LONGEST_DROP_OUT, len(known) // 20)
+    found: list[tuple[int, int]] = []
+    end = -1
+    for i, k in enumerate(edges):
+        if k < end:
+            continue
+        j = next((j for j in edges[i + 1 :] if step[j] * step[k] < 0.0), None)
+        if j is None or j - k > most:
+            continue
+        back = abs(level[j + 1] - level[k])
+        inside = (level[k + 1 : j + 1] - np.interp(np.arange(k + 1, j + 1), [k, j + 1], level[[k, j + 1]])) / step[k]
+        follows = max(abs(move[k]), abs(move[j])) > 0.25 * size[k]
+        beside = sorted(size[m] for m in (k - 1, k + 1, j - 1, j + 1) if 0 <= m < len(size))
+        follows = follows or beside[-2] > SWINGS * size[k]
+        if j - k >= SHORT and not follows and back < 0.3 * size[k] and np.min(inside) > 0.5:
+            found.append((int(known[k + 1]), int(known[j]) + 1))
+            end = j
+    return found
+
+
+def held(y: Array, v: Array) -> list[tuple[int, int]]:
+    """Runs [a, b) of equal outputs while the drive moves on, longer than noise and a converter's steps make them."""
+    step = np.diff(y)
+    same = step == 0.0
+    runs = [(a, b) for a, b in runs_of(same) if b - a + 1 >= FEWEST_HELD]
+    known = np.isfinite(step)
+    sizes = np.abs(step[known & ~same])
+    if not runs or len(sizes) < FEWEST_HELD:
+        return []
+    grain = float(np.min(sizes))
+    noise = float(np.median(np.abs(np.diff(y[np.isfinite(y)], 3)))) / 3.0
+    at = np.isfinite(y)
+    real = noise > NOISE_FREE * float(np.ptp(y[at]))
+    slope = sensitivity(y[at], v[at])
+    long = np.zeros(len(same), dtype=bool)
+    for a, b in runs:
+        long[a:b] = True
+    usual = known & ~long
+    chance = (np.count_nonzero(same & usual) + 1) / (np.count_nonzero(usual) + 2)
+    found = []
+    for a, b in runs:
+        moved = slope * float(np.ptp(v[a : b + 1]))
+        catches_up = b < len(step) and bool(abs(step[b]) > 0.5 * moved + slope * abs(v[b + 1] - v[b]))
+        if noise > grain:
+            around = np.concatenate([same[max(a - NEAR * (b - a), 0) : a], same[b : b + NEAR * (b - a)]])
+            likely = max(chance, float(np.mean(around))) if len(around) else chance
+            wrong = likely ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
+        else:  # a coarse converter repeats codes without any fault, and then moves on by one of them
+            wrong = moved > GRAINS * grain and catches_up
+        if wrong:
+            found.append((a, b + 1))
+    return found
+
+
+def rails(y: Array, v: Array) -> list[tuple[str, float]]:
+    """Ends of the output, with their level, at which many samples in a row are equal while the drive moves on outwards.
+
+    An end that is reached and left at a step is none: those are drop-outs. Nor is one where the drive only turns: that
+    is backlash, or a coarse converter.
+    """
+    known = np.isfinite(y)
+    if not known.any():
+        return []
+    found = []
+    step = np.abs(np.diff(y))
+    grain = float(np.min(step[step > 0.0], initial=np.inf))
+    low, high = float(np.min(y[known])), float(np.max(y[known]))
+    between = known & (y > low) & (y < high)
+    if not between.any():
+        return []
+    slope = sensitivity(y[between], v[between])  # samples at either end would flatten it
+    for name, end, sign in (("largest", high, 1.0), ("least", low, -1.0)):
+        least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
+        runs = runs_of(y == end)
+        if not any(b - a >= RAIL and float(np.max(sign * (v[a:b] - v[a]))) > least for a, b in runs):
+            continue
+        follows = np.abs(slope * np.diff(v)) + float(np.nanmedian(step))
+        edges = [k for a, b in runs if b - a >= SHORT for k in (a - 1, b - 1) if 0 <= k < len(step)]
+        sudden = step[edges] / np.maximum(follows[edges], np.finfo(np.float64).tiny)
+        if not np.isfinite(sudden).any() or np.nanmedian(sudden) < SUDDEN:
+            found.append((name, end))
+    return found
+
+
+def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Stretches [a, b) over which flags are set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""A fitted model: its figures, its predictions and its parameter file."""
+"""A fitted model: its figures, its predictions, its parameter file, and the samples compared."""
 
 from __future__ import annotations
 
@@ -6,23 +6,22 @@ import os
 import textwrap
 import warnings as python_warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import arguments
-from hystgen.basics.words import counted
-from hystgen.identification import faults, joint, reduction, remarks
+from hystgen.basics.problems import counted
+from hystgen.identification import faults, joint, quality, reduction
+from hystgen.identification.quality import Intervals, Row, table
 from hystgen.identification.reduction import Course
-from hystgen.identification.report import Row, table
-from hystgen.identification.uncertainty import Intervals
-from hystgen.identification.used import Used
 from hystgen.records import Record, Source, read_record, write_atomically
 
 if TYPE_CHECKING:
     from hystgen.parameters.files import Parameters
+
 
 HELD_OUT = 0.25
 """Share of each record, its end, that is held out for the figures when no record is given for that."""
@@ -58,7 +57,7 @@ class Fit:
         result to the mean of the record's `y`. Warns when the drive leaves the fitted range.
         """
         data = _read(record)
-        outside = remarks.outside(data.name, data.v, self.parameters.input_range)
+        outside = quality.outside(data.name, data.v, self.parameters.input_range)
         if outside:
             python_warnings.warn(outside, stacklevel=2)
         inner = self._inner(data, self.history if history is None else visited(history))
@@ -108,7 +107,7 @@ class Fit:
         return joint.through_front(course, cascade_of(self.parameters).stages)
 
     def text(self) -> str:
-        """The parameter file: what was fitted on what as comments, then the parameters."""
+        """The parameter file: models and records of the fit as comments, then the parameters."""
         from hystgen.parameters.files import dump_parameters
 
         lines = ["Identified by hystgen; errors have a free offset a record."]
@@ -159,12 +158,96 @@ class Fit:
         return reported
 
 
-
-
 def _read(source: Source) -> Record:
     return source if isinstance(source, Record) else read_record(source, need=("v",))
 
 
 def visited(values: Sequence[float]) -> tuple[float, ...]:
-    """A history as plain numbers. Raises ValueError unless all are finite, TypeError for what is no list of numbers."""
+    """A history as plain numbers. Raises ValueError unless all are finite, TypeError unless they are a list."""
     return arguments.numbers("history", values, "[100, -100]")
+
+
+# What a fit compared of each record and what it left out, sample by sample -----------------------------------
+
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Used:
+    """What a fit made of one record; arrays are ascending indices into its samples.
+
+    `name`: of the record; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
+    last sample (exclusive) of each part that was run, one where there is no gap; `skipped`: samples at the start not
+    compared because that was asked for; `ignored`: at the start of a part, because its start memory was not known;
+    `outliers`: of y, not compared; `stretches`: the same in drop-outs, held samples or a converter's end; `bridged`: of
+    v, replaced by a straight line; `gaps`: first sample behind each gap; `left_out`: between gaps, too little to be of
+    use.
+    """
+
+    name: str
+    held_out: bool
+    samples: int
+    parts: tuple[tuple[int, int], ...]
+    skipped: Indices = field(repr=False, compare=False)
+    ignored: Indices = field(repr=False, compare=False)
+    outliers: Indices = field(repr=False, compare=False)
+    stretches: Indices = field(repr=False, compare=False)
+    bridged: Indices = field(repr=False, compare=False)
+    gaps: Indices = field(repr=False, compare=False)
+    left_out: Indices = field(repr=False, compare=False)
+
+    @property
+    def compared(self) -> NDArray[np.bool_]:
+        """Whether each sample (samples,) was compared."""
+        found = np.ones(self.samples, dtype=bool)
+        for masked in (self.skipped, self.ignored, self.outliers, self.stretches, self.left_out):
+            found[masked] = False
+        return found
+
+
+    def sentences(self) -> list[str]:
+        """The sentences that count isolated wrong samples."""
+        return [
+            faults.sentence(self.name, found, what)
+            for found, what in ((self.bridged, faults.BRIDGED), (self.outliers, faults.NOT_COMPARED))
+            if len(found)
+        ]
+
+
+def used_of(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
+    """What became of the samples of `records`, given the courses that were compared in the end."""
+    return tuple(
+        _of_record(record, [item for item in courses if item.origin[0] == number], held_out)
+        for number, record in enumerate(records)
+    )
+
+
+def _of_record(record: Record, courses: Sequence[Course], held_out: bool) -> Used:
+    parts = tuple((item.origin[1], item.origin[1] + len(item.v)) for item in courses)
+    skipped, ignored, outliers, stretches, bridged = [], [], [], [], []
+    outside = np.ones(len(record), dtype=bool)
+    for item, (start, stop) in zip(courses, parts, strict=True):
+        outside[start:stop] = False
+        skipped.append(np.arange(start, start + item.begin))
+        ignored.append(np.arange(start + item.begin, start + item.first))
+        known = np.isfinite(item.y)
+        known[: item.first] = True
+        faulty = np.zeros(len(known), dtype=bool) if item.stretches is None else item.stretches
+        outliers.append(start + np.flatnonzero(~known & ~faulty))
+        stretches.append(start + np.flatnonzero(~known & faulty))
+        bridged.append(start + np.flatnonzero(item.v != record.v[start:stop]))
+    gaps = [piece.first for piece in faults.between_gaps(record)[1:]]
+    return Used(
+        record.name,
+        held_out,
+        len(record),
+        parts,
+        np.concatenate(skipped),
+        np.concatenate(ignored),
+        np.concatenate(outliers),
+        np.concatenate(stretches),
+        np.concatenate(bridged),
+        np.array(gaps, dtype=np.intp),
+        np.flatnonzero(outside),
+    )

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.front.stage import Stage
-from hystgen.identification import constrained, faults, joint, pi, reduction, thresholds, weights
-from hystgen.identification.fronts import DeadZones, Front, Kept, Tanh, even_breaks
+from hystgen.identification import faults, joint, pi, reduction
+from hystgen.identification.joint import DeadZones, Front, Kept, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
 from hystgen.plays import operators
@@ -26,10 +26,10 @@ Tick = Callable[[int], None] | None
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Names of what can be fitted; `auto` chooses among them."""
 
-BREAKS = (1, 2, 4, 8)
+BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks of a dead-zone sum that are tried."""
 
-PARSIMONY = 1.02
+FRONT_PARSIMONY = 1.02
 """A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
 
 INVERSE_PLAYS = 10
@@ -76,14 +76,14 @@ def solve(
     # What a play sum alone would choose is bent by the front that it lacks: the shape is sought over a dense list
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
-        fine = np.array(thresholds.dense(plain.reach, sum(item.used for item in compared)).thresholds)
+        fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
     best: tuple[float, Front, Array] | None = None
     before: Array | None = None
     for front in fronts_of(kind, compared, breaks):
         shaped = _shaped(compared, front, fine, before, tick)
         before = shaped.shape
         error = validation(shaped, front)
-        if best is None or error * PARSIMONY < best[0]:
+        if best is None or error * FRONT_PARSIMONY < best[0]:
             best = error, front, shaped.shape
     assert best is not None
     _, front, shape = best
@@ -95,7 +95,7 @@ def solve(
     if wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
     largest = float(fitted.solution.thresholds[-1])
-    firsts = [pi.resettled(fitted.inner(item), largest).first for item in courses]
+    firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
 
 
@@ -123,13 +123,13 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
                 f"breaks have to lie inside the drive range of the records, {drive[0]:.6g} to {drive[1]:.6g}"
             )
         return [DeadZones(drive, breaks)]
-    return [DeadZones(drive, even_breaks(drive, count)) for count in ([breaks] if breaks is not None else BREAKS)]
+    return [DeadZones(drive, even_breaks(drive, count)) for count in ([breaks] if breaks is not None else BREAK_COUNTS)]
 
 
 def _shaped(
     courses: Sequence[Course], front: Front, thresholds: Array, before: Array | None, tick: Tick
 ) -> joint.Shaped:
-    """The best of what is found from several starts; `before`: the shape of the front tried before this one."""
+    """The best result of several starts; `before`: the shape of the front tried before this one."""
     starts = [front.straight]
     if isinstance(front, Tanh) and front.branches == 2 and before is not None:
         starts = [front.doubled(before)]
@@ -148,8 +148,8 @@ def validation(shaped: joint.Shaped, front: Front) -> float:
         training = reduction.others(shaped.system, fold)
         change, p = joint.solve_linear(training, shaped.weights, shaped.shape, front, 0.0)
         unknowns = np.concatenate([p, change])
-        squares += weights.residual(left_out, np.arange(len(unknowns)), unknowns)
-    return constrained.root_mean_square(squares, shaped.system.samples)
+        squares += pi.residual(left_out, np.arange(len(unknowns)), unknowns)
+    return pi.root_mean_square(squares, shaped.system.samples)
 
 
 def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
@@ -209,8 +209,8 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     bounds.append(np.concatenate([np.zeros(k), -length[:-1] / length[-1]]))
     limits.append(least - (high - low) / length[-1])
     try:
-        solution = constrained.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
-    except constrained.InfeasibleError:
+        solution = pi.least_squares(system[:, :-1], system[:, -1], np.array(bounds), np.array(limits), k)
+    except pi.InfeasibleError:
         return None
     slopes = np.append(solution[k:], ((high - low) - float(length[:-1] @ solution[k:])) / length[-1])
     return front.shape(slopes)

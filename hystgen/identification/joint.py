@@ -1,4 +1,4 @@
-"""The shape of the front and the weights of the plays fitted together: least squares on the free-run output error.
+"""The shape of a front and the weights of the plays fitted together: least squares on the free-run output error.
 
 The weights enter linearly, the shape does not: a Gauss-Newton method with a trust region, whose every step solves for
 all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives by
@@ -17,14 +17,312 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.chain.static import directions, through_stages
+from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
-from hystgen.identification import constrained, reduction, weights
-from hystgen.identification.constrained import root_mean_square
-from hystgen.identification.fronts import Front
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.identification import pi, reduction
+from hystgen.identification.pi import DIGITS, InfeasibleError, root_mean_square, rounded
 from hystgen.identification.reduction import Course, Reduced, Source
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
+
+
+# Fronts whose shape a fit may change -------------------------------------------------------------------------
+#
+# A front and the play sum behind it share a scale: `a G` with thresholds `a r` and weights `p / a` is the same model.
+# Every front here maps the fitted drive range onto a range of the same length and 0 onto 0, so that thresholds keep the
+# meaning they have without one.
+
+
+STEEPEST = math.log(20.0)
+"""Largest ratio of two slopes of a dead-zone sum, as its logarithm."""
+
+FLATTER = math.log(200.0)
+"""Largest ratio of the slopes of a limiter, as its logarithm."""
+
+SMOOTH = 16
+"""Pieces of a dead-zone sum that stands for a smooth curve: its slope changes by at most a fifth from one to the next
+where the whole range has a ratio of 20."""
+
+FLATTEST = 3.0
+"""Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
+
+CURVED = (0.02, 3.0)
+"""Least and largest half drive range in units of the tanh's argument."""
+
+
+class Front(Protocol):
+    """A family of memoryless parts, a member for every `shape` (m,)."""
+
+    @property
+    def name(self) -> str:
+        """What the fit table calls it."""
+
+    @property
+    def straight(self) -> Array:
+        """The shape that is (nearly) a straight line: where a search starts."""
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of every shape number."""
+
+    def slack(self, shape: Array) -> Array:
+        """What must not be negative for the front to be invertible, beyond the bounds; empty when there is nothing."""
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The stages of the model."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A memoryless part that stays as it is; by default none, which makes a plain play sum."""
+
+    given: tuple[Stage, ...] = ()
+    name: str = "pi"
+
+    @property
+    def straight(self) -> Array:
+        """No shape numbers."""
+        return np.empty(0)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """None."""
+        return np.empty(0), np.empty(0)
+
+    def slack(self, shape: Array) -> Array:
+        """Nothing to hold."""
+        return np.empty(0)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The stages as they are."""
+        return self.given
+
+
+@dataclass(frozen=True)
+class DeadZones:
+    """Dead-zone sums with given breaks (41); the shape is the logarithm of each piece's slope over the first one's.
+
+    `drive`: the fitted range; `breaks`: places inside it where the slope may change, strictly rising, none of them 0:
+    a threshold of 0 is the line that every dead-zone sum has.
+    """
+
+    drive: tuple[float, float]
+    breaks: tuple[float, ...]
+    name: str = "gpi-deadzone"
+
+    @property
+    def straight(self) -> Array:
+        """All slopes alike."""
+        return np.zeros(len(self.breaks))
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Every piece rises, none is far steeper than another."""
+        most = np.full(len(self.breaks), STEEPEST)
+        return -most, most
+
+    def slack(self, shape: Array) -> Array:
+        """The logarithms keep all slopes positive."""
+        return np.empty(0)
+
+    def slopes(self, shape: Array) -> Array:
+        """Slopes of the pieces, from the lowest drive up."""
+        ratio = np.exp(np.concatenate([[0.0], shape]))
+        low, high = self.drive
+        length = np.diff([low, *self.breaks, high])
+        return np.asarray(ratio * (high - low) / float(ratio @ length))
+
+    def shape(self, slopes: Array) -> Array:
+        """The shape of given slopes, brought within the bounds."""
+        least = float(np.max(slopes)) * math.exp(-STEEPEST)
+        logs = np.log(np.maximum(slopes, least))
+        return np.asarray(np.clip(logs[1:] - logs[0], -STEEPEST, STEEPEST))
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The dead-zone sum; its weight at 0 is the slope of the piece that 0 lies in."""
+        slopes = self.slopes(shape)
+        middle = int(np.searchsorted(self.breaks, 0.0, side="right"))
+        terms = {0.0: float(slopes[middle])}
+        for j, place in enumerate(self.breaks):
+            outer, inner = (slopes[j], slopes[j + 1]) if j < middle else (slopes[j + 1], slopes[j])
+            terms[place] = float(outer - inner)
+        places = sorted(terms)
+        return (DeadZone(places, [rounded(terms[place], DIGITS) for place in places]),)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """A limiter: a straight line that is flatter near the ends of the drive range, two dead zones (41).
+
+    The shape is how far inside the range each place lies where that begins, as a share of it, and the logarithm of the
+    slope beyond them over that between them.
+    """
+
+    drive: tuple[float, float]
+    name: str = "gpi-deadzone"
+
+    @property
+    def straight(self) -> Array:
+        """Hardly flatter, so that the derivatives to the places are not zero."""
+        return np.array([0.1, 0.1, -0.1])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """A place may lie at its end, where it does nothing; the two do not meet."""
+        return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
+
+    def slack(self, shape: Array) -> Array:
+        """Every piece rises."""
+        return np.empty(0)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The dead-zone sum."""
+        low, high = self.drive
+        ends = low + shape[0] * (high - low), high - shape[1] * (high - low)
+        breaks = aside([float(x) for x in ends], 1e-3 * (high - low))
+        return DeadZones(self.drive, breaks).stages(np.array([-shape[2], 0.0]))
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A front whose slope changes smoothly over the drive range, as a dead-zone sum (41) of many equal pieces.
+
+    The shape is the coefficients of u, u^2, .. up to `degree` in the logarithm of the slope; u runs from -1 to 1.
+    """
+
+    drive: tuple[float, float]
+    degree: int
+    name: str = "gpi-deadzone"
+
+    @property
+    def straight(self) -> Array:
+        """The same slope everywhere."""
+        return np.zeros(self.degree)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """No slope is steeper against another than where they are sought piece by piece."""
+        most = np.full(self.degree, 0.5 * STEEPEST / self.degree)
+        return -most, most
+
+    def slack(self, shape: Array) -> Array:
+        """The logarithms keep all slopes positive."""
+        return np.empty(0)
+
+    @cached_property
+    def _pieces(self) -> DeadZones:
+        return DeadZones(self.drive, even_breaks(self.drive, SMOOTH - 1))
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The dead-zone sum."""
+        u = np.linspace(-1.0, 1.0, 2 * SMOOTH + 1)[1::2]
+        logs = u * np.polynomial.polynomial.polyval(u, shape)
+        return self._pieces.stages(logs[1:] - logs[0])
+
+
+@dataclass(frozen=True)
+class Tanh:
+    """Tanh envelopes with one branch or two (45).
+
+    The shape of a branch is `a1` times half the drive range, and the place of its steepest point, from the middle of
+    the range in units of its half length. The descending branch has two more: the logarithm of its length over the
+    ascending one's and its lift above it in the middle of the range, as a share of the range.
+    """
+
+    drive: tuple[float, float]
+    branches: int = 1
+
+    @property
+    def name(self) -> str:
+        """With the number of branches, which the table tells apart."""
+        return "gpi-tanh" if self.branches == 1 else "gpi-tanh, two branches"
+
+    @property
+    def straight(self) -> Array:
+        """A gently bent branch, so that the derivative to its place is not zero; no gap between two."""
+        return np.array([0.3, 0.0] if self.branches == 1 else [0.3, 0.0, 0.3, 0.0, 0.0, 0.0])
+
+    def doubled(self, single: Array) -> Array:
+        """Two branches that are both the single one of that shape."""
+        return np.concatenate([single, single, [0.0, 0.0]])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Curvature and place of each branch, then length and lift."""
+        low = [CURVED[0], -20.0] * self.branches + [-0.5, 0.0] * (self.branches - 1)
+        high = [CURVED[1], 20.0] * self.branches + [0.5, 0.3] * (self.branches - 1)
+        return np.array(low), np.array(high)
+
+    def slack(self, shape: Array) -> Array:
+        """How far the ends stay from where a branch is flat, and the descending branch above the ascending one."""
+        held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
+        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, and have no length
+            held += [-1.0] * len(self._places)
+        elif self.branches == 2:
+            stage = self._stage(shape, None)
+            places = self._places
+            gap = stage.forward(places, False) - stage.forward(places, True)
+            held += list(gap / (self.drive[1] - self.drive[0]))
+        return np.array(held)
+
+    @cached_property
+    def _places(self) -> Array:
+        return np.linspace(*self.drive, 61)
+
+    def stages(self, shape: Array) -> tuple[Stage, ...]:
+        """The envelope, its numbers rounded; the descending branch is lifted by what rounding lets it fall short."""
+        return (self._stage(shape, DIGITS),)
+
+    def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
+        low, high = self.drive
+        half = 0.5 * (high - low)
+        middle = 0.5 * (low + high)
+
+        def branch(curvature: float, place: float, length: float) -> tuple[float, float, float]:
+            a1 = curvature / half
+            a2 = -a1 * (middle + place * half)
+            a0 = 2.0 * half * length / (math.tanh(a1 * high + a2) - math.tanh(a1 * low + a2))
+            return a0, a1, a2
+
+        def value(numbers: tuple[float, float, float], v: float) -> float:
+            return numbers[0] * math.tanh(numbers[1] * v + numbers[2])
+
+        up = branch(shape[0], shape[1], 1.0)
+        up_all = (*up, -value(up, 0.0))
+        if self.branches == 1:
+            return TanhEnvelope(_numbers(up_all, digits))
+        down = branch(shape[2], shape[3], math.exp(shape[4]))
+        lift = value(up, middle) + up_all[3] - value(down, middle) + shape[5] * 2.0 * half
+        stage = TanhEnvelope(_numbers(up_all, digits), _numbers((*down, lift), digits))
+        if digits is not None:
+            places = np.linspace(low, high, 20001)
+            short = float(np.max(stage.forward(places, True) - stage.forward(places, False)))
+            if short > 0.0:
+                stage = TanhEnvelope(stage.ascending, _numbers((*down, lift + 1.01 * short + 1e-9 * half), digits))
+        return stage
+
+
+def _numbers(values: tuple[float, ...], digits: int | None) -> tuple[float, float, float, float]:
+    a0, a1, a2, a3 = (float(x) if digits is None else rounded(float(x), digits) for x in values)
+    return a0, a1, a2, a3
+
+
+def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
+    """So many breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside by a little."""
+    low, high = drive
+    step = (high - low) / (count + 1)
+    return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)
+
+
+def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
+    """The places, one within `least` of 0 moved to `least`: a dead zone of threshold 0 is the line itself."""
+    return tuple(rounded(least, 6) if abs(x) < least else x for x in places)
+
+
+# The search for a shape --------------------------------------------------------------------------------------
+
 
 DIFFERENCE = 1e-6
 """Change of a shape number for a derivative; shapes are of the order of one."""
@@ -44,7 +342,8 @@ LEAST_CHANGE = 1e-8
 """It ends too when no shape number changes by more than this."""
 
 COMPARED = 200_000
-"""Samples that are compared while the shape is sought; of longer records each so many-th, all run through the plays."""
+"""Samples that are compared while the shape is sought; of longer records an even selection, though all run through the
+plays."""
 
 Tick = Callable[[int], None] | None
 
@@ -95,7 +394,7 @@ def refine(
     """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
-    p = weights.non_negative(plain.whole, np.arange(len(thresholds)))
+    p = pi.non_negative(plain.whole, np.arange(len(thresholds)))
 
     def linear(s: Array, q: Array) -> Shaped:
         return _linear(courses, front, s, q, thresholds, tick)
@@ -138,14 +437,14 @@ def search(
             break
         try:
             change, p = solve_linear(system, now.weights, now.shape, limits, damping)
-        except constrained.InfeasibleError:
+        except InfeasibleError:
             break
         moved = np.clip(now.shape + change, low, high)
         if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
             break
         least = 0.5 * ENOUGH / now.samples
-        left = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
-        promised = root_mean_square(float(left @ left), now.samples)
+        residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
+        promised = root_mean_square(float(residual @ residual), now.samples)
         if now.rms - promised < least * now.rms:  # most of these steps fail, and each costs as much as any other
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None
@@ -172,8 +471,8 @@ def _linear(
     source = linear_source(front, shape, p, every)
     system = reduction.reduce(courses, thresholds, tick, source, len(shape))
     columns = np.arange(len(thresholds))
-    best = weights.non_negative(system.whole, columns)
-    rms = root_mean_square(weights.residual(system.whole, columns, best), system.samples)
+    best = pi.non_negative(system.whole, columns)
+    rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)
     # About the weights that the derivatives were taken with: they are what the next step of the shape refers to
     return Shaped(shape, p, rms, best, system.samples, lambda: system)
 
@@ -195,7 +494,7 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 def _rows_with_derivatives(
     course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and by how much each other version changes their weighted sum."""
+    """The plays behind the first version of a front, and the change of their weighted sum with every other version."""
     carried = []
     for stages in versions:
         rising, history = _session(course, stages)
@@ -217,7 +516,7 @@ def _rows_with_derivatives(
             found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
         found[:, 0] = 1.0
         found[:, -1] = course.y[start:stop]
-        # every so many-th sample stands for all of them
+        # one sample in `every` stands for all of them
         found = found[-start % every :: every]
         return found[np.isfinite(found[:, -1])] * math.sqrt(every) if compared else found[:0]
 
@@ -234,7 +533,7 @@ def solve_linear(
     size = np.linalg.norm(matrix[:, k:], axis=0)
     tied[:, k:] = np.diag(np.sqrt(damping) * np.maximum(size, 1e-12 * float(np.linalg.norm(target))))
     low, high = limits.bounds
-    bounds, least = constrained.at_least(
+    bounds, least = pi.at_least(
         np.concatenate([np.zeros(k), low - shape]), np.concatenate([np.full(k, np.inf), high - shape])
     )
     slack = limits.slack(shape)
@@ -246,7 +545,7 @@ def solve_linear(
             slope[:, j] = (limits.slack(one) - slack) / DIFFERENCE
         bounds = np.concatenate([bounds, np.concatenate([np.zeros((len(slack), k)), slope], axis=1)])
         least = np.concatenate([least, np.minimum(-slack, 0.0)])
-    solution = constrained.least_squares(
+    solution = pi.least_squares(
         np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least, k
     )
     return solution[k:], solution[:k]

@@ -1,8 +1,12 @@
-"""Fitting a PI model to records: thresholds, weights, and how good it is."""
+"""Fitting a PI model to records: places, number and weights of the plays.
+
+The weights are non-negative least squares on the triangular system of `reduction`, whose offsets are projected out and
+hence free, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974, chapter 23) as scipy
+implements it.
+"""
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,34 +14,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments
-from hystgen.identification import faults, reduction, thresholds, weights
-from hystgen.identification.reduction import Course
-from hystgen.identification.report import Row
-from hystgen.identification.thresholds import Candidate, rounded
-from hystgen.identification.weights import Weights
-from hystgen.records import LARGEST, SHORTEST, Record, no_value
+from hystgen.identification import reduction
+from hystgen.identification.reduction import Course, Reduced, others, travel
 
 Array = NDArray[np.float64]
 
 DIGITS = 10
-"""Significant digits of fitted numbers: far below what a record tells, above what depends on the linear algebra."""
+"""Significant digits of fitted numbers: more than a record determines, fewer than depend on the linear algebra
+library."""
 
 DUST = 1e-9
 """A weight of less than this share of their sum is rounding, not a play."""
-
-MOST_PLAYS = 1000
-
-SMALLEST = 1e-20
-"""Drive or output that moves by less is no measurement: squares of it, and ratios to the other one, leave the numbers
-that there are in double precision and in parameter files."""
-
 
 FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
     "else check which column is which"
 )
-"""What is said of records from which nothing is left of a model."""
+"""The message where no play is left in the model."""
 
 
 class IdentificationError(ValueError):
@@ -59,52 +52,6 @@ class Solution:
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
 
-def course(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it takes part: its start ignored as far as the start memory is unknown, isolated faults that show
-    without a model bridged (drive) or left out (output).
-
-    Raises IdentificationError for a record without what a fit needs.
-    """
-    if record.y is None:
-        raise IdentificationError(f"{record.name} has no measured column y; name one with --columns")
-    v = np.ascontiguousarray(record.v, dtype=np.float64)
-    y = np.ascontiguousarray(record.y, dtype=np.float64)
-    if len(v) != len(y):
-        raise IdentificationError(f"{record.name} has {len(v)} samples of v and {len(y)} of y")
-    if not (np.isfinite(v).all() and np.isfinite(y).all()):
-        raise IdentificationError(f"{record.name} has samples without a value; drop them first")
-    if len(v) < skip + SHORTEST:
-        raise IdentificationError(f"{record.name} has {len(v)} samples, at least {skip + SHORTEST} are needed")
-    for name, x in (("v", v), ("y", y)):
-        missing = int(np.count_nonzero(no_value(x)))
-        if missing > faults.most(len(x)):
-            raise IdentificationError(
-                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
-                f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
-                f"convert {name}"
-            )
-    y = np.where(faults.wrong_output(v, y), np.nan, y)
-    v = faults.bridged(v, faults.wrong_drive(v, y))
-    if np.ptp(v[skip:]) == 0.0:
-        raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
-    measured = y[skip:][np.isfinite(y[skip:])]
-    if not len(measured) or np.ptp(measured) == 0.0:
-        raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
-    for name, x in (("v", v), ("y", measured)):
-        if np.ptp(x) < SMALLEST:
-            raise IdentificationError(
-                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
-                "to a smaller unit, or name another column"
-            )
-    return resettled(Course(record.name, v, y, history, skip, len(v), skip), math.inf)
-
-
-def resettled(item: Course, largest: float) -> Course:
-    """The course with no more of its start ignored than a largest threshold makes necessary."""
-    first = 0 if item.history is not None else reduction.settled(item.v[: item.last], largest)
-    return replace(item, first=max(first, item.begin))
-
-
 def solve(
     courses: Sequence[Course],
     wanted: int | tuple[float, ...] | None,
@@ -115,7 +62,7 @@ def solve(
 
     Raises IdentificationError.
     """
-    reach = thresholds.largest([item for item in courses if item.used])
+    reach = largest([item for item in courses if item.used])
     if reach == 0.0:
         names = ", ".join(dict.fromkeys(item.name for item in courses))
         raise IdentificationError(
@@ -125,9 +72,9 @@ def solve(
     if isinstance(wanted, tuple):
         lists = [Candidate(wanted)]
     else:
-        lists = thresholds.candidates(reach, sum(item.used for item in courses), wanted)
+        lists = candidates(reach, sum(item.used for item in courses), wanted)
     top = max(candidate.thresholds[-1] for candidate in lists)
-    compared = [resettled(item, top) for item in courses]
+    compared = [item.resettled(top) for item in courses]
     samples = sum(item.used for item in compared)
     fewest = min(candidate.n for candidate in lists) + 2
     if samples < fewest:
@@ -135,9 +82,9 @@ def solve(
             f"{samples} samples can be compared, {fewest - 2} plays need at least {fewest}; record more cycles, "
             "give --history, or use fewer thresholds"
         )
-    reduced = reduction.reduce(compared, thresholds.union(lists), tick)
-    chosen = thresholds.choose(reduced, lists)
-    fitted = weights.fit(reduced, thresholds.columns(reduced, chosen), floor)
+    reduced = reduction.reduce(compared, union(lists), tick)
+    chosen = choose(reduced, lists)
+    fitted = fit_weights(reduced, columns(reduced, chosen), floor)
     p = np.array([rounded(float(x), DIGITS) for x in fitted.p])
     p[p < DUST * float(np.sum(p))] = 0.0
     r = np.array(chosen.thresholds)
@@ -163,35 +110,277 @@ def compare(item: Course, r: Array, p: Array) -> Errors:
     return Errors(item, offset, error - offset)
 
 
-def row(part: str, model: str, errors: Sequence[Errors]) -> Row:
-    """The table's row."""
-    joined = np.concatenate([e.error for e in errors])
-    joined = joined[np.isfinite(joined)]
-    return Row(
-        part,
-        model,
-        tuple(e.course.name for e in errors),
-        len(joined),
-        sum(e.course.first - e.course.begin for e in errors),
-        float(np.sqrt(np.mean(joined**2))),
-        float(np.max(np.abs(joined))),
-        max(e.course.output_range for e in errors),
+# Places and number of the plays ------------------------------------------------------------------------------
+
+
+LEAST_TRAVEL = 0.15
+"""The largest play still moves over this share of the drive's peak-to-peak range.
+
+A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero its weight is set by the last few
+samples before each reversal and can take any value, while a slightly larger drive multiplies it by a real travel. At
+15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much drive as the gap to
+the play below, and the error at the ends of the loop is already within 10 % of what plays up to 0.9 reach.
+"""
+
+COUNTS = (6, 8, 12, 16, 24)
+"""Numbers of plays tried by default."""
+
+POWERS = (1.0, 1.5, 2.0)
+"""Spacings tried, `r_i = r_n (i/n)^power`: even, or denser near zero where loops bend most."""
+
+PLAYS_PARSIMONY = 1.01
+"""The fewest plays whose validation error is within this factor of the best are chosen."""
+
+DENSE = 16
+"""Plays of the list that other parts of a model are sought with."""
+
+MANY_PLAYS = 100
+"""More plays than this are spaced evenly."""
+
+SAMPLES_A_PLAY = 8
+"""The default never places more plays than one for this many samples."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A list of thresholds to try, r_0 = 0 included."""
+
+    thresholds: tuple[float, ...]
+
+    @property
+    def n(self) -> int:
+        """Plays without r_0."""
+        return len(self.thresholds) - 1
+
+
+def largest(courses: Sequence[Course]) -> float:
+    """The largest threshold whose play moves far enough in the record that moves it most.
+
+    The movement of a play falls steadily with its threshold, so bisection finds the place; nothing is assumed about
+    the waveform, and a first loading from a known start counts as what it is.
+    """
+    found = 0.0
+    for course in courses:
+        low_end, high_end = course.drive_range
+        wanted = LEAST_TRAVEL * (high_end - low_end)
+        if wanted == 0.0:
+            continue
+        low, high = 0.0, float(np.ptp(course.v))
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if travel(course, middle) >= wanted else (low, middle)
+        found = max(found, low)
+    return found
+
+
+def candidates(reach: float, samples: int, count: int | None = None) -> list[Candidate]:
+    """The lists of thresholds to choose from: every spacing with every number of plays, or with `count` of them."""
+    if count is not None:
+        counts: Sequence[int] = (count,)
+    else:
+        counts = [n for n in COUNTS if n * SAMPLES_A_PLAY <= samples] or (max(1, samples // SAMPLES_A_PLAY),)
+    lists = []
+    for n in counts:
+        # A single play has one place; very many leave nothing to choose
+        for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
+            places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
+            lists.append(Candidate((0.0, *places)))
+    return lists
+
+
+def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
+    """One list of `most` plays, which leaves little to wish for, to judge by what else there is in a record."""
+    return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
+
+
+def rounded(x: float, digits: int) -> float:
+    """x to a number of significant digits."""
+    return float(f"{x:.{digits}g}") if math.isfinite(x) else x
+
+
+def union(lists: Sequence[Candidate]) -> Array:
+    """All thresholds that occur, each once."""
+    return np.array(sorted({r for candidate in lists for r in candidate.thresholds}))
+
+
+def columns(reduced: Reduced, candidate: Candidate) -> Columns:
+    """Where the candidate's plays are among the reduced ones."""
+    return np.asarray(np.searchsorted(reduced.thresholds, candidate.thresholds))
+
+
+def choose(reduced: Reduced, lists: Sequence[Candidate]) -> Candidate:
+    """The fewest plays that predict blocks of the records left out of the fit about as well as any candidate does.
+
+    Each of four consecutive blocks is predicted by weights fitted to the other three. Ties go to the smaller error.
+    """
+    if len(lists) == 1:
+        return lists[0]
+    squares = np.zeros(len(lists))
+    for fold, left_out in enumerate(reduced.folds):
+        training = others(reduced, fold)
+        for k, candidate in enumerate(lists):
+            chosen = columns(reduced, candidate)
+            squares[k] += residual(left_out, chosen, non_negative(training, chosen))
+    errors = np.sqrt(squares)
+    enough = float(errors.min()) * PLAYS_PARSIMONY
+    return min(
+        (candidate for candidate, error in zip(lists, errors, strict=True) if error <= enough),
+        key=lambda candidate: (candidate.n, errors[lists.index(candidate)]),
     )
 
 
-def checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[float, ...] | None:
-    """None, a number of plays, or a list of thresholds that begins with 0. Raises ValueError."""
-    if wanted is None:
-        return None
-    if isinstance(wanted, int | np.integer) and not isinstance(wanted, bool):
-        if not 0 <= wanted <= MOST_PLAYS:
-            raise ValueError(f"thresholds is a number of plays from 0 to {MOST_PLAYS}, not {wanted}")
-        return int(wanted)
-    if isinstance(wanted, str | float | bool):
-        raise ValueError("thresholds is a whole number of plays or a list of thresholds")
-    places = arguments.numbers("thresholds", wanted, "[0, 1.5, 3]")
-    if not places or places[0] != 0.0:
-        places = (0.0, *places)
-    if any(b <= a for a, b in itertools.pairwise(places)):
-        raise ValueError("thresholds are finite, not negative, and rise strictly")
-    return places
+# Weights of a play sum, and the floor under p_0 --------------------------------------------------------------
+
+
+Columns = NDArray[np.intp]
+
+STILL = 1e-9
+"""A column of less than this share of the first or longest one in its unit is rounding: a play that does not move."""
+
+TIE = 1e-12
+"""Weight of the tie break between solutions that fit equally well, as a share of the squared output.
+
+Where the drive stays between few turning points several plays move alike, and how the weight is divided among them is
+left to rounding. Of such solutions the one with the least sum of squares is taken. A play of which a thousandth part
+moves like no other keeps its weight to about six digits.
+"""
+
+FLOOR_COST = 0.05
+"""How much the rms error may grow, as a share of itself, for p_0 to be raised to its floor."""
+
+
+def non_negative(system: Array, columns: Columns) -> Array:
+    """Weights >= 0 of the chosen plays that minimise `|system[:, columns] p - system[:, -1]|`."""
+    return _least_squares(system[:, columns], system[:, -1])
+
+
+def _least_squares(matrix: Array, target: Array) -> Array:
+    from scipy.optimize import nnls
+
+    size = np.linalg.norm(matrix, axis=0)
+    moving = size > STILL * size[0]
+    length = float(np.linalg.norm(target))
+    weights = np.zeros(len(size))
+    if moving.any() and length > 0.0:
+        # Columns and target of length one: the solution is the same, whatever the units, and the solver's absolute
+        # tolerance fits all of them
+        n = int(np.count_nonzero(moving))
+        unit = np.concatenate([matrix[:, moving] / size[moving], math.sqrt(TIE) * np.eye(n)])
+        scaled, _ = nnls(unit, np.concatenate([target / length, np.zeros(n)]), maxiter=100 * n)
+        weights[moving] = scaled * length / size[moving]
+    return weights
+
+
+def residual(system: Array, columns: Columns, weights: Array) -> float:
+    """Sum of squared errors of the weights on a system."""
+    return float(np.sum((system[:, columns] @ weights - system[:, -1]) ** 2))
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Result of `fit`: the weights, their rms error, and whether p_0 was raised.
+
+    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None when it was not.
+    """
+
+    p: Array
+    rms: float
+    free_p0: float | None = None
+    free_rms: float | None = None
+
+
+def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
+    """Weights for the chosen plays, with p_0 at least the share `floor` of their sum where the data allow it.
+
+    p_0 is the slope just after a reversal, and the inverse divides by it. A record shows it only over the first,
+    smallest travel, where a slight lag of sensor or amplifier already flattens the loop and drives the least-squares
+    p_0 to zero. So when it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`; this is taken when
+    the rms error grows by at most 5 %, that is when the data hardly determine p_0. Otherwise the smaller p_0 is
+    what the actuator does (series backlash for p_0 = 0: no inverse) and stays.
+    """
+    matrix, target = reduced.whole[:, columns], reduced.whole[:, -1]
+
+    def rms(p: Array) -> float:
+        return float(np.sqrt(residual(reduced.whole, columns, p) / max(reduced.samples, 1)))
+
+    free = _least_squares(matrix, target)
+    if len(free) < 2 or free[0] >= floor * float(np.sum(free)):
+        return Weights(free, rms(free))
+    # p_0 = q_0 + share * sum of the others, all >= 0, is the bounded problem as another non-negative one
+    share = floor / (1.0 - floor)
+    bounded_matrix = matrix.copy()
+    bounded_matrix[:, 1:] += share * matrix[:, :1]
+    bounded = _least_squares(bounded_matrix, target)
+    bounded[0] += share * float(np.sum(bounded[1:]))
+    if rms(bounded) > (1.0 + FLOOR_COST) * rms(free):
+        return Weights(free, rms(free))
+    return Weights(bounded, rms(bounded), float(free[0]), rms(free))
+
+
+# Linear least squares under linear inequalities --------------------------------------------------------------
+
+
+RIDGE = 1e-7
+"""Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
+
+INFEASIBLE = 1e-10
+
+
+class InfeasibleError(ValueError):
+    """The inequalities contradict each other."""
+
+
+def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, plays: int = 0) -> Array:
+    """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
+
+    `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: number of leading columns with a unit of their own, the
+    others have that of the target. Where the matrix does not determine x the shortest one, in the measure of its
+    columns, is taken. Raises InfeasibleError.
+
+    Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor makes of the problem
+    the one of the shortest vector under inequalities (LDP), whose dual is a non-negative least-squares problem.
+    """
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
+    k = matrix.shape[1]
+    size = np.linalg.norm(matrix, axis=0)
+    alike, reach = size.copy(), float(np.linalg.norm(target))
+    if reach > 0.0 and np.any(size[:plays]):
+        alike[:plays] *= reach / np.max(size[:plays])
+    idle = alike <= STILL * np.max(alike)
+    size[idle] = 1.0
+    stacked = np.concatenate([np.where(idle, 0.0, matrix / size), RIDGE * np.eye(k)])
+    q, triangle = np.linalg.qr(stacked)
+    free = q.T @ np.concatenate([target, np.zeros(k)])
+    # In the coordinates e = triangle (x size) - free the objective is |e|
+    rows = np.asarray(solve_triangular(triangle, (bounds / size).T, trans="T")).T
+    least = limits - rows @ free
+    if np.all(least <= 0.0):
+        shortest = np.zeros(k)
+    else:
+        length = np.linalg.norm(rows, axis=1)
+        length[length == 0.0] = 1.0
+        scale = float(np.max(np.abs(least / length)))
+        dual_matrix = np.vstack([(rows / length[:, None]).T, least / length / scale])
+        dual_target = np.zeros(k + 1)
+        dual_target[-1] = 1.0
+        multipliers, rest = nnls(dual_matrix, dual_target, maxiter=100 * (k + len(bounds)))
+        if rest < INFEASIBLE:
+            raise InfeasibleError("the inequalities contradict each other")
+        # over the last component of the residual, which is the square of its length, and as that does not cancel to 0
+        shortest = dual_matrix[:k] @ multipliers / rest**2 * scale
+    return np.asarray(solve_triangular(triangle, shortest + free) / size)
+
+
+def at_least(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Bounds on single unknowns, infinite ones left out, as the inequalities of `least_squares`."""
+    k = len(lower)
+    eye = np.eye(k)
+    below, above = np.isfinite(lower), np.isfinite(upper)
+    return np.concatenate([eye[below], -eye[above]]), np.concatenate([lower[below], -upper[above]])
+
+
+def root_mean_square(squares: float, samples: int) -> float:
+    """rms from the sum of squares of a number of samples."""
+    return math.sqrt(squares / max(samples, 1))

@@ -13,28 +13,33 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.words import counted
-from hystgen.identification import faults, pi, stretches
+from hystgen.basics.problems import counted
+from hystgen.identification import faults, pi
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
-from hystgen.records import SHORTEST, Record
+from hystgen.records import LARGEST, SHORTEST, Record, no_value
 
 Array = NDArray[np.float64]
 
-LEFT = 0.1
+LEAST_SOUND = 0.1
 """Least share of a record that has to be left of it where its output stood at a converter's end."""
 
-ROUNDS = 4
-"""Most robust fits; there is one where it changes nothing about what is found."""
+MOST_FITS = 4
+"""Most robust fits; the first that finds the same faults is the last."""
 
-HALF = 0.25
-"""The drive is what is wrong where the output is then missed by less than half as much, squared."""
+LESS_MISSED = 0.25
+"""The drive, not the output, is wrong where bridging it reduces the squared error to less than this share."""
+
+
+LEAST_MOVEMENT = 1e-20
+"""Drive or output that moves by less is no measurement: squares of it, and ratios to the other one, leave the numbers
+that there are in double precision and in parameter files."""
 
 
 def courses(
     records: Sequence[Record], history: tuple[float, ...] | None, skip: int
 ) -> tuple[list[Course], list[str]]:
-    """The courses of the records and what was done to them, one sentence each.
+    """The courses of the records, and a sentence about each change.
 
     `history` precedes every record; behind a gap the memory is unknown again. Raises IdentificationError.
     """
@@ -43,21 +48,21 @@ def courses(
     for number, record in enumerate(records):
         pieces = faults.between_gaps(record)
         if len(pieces) == 1:
-            made.append(replace(pi.course(record, history, skip), origin=(number, 0)))
+            made.append(replace(course_of(record, history, skip), origin=(number, 0)))
             continue
         found = []
         for piece in pieces:
             try:
                 before = None if piece.after_gap else history
-                course = pi.course(piece.record, before, max(skip - piece.first, 0))
-                found.append(replace(course, origin=(number, piece.first)))
+                part = course_of(piece.record, before, max(skip - piece.first, 0))
+                found.append(replace(part, origin=(number, piece.first)))
             except IdentificationError as failure:
                 reported.append(f"left out: {failure}")
         if not found:
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
-            f"{faults.LOST:g} steps; what the drive did in them is not known, so that each part starts anew"
+            f"{faults.LONG_GAP:g} steps; what the drive did in them is not known, so that each part starts anew"
         )
         made += found
     for k, item in enumerate(made):
@@ -66,17 +71,57 @@ def courses(
     return made, reported
 
 
+def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
+    """The record as it takes part: its start ignored as far as the start memory is unknown, isolated faults that show
+    without a model bridged (drive) or left out (output).
+
+    Raises IdentificationError for a record without what a fit needs.
+    """
+    if record.y is None:
+        raise IdentificationError(f"{record.name} has no measured column y; name one with --columns")
+    v = np.ascontiguousarray(record.v, dtype=np.float64)
+    y = np.ascontiguousarray(record.y, dtype=np.float64)
+    if len(v) != len(y):
+        raise IdentificationError(f"{record.name} has {len(v)} samples of v and {len(y)} of y")
+    if not (np.isfinite(v).all() and np.isfinite(y).all()):
+        raise IdentificationError(f"{record.name} has samples without a value; drop them first")
+    if len(v) < skip + SHORTEST:
+        raise IdentificationError(f"{record.name} has {len(v)} samples, at least {skip + SHORTEST} are needed")
+    for name, x in (("v", v), ("y", y)):
+        missing = int(np.count_nonzero(no_value(x)))
+        if missing > faults.most(len(x)):
+            raise IdentificationError(
+                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
+                f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
+                f"convert {name}"
+            )
+    y = np.where(faults.wrong_output(v, y), np.nan, y)
+    v = faults.bridged(v, faults.wrong_drive(v, y))
+    if np.ptp(v[skip:]) == 0.0:
+        raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
+    measured = y[skip:][np.isfinite(y[skip:])]
+    if not len(measured) or np.ptp(measured) == 0.0:
+        raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
+    for name, x in (("v", v), ("y", measured)):
+        if np.ptp(x) < LEAST_MOVEMENT:
+            raise IdentificationError(
+                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
+                "to a smaller unit, or name another column"
+            )
+    return Course(record.name, v, y, history, skip, len(v), skip).resettled(math.inf)
+
+
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
-    """The course without the samples at which the converter stood at its end; which end, its level and how many.
+    """The course without the samples at a converter's end; name, level and number of samples of each end.
 
     Raises IdentificationError where next to nothing is left.
     """
-    levels = stretches.rails(item.y, item.v)
+    levels = faults.rails(item.y, item.v)
     if not levels:
         return item, []
     at = np.isin(item.y, [level for _, level in levels])
     left, before = np.count_nonzero(np.isfinite(item.y) & ~at), np.count_nonzero(np.isfinite(item.y))
-    if left < max(LEFT * before, SHORTEST):
+    if left < max(LEAST_SOUND * before, SHORTEST):
         raise IdentificationError(
             f"{item.name}: y stands at the converter's end in {before - left} of {len(at)} samples; set the sensor's "
             "range so that the whole motion lies inside it, and record again"
@@ -87,7 +132,7 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
 def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
     """The course without drop-outs and held samples, and where these are."""
     found = []
-    for what, find in (("drop-out", stretches.drop_outs), ("run", stretches.held)):
+    for what, find in (("drop-out", faults.drop_outs), ("run", faults.held)):
         runs = find(item.y, item.v)
         if runs:
             wrong = np.zeros(len(item.y), dtype=bool)
@@ -125,7 +170,7 @@ def _without_stretches(item: Course) -> tuple[Course, list[str]]:
 def mask_outliers(
     to_fit: list[Course], held: list[Course], wanted: int | tuple[float, ...] | None, floor: float
 ) -> None:
-    """Leave isolated samples of y out that lie far from what a play sum makes of their neighbours.
+    """Leave out isolated samples of y that lie far from the prediction of a play sum fitted to their neighbours.
 
     Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
     that is bridged. The play sum is one of least trimmed squares (Rousseeuw and Van Driessen, Data Mining and Knowledge
@@ -135,7 +180,7 @@ def mask_outliers(
     solution, _ = pi.solve([_without_runs(item)[0] for item in to_fit], wanted, floor)
     places = tuple(float(r) for r in solution.thresholds)
     before: list[Array] = []
-    for number in range(ROUNDS):
+    for number in range(MOST_FITS):
         to_fit[:] = [_with_drive_right(item, solution, number > 0) for item in to_fit]
         wrong = [faults.outliers(_errors(item, solution), item.v, item.output_range) for item in to_fit]
         now = [np.stack([item.v, flags]) for item, flags in zip(to_fit, wrong, strict=True)]
@@ -168,9 +213,9 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
             continue
         run = np.zeros(len(item.v), dtype=bool)
         run[first:last] = True
-        other = pi.resettled(replace(item, v=faults.bridged(item.v, run)), math.inf)
+        other = replace(item, v=faults.bridged(item.v, run)).resettled(math.inf)
         less = _errors(other, solution)
-        if _size(less[run]) < HALF * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
+        if _size(less[run]) < LESS_MISSED * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
             item, error = other, less
     return item
 

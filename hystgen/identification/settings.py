@@ -1,4 +1,4 @@
-"""What a fit takes over from the parameter file that it replaces: whatever no record can tell."""
+"""Settings that a fit takes over from the parameter file it replaces: everything that no record determines."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hystgen.identification.fit import Fit
 
-KEPT = ("description", "sample_time", "emit")
+KEPT_KEYS = ("description", "sample_time", "emit")
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Settings:
         return replace(fit, parameters=make_parameters(data))
 
     def sentences(self, fit: Fit) -> list[str]:
-        """What was kept of the older file and what was not; `fit` as it was before."""
+        """Sentences about settings kept and left out; `fit` as it was before."""
         said = []
         if self.problem:
             said.append(f"{self.file}: nothing of what was there is kept, it is no parameter file: {self.problem}")
-        names = [key for key in KEPT if key in self.values]
+        names = [key for key in KEPT_KEYS if key in self.values]
         if self._gives_units(fit):
             names.insert(0, "units")
         if self.name == fit.parameters.name:
@@ -72,7 +72,7 @@ def of(path: str | os.PathLike[str]) -> Settings:
         return Settings()
     try:
         data = parameter_data(path)
-        known = {key: data[key] for key in (*KEPT, "name", "units") if data.get(key) is not None}
+        known = {key: data[key] for key in (*KEPT_KEYS, "name", "units") if data.get(key) is not None}
         pi = {"thresholds": (0,), "weights": (1,)}
         make_parameters({"hystgen": 1, "name": "x", "input_range": (0, 1), "model": {"pi": pi}, **known}, file)
     except ParameterError as error:
@@ -80,5 +80,5 @@ def of(path: str | os.PathLike[str]) -> Settings:
     model = data.get("model")
     effects = model.get("effects") if isinstance(model, Mapping) else ()
     names = tuple(str(each["name"]) for each in effects or () if isinstance(each, Mapping) and "name" in each)
-    values = {key: known[key] for key in KEPT if key in known}
+    values = {key: known[key] for key in KEPT_KEYS if key in known}
     return Settings(file, values, known.get("name"), known.get("units"), names)

@@ -36,7 +36,7 @@ MARGIN = 0.01
 """Share of the input range, at each end, that no record enters."""
 
 OF_RATE = 0.98
-"""Share of the rate limit that is used: what rounding adds stays below the limit."""
+"""Share of the rate limit that is used, so that rounding stays below the limit."""
 
 SAMPLE_TIME = 1e-4
 """s, where neither the caller nor the parameter file gives one."""
@@ -60,7 +60,7 @@ SLOW = 24.0
 """s of a slow record, at least."""
 
 SLOWER = 1.5
-"""A slow record lasts at least so many times as long as a fast one."""
+"""Least ratio of the lengths of a slow and a fast record."""
 
 FAST_SAMPLES = 1000
 """Samples of a fast record, about."""
@@ -128,7 +128,7 @@ class Plan:
         return (*(drive.name for drive in self.drives), "plan.html")
 
     def sentence(self) -> str:
-        """How much there is to measure, and how long it takes."""
+        """Number of records and samples, and the time they take."""
         held_out = sum(drive.held_out for drive in self.drives)
         return (
             f"{len(self.drives)} records, {held_out} of them held out, {self.samples} samples; the session takes "
@@ -222,7 +222,7 @@ def plan(
 
 
 def lasting(seconds: float) -> str:
-    """A duration as somebody says it."""
+    """A duration in everyday words."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.1f} {unit}"
@@ -257,7 +257,7 @@ class Grid:
         return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
 
     def rate(self, per_second: float, seconds: float) -> int:
-        """Most codes in so many seconds."""
+        """Most codes by which the drive moves in `seconds`."""
         return math.floor(Decimal(OF_RATE * per_second) * Decimal(seconds) * Decimal(1).scaleb(self.digits))
 
 
@@ -290,11 +290,11 @@ class Tempo:
         return cls(sample_time, max_rate, fast, slow, math.ceil(REST * slow), move)
 
     def seconds(self, ticks: int) -> float:
-        """The double nearest to the decimal of so many sample times."""
+        """The double nearest to the decimal of `ticks` sample times."""
         return float(ticks * Decimal(repr(self.sample_time)))
 
     def every_of(self, share: float, samples: int) -> int:
-        """Sample times between the samples of a record of so many, that lasts a share of a slow one."""
+        """Sample times between the `samples` of a record that lasts this share of a slow one."""
         return max(self.fast, round(share * self.slow / samples))
 
     @property
@@ -495,7 +495,7 @@ def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
 
 @dataclass(frozen=True)
 class Kind:
-    """What a record is: file name, what it is for, which effects it shows, its waveform and time between samples."""
+    """A record: file name, purpose, effects that it shows, waveform and time between samples."""
 
     name: str
     purpose: str

@@ -4,9 +4,9 @@ Text tables (`t` time, `v` drive, `y` measured, any further columns) as instrume
 `.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. What is wrong with a file is refused, all of it at once and each
 with its place; small faults of a recording are repaired and counted in `Record.notes`.
 
-Of text, `text` makes lines of bytes, `layout` (for some instruments a file of their own) finds out what is where in
-them, `cells` and `clock` read cells, `csv_file` all rows; `columns` finds the columns asked for and `sampling` sample
-rates, for every format.
+Of a text file, `csv_file` makes lines and reads the rows, once `layout` has found what is where in them; `cells` reads
+single cells. For every format, `columns` finds the columns asked for and sample rates, and `reading` makes the record
+of them.
 
 A format is a file of this package and an entry of `FORMATS`.
 """
@@ -24,16 +24,13 @@ from hystgen.basics.problems import RecordError, printable
 from hystgen.basics.progress import Progress
 from hystgen.basics.writing import write_atomically
 from hystgen.records.array_files import read_mat, read_npz
-from hystgen.records.columns import LISTED, parse_columns
+from hystgen.records.columns import LISTED, agreed_units, headers, parse_columns
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
-from hystgen.records.no_value import LARGEST, no_value
 from hystgen.records.parquet import read_parquet
-from hystgen.records.reading import CountingFile, Reading, Table
-from hystgen.records.record import Record
-from hystgen.records.repair import SHORTEST, repaired
+from hystgen.records.reading import SHORTEST, CountingFile, Reading, Table, repaired
+from hystgen.records.record import LARGEST, Record, no_value
 from hystgen.records.tdms import read_tdms
-from hystgen.records.units import agreed_units, headers
 from hystgen.records.writing import columns_text, write_columns
 
 Source = Record | str | os.PathLike[str]
@@ -126,7 +123,7 @@ def read_record(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One record or path, or several, as a list. Raises TypeError for what is neither, such as a table or arrays."""
+    """One record or path, or several, as a list. Raises TypeError for anything else, such as a table or arrays."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     # Tables and mappings would give the names of their columns, which are no paths

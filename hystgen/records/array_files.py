@@ -10,9 +10,8 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from hystgen.records.columns import Column, column
+from hystgen.records.columns import Column, Step, column, from_number, is_named
 from hystgen.records.reading import Reading, Table, one_dimension
-from hystgen.records.sampling import Step, from_number, is_named
 
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")

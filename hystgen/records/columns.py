@@ -1,19 +1,233 @@
-"""Which column of a file is which of ours: t, v, y, u."""
+"""Columns of a file: their names, units and sample rates, and which of them are ours."""
 
 from __future__ import annotations
 
 import difflib
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.typing import NDArray
 
 from hystgen.basics.problems import printable
-from hystgen.records.sampling import Step
-from hystgen.records.units import is_time_unit, split_unit
+from hystgen.records.record import Array, Record
+
+# Units: how headers write them, which ones are times, and what several records agree on ----------------------
+
+
+MAX_UNIT = 40
+"""Longest text in a header that is taken for a unit; longer ones do not fit a parameter file either."""
+
+SECONDS = ("s", "sec", "secs", "second", "seconds")
+
+TIMES: dict[str, tuple[float, float]] = {
+    **dict.fromkeys(SECONDS, (1.0, 1.0)),
+    **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), (1.0, 1e3)),
+    **dict.fromkeys(("us", "usec", "microsecond", "microseconds"), (1.0, 1e6)),
+    **dict.fromkeys(("ns", "nsec", "nanosecond", "nanoseconds"), (1.0, 1e9)),
+    **dict.fromkeys(("min", "mins", "minute", "minutes"), (60.0, 1.0)),
+    **dict.fromkeys(("h", "hr", "hour", "hours"), (3600.0, 1.0)),
+}
+"""Factor and divisor to seconds: x/1000 is the double nearest to the time meant, 0.001*x need not be."""
+
+_ONE = (
+    r"(?:(?:[fpnumkMG]|d[am]?|c)?(?:s|V|A|m|rad|N|Hz|F|C|K|Pa|g|W|J|T|bar|Ohm|strain)"
+    r"|(?i:(?:pico|nano|micro|milli|kilo)?(?:met(?:er|re)s?|volts?|amperes?|seconds?|radians?|newtons?)"
+    r"|microns?|sec|msec|usec|counts?|lsb)|min|h|%|deg|deg ?C|°|°C|°F|arcsec|a\.u\.)"
+)
+_UNIT = re.compile(rf"{_ONE}(?:\^?-?\d)?(?:\s?[*/·]\s?{_ONE}(?:\^?-?\d)?)*")
+
+# After an underscore a word is a unit only when it is hardly anything else: v_in, y_min and v_m are names
+_AFTER_UNDERSCORE = re.compile(
+    r"[mun]?s|sec|seconds|[muk]?V|volts|[mu]A|k?Hz|[munp]m|microns|deg|[mu]rad|degC|[mk]N|counts"
+)
+_TIME_NAMES = ("t", "time")
+
+
+def split_unit(header: str) -> tuple[str, str]:
+    """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit is empty where there is none."""
+    text = header.strip()
+    match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
+    # In square brackets anything is a unit but a number, which counts channels
+    if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
+        return match[1], "" if match[2] == "-" else match[2]
+    match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
+    if match and len(match[2]) <= MAX_UNIT and _UNIT.fullmatch(_plain(match[2])):
+        return match[1], match[2]
+    name, _, unit = text.rpartition("_")
+    known = _AFTER_UNDERSCORE.fullmatch(_plain(unit)) or (name.casefold() in _TIME_NAMES and _plain(unit) in TIMES)
+    return (name, unit) if name and known else (text, "")
+
+
+def unit_alone(text: str) -> str | None:
+    """The unit that a cell below a header holds, `s` or `[um]`, empty for none; None for a cell that is no unit."""
+    inside = re.fullmatch(r"\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\)", text.strip())
+    unit = text.strip() if inside is None else inside[1] or inside[2] or ""
+    if unit in ("", "-") or (inside is not None and inside[1] and not unit.isdecimal()):
+        return "" if unit == "-" else unit
+    return unit if _UNIT.fullmatch(_plain(unit)) or _plain(unit).casefold() in TIMES else None
+
+
+def is_time_unit(unit: str) -> bool:
+    """Whether a unit is one of time."""
+    return _plain(unit).casefold() in TIMES
+
+
+def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
+    """Names of columns with their units, `v [V]`, wherever that is read back as the same name and unit."""
+    made = []
+    for name in names:
+        unit = units.get(name, "")
+        header = f"{name} [{unit}]"
+        made.append(header if unit and split_unit(header) == (name, unit) else name)
+    return made
+
+
+def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
+    """Times in seconds, and what the user should know about it, empty when they were seconds already."""
+    scale = TIMES.get(_plain(unit).partition(" since ")[0].casefold())
+    if scale is None:
+        return t, f'the unit "{printable(unit)}" of t is no known unit of time; its numbers were taken as seconds'
+    factor, divisor = scale
+    if factor == divisor:
+        return t, ""
+    seconds = t / divisor
+    seconds *= factor
+    return seconds, f"t is in {printable(unit)}; it was converted to seconds"
+
+
+def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = None) -> tuple[dict[str, str], list[str]]:
+    """Units `input` and `output` of a model made from `records`, and a sentence for each disagreement.
+
+    `given` wins over the records, the first record that has a unit over later ones. No number is converted.
+    """
+    units = {}
+    conflicts = []
+    everything = list(records)
+    for key, column in (("input", "v"), ("output", "y")):
+        unit = (given or {}).get(key, "")
+        source = "given"
+        for record in everything:
+            own = record.units.get(column, "")
+            if len(own) > MAX_UNIT or not own.isprintable():
+                conflicts.append(
+                    f'the unit "{printable(own)}" of {column} in {record.name} is not taken over: a unit has up to '
+                    f"{MAX_UNIT} characters on one line"
+                )
+            elif own and not unit:
+                unit, source = own, f"in {record.name}"
+            elif own and _plain(own) != _plain(unit):
+                conflicts.append(
+                    f'the unit of {column} is "{printable(unit)}" {source} and "{printable(own)}" in {record.name}; '
+                    "no number was converted, check that they agree"
+                )
+        if unit:
+            units[key] = unit
+    return units, conflicts
+
+
+def _plain(unit: str) -> str:
+    """A unit with the letter u for either of Unicode's two micro signs."""
+    return unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
+
+
+# Sample rates and times: in lines above a table, as scalars, as attributes -----------------------------------
+
+
+RATES = {
+    "mHz": 1e-3, "Hz": 1.0, "kHz": 1e3, "KHz": 1e3, "MHz": 1e6, "GHz": 1e9, "hz": 1.0, "1/s": 1.0, "samples/s": 1.0,
+    "S/s": 1.0, "kS/s": 1e3, "MS/s": 1e6, "GS/s": 1e9, "Sa/s": 1.0, "kSa/s": 1e3, "MSa/s": 1e6, "GSa/s": 1e9,
+    "sps": 1.0, "SPS": 1.0, "ksps": 1e3, "kSPS": 1e3, "MSPS": 1e6,
+}  # fmt: skip
+"""Units of sample rates in Hz; m and M differ, so letters count."""
+
+_RATE = r"(?i:sampl(?:e|ing)[ _-]?(?:rate|freq(?:uency)?)|f_?s(?:ample)?|srate|abtast(?:rate|frequenz))"
+_STEP = (
+    r"(?i:sampl(?:e|ing)[ _-]?(?:interval|period)|sample[ _-]?time|d_?t|delta[ _-]?t|time[ _-]?(?:step|increment)"
+    r"|wf_increment|t_?sample|abtast(?:zeit|intervall|periode))|T_?s"
+)
+_NUMBER = r"[+-]?\d+(?:[.,]\d+)*(?:[eE][+-]?\d+)?"
+_LINE = re.compile(
+    rf"(?<![A-Za-z0-9_])(?:(?P<rate>{_RATE})|(?P<step>{_STEP}))(?P<suffix>_[A-Za-z]+)?(?:\s*[\[(](?P<unit>[^\])]*)[\])])?"
+    rf"\s*(?:[:=;,\t]\s*)*(?P<number>{_NUMBER})(?:\s*[;,\t]?\s*[\[(]?(?P<after>[A-Za-zµμ/1]+)(?P<entry>\s*[=:])?)?"
+)
+
+
+@dataclass(frozen=True)
+class Step:
+    """`seconds` between two samples, and how the file gives them.
+
+    `of`: the column, or with its separator the group or struct, to which they belong; empty for all of the file;
+    `start`: when the first sample was, where the file gives that for each column.
+    """
+
+    seconds: float
+    said: str
+    of: str = ""
+    start: str = ""
+
+    def belongs(self, names: Iterable[str]) -> bool:
+        """Whether they are those of any of the columns."""
+        group = not self.of or self.of[-1] in "./"
+        return any(name.startswith(self.of) if group else name == self.of for name in names)
+
+
+def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
+    """What numbered lines of text say of the sample rate."""
+    found = []
+    for number, line in lines:
+        for match in _LINE.finditer(line.replace('"', "")):
+            text = match["number"]
+            if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
+                continue
+            # What has a value of its own is no unit but the next entry of the line
+            after = "" if match["entry"] else match["after"]
+            unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
+            step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
+            if step is not None:
+                found.append(step)
+    return found
+
+
+def is_named(name: str) -> bool:
+    """Whether a name, with a unit or without, is one of a sample rate or a sample time."""
+    key, _ = split_unit(name)
+    return re.fullmatch(f"{_RATE}|{_STEP}", key) is not None
+
+
+def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step | None:
+    """What a number beside the columns says of their sample rate, by its name; `of` as in `Step`."""
+    key, own_unit = split_unit(name)
+    rate = re.fullmatch(_RATE, key) is not None
+    if not rate and re.fullmatch(_STEP, key) is None:
+        return None
+    step = _step(rate, value, unit or own_unit, f"{of} {name}".strip() if of[-1:] not in "./" else f"{of}{name}")
+    return None if step is None else replace(step, of=of)
+
+
+def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
+    """Seconds a sample of a rate or an interval; a unit that is none of it gives nothing."""
+    if not 0.0 < value < float("inf"):
+        return None
+    plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
+    if rate:
+        if plain and plain not in RATES:
+            return None
+        said = f"sample rate {value:g} {plain or 'Hz'}"
+        seconds = 1.0 / (value * RATES.get(plain, 1.0))
+    else:
+        if plain and plain.casefold() not in TIMES:
+            return None
+        factor, divisor = TIMES.get(plain.casefold(), (1.0, 1.0))
+        said = f"sample time {value:g} {plain or 's'}"
+        seconds = value / divisor * factor
+    return Step(seconds, f"{said} ({printable(where)}{'' if plain else ', which gives no unit'})")
+
+
+# Which column of a file is which of ours: t, v, y, u ---------------------------------------------------------
+
 
 LISTED = 20
 """Columns or bad cells named one by one before the rest is only counted."""
@@ -30,13 +244,13 @@ MEANINGS = {
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
 }  # fmt: skip
-"""Words, one of which the name of a column has that may be meant where it is not called as we call it."""
+"""Words in names of columns that may be meant where none has our name."""
 
 DECIDE = {
     "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
     "u": frozenset(("target", "reference", "ref", "setpoint", "desired", "commanded", "command", "soll", "sollwert")),
 }
-"""Words that say which column is meant, whatever other words stand beside them."""
+"""Words that decide which column is meant, despite other words beside them."""
 
 OTHERWISE = frozenset(
     ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
@@ -205,7 +419,7 @@ class Finder:
         return meant[0] if len(meant) == 1 else None
 
     def _name_together(self) -> None:
-        """One question for all columns of which nothing is known."""
+        """One question for all columns that nothing identifies."""
         if len(self._unnamed) > 1:
             *others, last = (f'"{ours}"' for ours in self._unnamed)
             self.problems.append(

@@ -5,27 +5,111 @@ A file of any size then needs little more memory than its columns, and every fau
 
 from __future__ import annotations
 
+import codecs
 import io
 import os
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.problems import printable
-from hystgen.basics.words import counted
-from hystgen.records import layout, lvm, pi_gcs, tektronix
-from hystgen.records.cells import BLANKS, COMMENT, MISSING, Dialect, is_comment, shape
-from hystgen.records.clock import Clock
+from hystgen.basics.problems import counted, printable
+from hystgen.records import layout
+from hystgen.records.cells import BLANKS, COMMENT, MISSING, Clock, Dialect, is_comment, shape
 from hystgen.records.columns import LISTED, Column, column
 from hystgen.records.layout import Layout
 from hystgen.records.reading import Lines, Reading, Table
 from hystgen.records.record import Array
-from hystgen.records.text import texts
+
+# Bytes into text: encodings, byte order marks and line ends --------------------------------------------------
+
+
+BLOCK = 1 << 20
+"""Bytes read at a time; a longer line is none of a text table."""
+
+WIDE = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
+"""Encodings by the byte order mark that a file begins with."""
+
+LOOKED_AT = 1 << 10
+"""Bytes at the start of a file that show UTF-16 without a byte order mark."""
+
+
+def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
+    """The file's text in blocks of whole lines that end in a line feed, as every line does but perhaps the last."""
+    latin = False
+    for data in _blocks(reading, _eight_bit(reading, stream)):
+        if b"\0" in data:
+            raise reading.refuse("is not a text file; export CSV, .npz, .h5, Parquet or MATLAB .mat")
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+            if not latin:
+                reading.notes.append("the text is not UTF-8; it was read as Latin-1")
+            latin = True
+        if "\r" in text:
+            text = text.replace("\r\n", "\n").replace("\r", "\n")
+        yield text
+
+
+def _eight_bit(reading: Reading, stream: IO[bytes]) -> Iterator[bytes]:
+    """The bytes of the file without its byte order mark, those of UTF-16 as UTF-8."""
+    data = stream.read(BLOCK)
+    mark, encoding = next(((mark, name) for mark, name in WIDE.items() if data.startswith(mark)), (b"", ""))
+    encoding = encoding or _wide_without_mark(data[:LOOKED_AT])
+    data = data[len(mark) :]
+    if not encoding.startswith("utf-16"):
+        while data:
+            yield data
+            data = stream.read(BLOCK)
+        return
+    reading.understood(encoding[:6].upper())
+    decoder = codecs.getincrementaldecoder(encoding)("strict")
+    while True:
+        try:
+            text = decoder.decode(data, final=not data)
+        except UnicodeDecodeError:
+            raise reading.refuse("is damaged UTF-16 text; export it again, as UTF-8") from None
+        if text:
+            yield text.encode("utf-8", "surrogatepass")
+        if not data:
+            return
+        data = stream.read(BLOCK)
+
+
+def _wide_without_mark(start: bytes) -> str:
+    """UTF-16 when every other byte is zero, as in text that is mostly digits; else nothing."""
+    pairs = len(start) // 2
+    for encoding, zeros, others in (
+        ("utf-16-le", start[1::2].count(0), start[: 2 * pairs : 2].count(0)),
+        ("utf-16-be", start[: 2 * pairs : 2].count(0), start[1::2].count(0)),
+    ):
+        if pairs and not others and zeros > 0.9 * pairs:
+            return encoding
+    return ""
+
+
+def _blocks(reading: Reading, chunks: Iterator[bytes]) -> Iterator[bytes]:
+    rest = b""
+    for data in chunks:
+        data = rest + data
+        # A carriage return at the end may be the first half of a line end
+        end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1
+        if end:
+            yield data[:end]
+        rest = data[end:]
+        if len(rest) > BLOCK:
+            raise reading.refuse(f"has a line of more than {BLOCK >> 20} MB; export one row a line")
+    if rest:
+        yield rest
+
+
+# Rows into columns -------------------------------------------------------------------------------------------
+
 
 SAMPLE = 1 << 16
 """Characters at the start of a file, in whole lines, that show its layout."""
@@ -33,13 +117,8 @@ SAMPLE = 1 << 16
 SAMPLE_LINES = 8
 """Fewest lines that show it, however long they are: a header, units and a few rows."""
 
-INSTRUMENTS: tuple[Callable[[Reading, Sequence[str]], Layout | None], ...] = (
-    lvm.layout, pi_gcs.layout, tektronix.layout,
-)  # fmt: skip
-"""Formats whose first lines say themselves what is where."""
-
 SPARE = 1.05
-"""Rows are set aside for a file of so many times the rows that its first block makes expect."""
+"""Ratio of the rows that room is made for to the number that the first block suggests."""
 
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
@@ -67,12 +146,11 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
 
 
 def _layout(reading: Reading, sample: str) -> Layout:
-    """The layout that the first lines show, and what is said of it."""
+    """The layout that the first lines show; notes how it was understood."""
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
-    known = (each(reading, lines) for each in INSTRUMENTS)
-    found = next((each for each in known if each is not None), None) or layout.find(reading, lines)
+    found = layout.find(reading, lines)
     if found.kind:
         reading.understood(found.kind)
     dialect = found.dialect
@@ -115,7 +193,7 @@ def _size(stream: IO[bytes]) -> int:
 
 @dataclass
 class _Fault:
-    """Something wrong, in words, where it is first, how many times it is there and where last."""
+    """A fault in words, with its first place, number of occurrences and last line."""
 
     text: str
     line: int
@@ -197,7 +275,7 @@ class _Body:
         return reading.finished(numbers, taken, self.lines)
 
     def _room(self, rows: int, size: int) -> None:
-        """Make room for so many more rows, at once for all that may come when these have `size` bytes."""
+        """Make room for `more` rows, at once for all that may follow if these have `size` bytes."""
         needed = self.rows + rows
         have = min((len(x) for x in self.stored.values()), default=needed)
         if needed <= have:
@@ -267,7 +345,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Line by line: finds what is wrong and where, and takes what is merely missing."""
+        """Line by line: reports wrong cells with their place, and accepts missing ones."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []

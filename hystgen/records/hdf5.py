@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from hystgen.basics import extras
 from hystgen.records.array_files import MATLAB_NUMBERS
-from hystgen.records.columns import Column, column
+from hystgen.records.columns import Column, Step, column, from_number, is_named
 from hystgen.records.reading import Reading, Table, one_dimension
-from hystgen.records.sampling import Step, from_number, is_named
 
 SLICE = 1 << 18
 """Samples read at a time."""

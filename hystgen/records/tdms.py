@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import extras
-from hystgen.records.columns import Column, column
+from hystgen.records.columns import Column, Step, column
 from hystgen.records.reading import Reading, Table
-from hystgen.records.sampling import Step
 
 _UNITS = ("unit_string", "NI_UnitDescription")
 

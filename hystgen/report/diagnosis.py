@@ -1,11 +1,14 @@
-"""The report of a diagnosis: one page on what is missing, how much it explains, and what is left."""
+"""The report of a diagnosis: one page on the missing effects, their share of the error, and the remaining error."""
 
 from __future__ import annotations
 
+import functools
 import itertools
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ParamSpec
 
+from hystgen import diagnosis
 from hystgen.basics import parallel
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
@@ -23,8 +26,23 @@ if TYPE_CHECKING:
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
 """How exactly, and how, a compensator corrects a stage in front of the plays."""
 
-LONGER = 0.01
+VISIBLE = 0.01
 """An error is visibly larger than another from this share on."""
+
+
+P = ParamSpec("P")
+
+
+def _with_page(find: Callable[P, Diagnosis]) -> Callable[P, Diagnosis]:
+    @functools.wraps(find)
+    def found(*given: P.args, **named: P.kwargs) -> Diagnosis:
+        return replace(find(*given, **named), page=html)
+
+    return found
+
+
+diagnose = _with_page(diagnosis.diagnose)
+"""`hystgen.diagnose`: what the search finds, with a page to write."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:
@@ -45,7 +63,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Before and after, on held-out records", [figures["overlay"]]),
         Section("Where model and measurement disagree", [figures["records"], figures["time"], *_where(result)]),
         Section("What the error goes with", [figures["against"], figures["frequency"]]),
-        Section("What cannot be told apart", _rivals(result)),
+        Section("What cannot be separated", _rivals(result)),
         Section("Shapes that were tried", _ranking(result)),
         Section("What was done to the data", [Listing(found.notes) if found.notes else Text("Nothing.")]),
         Section("Parameters", [Details("Parameter file with the effects added", parameters_text)]),
@@ -67,7 +85,7 @@ def _chance(p_value: float) -> str:
 def _refitted(result: Result) -> list[Text]:
     """An explanation of the second bar where it is visibly longer than the first."""
     given, refitted = result.gap.as_given, result.gap.refitted
-    if refitted.holdout <= (1.0 + LONGER) * given.holdout:
+    if refitted.holdout <= (1.0 + VISIBLE) * given.holdout:
         return []
     fitted = f"{given.fit:.4g} to {refitted.fit:.4g}"
     return [

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.data.noise_floor import still
+from hystgen.diagnosis.data.signals import still
+from hystgen.diagnosis.findings.content import loop_centre
 from hystgen.diagnosis.findings.kinds import Line
-from hystgen.diagnosis.findings.residual import loop_centre
 from hystgen.diagnosis.search import acceptance
 from hystgen.report import drawing
 from hystgen.report.drawing import label

@@ -101,7 +101,7 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """The style of all pictures, whatever matplotlib's own settings; to draw and to save in. Raises PlotError."""
+    """The style of all pictures, independent of matplotlib's settings; to draw and to save in. Raises PlotError."""
     require()
     with _quiet():
         from matplotlib import figure, style  # noqa: F401  # which each fork of this process would import again

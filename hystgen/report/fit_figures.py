@@ -25,7 +25,7 @@ BINS, FEWEST = 40, 5
 """Bins of the residual's mean, and the fewest samples in one that is shown."""
 
 TAIL, FAR = 0.002, 3.0
-"""Quantiles at which an axis ends, and how many times farther out the extremes then are."""
+"""Quantiles at which an axis ends, and the factor by which the extremes then lie farther out."""
 
 AGREE = 1.2
 """Two estimates of the noise that differ by at most this factor agree."""
@@ -86,7 +86,7 @@ class Shown:
     def noise(self) -> float | None:
         """Standard deviation of white noise in y; None where the residual is not white on the scale of samples.
 
-        Differences of second order take what is smooth out of a residual and leave noise times the root of 6 (Gasser,
+        Second differences take the smooth part out of a residual and leave noise times the root of 6 (Gasser,
         Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth do
         neighbours agree with that from every other sample.
         """
@@ -102,7 +102,7 @@ class Shown:
 
 
 def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
-    """The records of a fit with what is drawn of them; those held out last, as in `fit.used`."""
+    """The records of a fit as they are drawn; those held out last, as in `fit.used`."""
     if len(records) != len(fit.used):
         raise ValueError(f"the fit compared {len(fit.used)} records, those held out among them, not {len(records)}")
     return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
@@ -177,7 +177,7 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
 
 
 def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
-    """Measured and model along time, what was not compared shaded or marked."""
+    """Measured and model along time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
     low, high = float(good.min()), float(good.max())
@@ -345,7 +345,7 @@ def noise_of(shown: Sequence[Shown]) -> float | None:
 
 
 def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
-    """Initial loading curve with its band; with a front, its curve and how far it is from a straight line."""
+    """Initial loading curve with its band; with a front, its curve and its distance from a straight line."""
     units, cascade = units_of(fit), cascade_of(fit.parameters)
     bent = bool(cascade.stages)
     if wide:

@@ -63,7 +63,7 @@ class Details:
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what is below it."""
+    """A heading and its content."""
 
     title: str
     blocks: Sequence[Text | Listing | Table | Figure | Details]

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hystgen.basics import arguments
+from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
-from hystgen.basics.words import counted
 from hystgen.emission import files
 from hystgen.front.dead_zone.model import DeadZone
-from hystgen.identification import PARSIMONY
-from hystgen.identification.fit import HELD_OUT
-from hystgen.identification.report import LEFT, cells
+from hystgen.identification import MODEL_PARSIMONY
+from hystgen.identification.fit import HELD_OUT, Fit
+from hystgen.identification.quality import WORD_COLUMNS, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
+from hystgen.records import Record, Source, read_records, several
 from hystgen.report import drawing, fit_figures, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
 
 if TYPE_CHECKING:
-    from hystgen.identification import Fit, Row
-    from hystgen.records import Record
+    from hystgen.identification import Row
 
 PAGE = "report.html"
 
@@ -44,6 +45,23 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
             if not place.is_dir():
                 raise NotADirectoryError(f"{place} is a file; give a folder for the report")
             return
+
+
+def report_fit(
+    fit: Fit,
+    records: Source | Iterable[Source],
+    folder: str | os.PathLike[str],
+    holdout: Source | Iterable[Source] = (),
+) -> Path:
+    """Write the report of a fit: `report.html`, which needs nothing else, and its pictures; the path of the page.
+
+    `records`, `holdout`: as `identify` was given them, in the same order; records read with options such as `columns`
+    have to be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises
+    ValueError for other records, RecordError, OSError.
+    """
+    if not isinstance(fit, Fit):
+        raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
+    return write(fit, read_records([*several(records), *several(holdout)]), folder)
 
 
 def write(
@@ -152,7 +170,7 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> l
 def _table(fit: Fit) -> list[Text | Table | Listing]:
     row = held_out_row(fit)
     marked = next((k for k, each in enumerate(fit.rows) if each is row), len(fit.rows) - 1)
-    blocks: list[Text | Table | Listing] = [Table(cells(fit.rows, fit.unit), LEFT, marked)]
+    blocks: list[Text | Table | Listing] = [Table(cells(fit.rows, fit.unit), WORD_COLUMNS, marked)]
     candidates = [each for each in fit.rows if each.part == "candidate"]
     if candidates and row is not None:
         best = min(each.rms for each in candidates)
@@ -160,7 +178,7 @@ def _table(fit: Fit) -> list[Text | Table | Listing]:
         blocks.append(
             Text(
                 f"{chosen.model} was chosen: of the candidates, the simplest first, it is the first whose held-out "
-                f"error is within {100 * (PARSIMONY - 1):.3g} % of the least, {best:.4g}"
+                f"error is within {100 * (MODEL_PARSIMONY - 1):.3g} % of the least, {best:.4g}"
                 f"{f' {fit.unit}' if fit.unit else ''}."
             )
         )

@@ -2,22 +2,43 @@
 
 from __future__ import annotations
 
+import functools
 import os
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
 
 from hystgen.basics.version import __version__
-from hystgen.planning.plan import EDGE, MEASURED, lasting
+from hystgen.emission import files
+from hystgen.planning import plan as planning
+from hystgen.planning.plan import EDGE, MEASURED, Drive, lasting
 from hystgen.report import drawing
 from hystgen.report.drawing import label
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
-
-if TYPE_CHECKING:
-    from hystgen.planning.plan import Drive, Plan
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
 """Width in inches and panels side by side."""
 
 FIT, JUDGE = drawing.MEASURED, drawing.MODEL
+
+
+@dataclass(frozen=True)
+class Plan(planning.Plan):
+    """Drive records of one session, in the order in which they are recorded; fields as in `hystgen.planning.plan`."""
+
+    def write(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; the paths.
+
+        Raises PlotError without matplotlib, OSError.
+        """
+        made = {**self.tables(), "plan.html": html(self, folder)}
+        return files.write(Path(folder), {name: text.encode("utf-8") for name, text in made.items()})
+
+
+@functools.wraps(planning.plan)
+def plan(*given: Any, **options: Any) -> Plan:
+    made = planning.plan(*given, **options)
+    return Plan(**{each.name: getattr(made, each.name) for each in fields(made)})
 
 
 def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
@@ -27,7 +48,7 @@ def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
     figure = Figure("drives", wide, narrow, CAPTION, ALTERNATIVE)
     home = os.fspath(folder).rstrip("/\\")
     lead = [
-        Text(f"Drives that tell all effects apart. {plan.sentence()}"),
+        Text(f"Drives that separate all effects. {plan.sentence()}"),
         Text(f"When the measured records are in {home}/{MEASURED}, run:", plan.command(folder)),
     ]
     sections = [
@@ -99,7 +120,7 @@ def _limits(plan: Plan) -> list[str]:
         f"Cannot be seen: a slew limit above {_rate(plan, fastest)}, since no record is faster.",
         f"Cannot be seen: a resonance above {1.0 / (EDGE * fast):.3g} Hz, and lags and delays far below {fast:.3g} s, "
         "since no record is sampled more often.",
-        f"Cannot be told from drift: creep with time constants far above {lasting(plan.duration)}, the whole session.",
+        f"Not separable from drift: creep with time constants far above {lasting(plan.duration)}, the whole session.",
     ]
     if fast > 1.5 * plan.sample_time:
         said.append(

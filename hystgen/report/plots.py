@@ -23,7 +23,7 @@ FORMATS = (".png", ".svg")
 
 
 def check_path(path: str | os.PathLike[str]) -> None:
-    """Raise PlotError for a file that no plot can be written to."""
+    """Raise PlotError for a file that cannot hold a plot."""
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise PlotError(f"{target}: a plot is a .png or .svg file")

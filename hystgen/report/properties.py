@@ -133,7 +133,7 @@ def _fixed(model: Model, drive: str, output: str) -> list[str]:
 
 
 def warnings(model: Model) -> list[str]:
-    """What the user should know before relying on the model."""
+    """Warnings about the model, one sentence each."""
     c = model.cascade
     if model.effects or c.inverse_problems():
         return []

@@ -1,4 +1,4 @@
-"""What a seed gives: bench, session, plant, noise, the believed model, and the strength of its effects.
+"""The case of a seed: bench, session, plant, noise, the nominal model, and the strength of its effects.
 
 Seeds below REPORT are for tuning, those from it on for reporting; nothing else separates the two blocks.
 """
@@ -70,7 +70,7 @@ class Present:
 
 @dataclass(frozen=True)
 class Case:
-    """Everything about one case; only `measured`, `believed` and the session's known history go to the workflow.
+    """Everything about one case; only `measured`, `nominal` and the session's known history go to the workflow.
 
     `clean`: noise-free output of the plant a record, before any foreign fault; `twin`: the same of the plant without
     its effects; `measured`: columns a record by name; `added`: what the converters added to `clean`; `unabsorbed`,
@@ -87,7 +87,7 @@ class Case:
     clean: tuple[Array, ...]
     twin: tuple[Array, ...]
     measured: tuple[dict[str, Array], ...]
-    believed: Believed
+    nominal: Nominal
     unabsorbed: float
     remainder: float
     session_time: bool
@@ -106,7 +106,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Believed:
+class Nominal:
     """Parameters of the model that the workflow is given: about right, from the plant without effects."""
 
     thresholds: tuple[float, ...]
@@ -154,7 +154,7 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
         if logged:
             columns["temperature"] = _thermometer(streams[5], stage, item)
         measured.append(columns)
-    believed = _believe(streams[5], course, np.concatenate(twin), stage.bench.span)
+    nominal = _nominal(streams[5], course, np.concatenate(twin), stage.bench.span)
     return Case(
         kind,
         seed,
@@ -166,7 +166,7 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
         tuple(clean),
         tuple(twin),
         tuple(measured),
-        believed,
+        nominal,
         unabsorbed,
         remainder,
         session_time,
@@ -309,7 +309,7 @@ def _thermometer(rng: np.random.Generator, stage: session.Session, item: session
     return measure.quantised(true + 0.01 * rng.standard_normal(len(true)), 0.01)
 
 
-def _believe(rng: np.random.Generator, course: refit.Track, output: Array, span: float) -> Believed:
+def _nominal(rng: np.random.Generator, course: refit.Track, output: Array, span: float) -> Nominal:
     number = int(rng.integers(8, 16))
     even = refit.radii(0.9 * span, number + 1)[1:]
     thresholds = np.concatenate(([0.0], np.sort(rng.uniform(0.9, 1.1, number) * even)))
@@ -325,4 +325,4 @@ def _believe(rng: np.random.Generator, course: refit.Track, output: Array, span:
     # As written, two thresholds may be the same
     written, first = np.unique([float(f"{x:.5g}") for x in thresholds], return_index=True)
     weights = np.add.reduceat(weights, first)
-    return Believed(tuple(written.tolist()), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}"))
+    return Nominal(tuple(written.tolist()), tuple(float(f"{x:.5g}") for x in weights), float(f"{offset:.4g}"))

@@ -96,7 +96,7 @@ def units_one(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: 
 
 
 def units_all(rng: np.random.Generator, scenes: list[Scene], v: list[Array], y: list[Array]) -> dict[str, float]:
-    """Every record in other units than those of the believed model."""
+    """Every record in other units than those of the nominal model."""
     factor = _one_of(rng, 1000.0, 0.001, 25.4, 0.1)
     for seen in y:
         seen *= factor

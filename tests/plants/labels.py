@@ -33,13 +33,13 @@ def write(case: Case, folder: Path, with_rivals: bool = True) -> Path:
         text = "\n".join([",".join(columns), *(digits % row for row in rows)])
         (home / names[-1]).write_text(text + "\n", newline="\n")
     held_out = [record.held_out for record in case.session.records]
-    told = {
+    spec = {
         "fit": [name for name, out in zip(names, held_out, strict=True) if not out],
         "holdout": [name for name, out in zip(names, held_out, strict=True) if out],
         "history": list(case.session.history) if case.session.history else None,
         "rest": case.session.rest,
     }
-    (home / "session.json").write_text(json.dumps(told, indent=1) + "\n")
+    (home / "session.json").write_text(json.dumps(spec, indent=1) + "\n")
     (home / "params.yaml").write_text(parameters(case))
     labels = folder / "labels"
     labels.mkdir(exist_ok=True)
@@ -48,8 +48,8 @@ def write(case: Case, folder: Path, with_rivals: bool = True) -> Path:
 
 
 def parameters(case: Case) -> str:
-    """The believed model in the package's parameter format."""
-    stand, model = case.session.bench, case.believed
+    """The nominal model in the package's parameter format."""
+    stand, model = case.session.bench, case.nominal
     return "\n".join(
         [
             "hystgen: 1",

@@ -3,7 +3,7 @@
 For each effect alone on its base hysteresis, with the noise of the case: a simple form of each catalogue name is
 fitted to the fit records jointly with a play sum and an offset a record; so is the true form, which is the play sum
 on the plant without the effect, all its parameters being known. A name whose held-out rms is within 5 % of the true
-form's cannot be told apart on these records.
+form's cannot be separated on these records.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PLAYS = 24
 
 @dataclass(frozen=True)
 class Data:
-    """A course with a measured output (seen samples); `clock` is the time the records tell, at every sample."""
+    """A course with a measured output (seen samples); `clock` is the time that the records give, at every sample."""
 
     course: refit.Track
     clock: Array

@@ -21,14 +21,14 @@ COMMAND = (sys.executable, "-c", "import sys; from hystgen.cli import main; sys.
 
 def arguments(case: Path) -> list[str]:
     """Arguments of `diagnose` for a case, with paths relative to it."""
-    told = json.loads((case / "session.json").read_text())
-    words = ["diagnose", "params.yaml", *told["fit"], "-o", "out"]
-    for name in told["holdout"]:
+    spec = json.loads((case / "session.json").read_text())
+    words = ["diagnose", "params.yaml", *spec["fit"], "-o", "out"]
+    for name in spec["holdout"]:
         words += ["--holdout", name]
-    if told["history"]:
-        words.append("--history=" + ",".join(f"{x:g}" for x in told["history"]))
-    if told["rest"]:
-        words.append(f"--rest={told['rest']:g}")
+    if spec["history"]:
+        words.append("--history=" + ",".join(f"{x:g}" for x in spec["history"]))
+    if spec["rest"]:
+        words.append(f"--rest={spec['rest']:g}")
     return words
 
 

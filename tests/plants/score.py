@@ -268,7 +268,7 @@ def main(cases: Path, labels: Path, results: Path, report: Path | None = None) -
             "confusion": {row: dict(counts) for row, counts in confusion(outcomes).items()},
             "curve": curve(outcomes),
             "seconds": _seconds(outcomes),
-            "failures": [_told(x) for x in outcomes if _failed(x)],
+            "failures": [_case_text(x) for x in outcomes if _failed(x)],
         }
         report.write_text(json.dumps(data, indent=1) + "\n")
     return 0 if all(x.kept for x in judged) else 1
@@ -298,7 +298,7 @@ def text(outcomes: Sequence[Outcome], judged: Sequence[Figure]) -> str:
     times = _seconds(outcomes)
     if times:
         lines += ["", "seconds a case: median {median:.1f}, 90 % {most:.1f}, longest {longest:.1f}".format(**times)]
-    failed = [_told(x) for x in outcomes if _failed(x)]
+    failed = [_case_text(x) for x in outcomes if _failed(x)]
     if failed:
         lines += ["", "failures:", *(f"  {line}" for line in failed)]
     return "\n".join(lines)
@@ -317,7 +317,7 @@ def _failed(x: Outcome) -> bool:
     return bool(x.confident_wrong) if kind == "poor" else kind == "none" and bool(x.names)
 
 
-def _told(x: Outcome) -> str:
+def _case_text(x: Outcome) -> str:
     ratios = ", ".join(f"{e['name']}/{e['form']} at {e['ratio']:.1f}" for e in x.label["effects"]) or x.row
     answer = ", ".join(x.names) or x.column
     alike = "; alike " + ", ".join("/".join(sorted(group)) for group in x.groups) if x.groups else ""

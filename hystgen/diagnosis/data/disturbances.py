@@ -1,6 +1,7 @@
-"""Records without disturbances that rule their errors: mains hum, and a sensor's ripple over the position.
+"""Disturbances in what a model leaves: lines over time, a ripple over the position, stick-slip.
 
-Hum hides effects; a ripple would be taken for effects and for stick-slip.
+Lines and ripples that rule the errors are taken out of the records: hum hides effects, and a ripple would be taken for
+effects and for stick-slip. Stick-slip is reported with place and count, and never named.
 """
 
 from __future__ import annotations
@@ -10,13 +11,347 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hystgen.diagnosis.data import periodic
 from hystgen.diagnosis.data.items import Item, Model
-from hystgen.diagnosis.data.noise_floor import still
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.findings.kinds import Line, Ripple
+from hystgen.diagnosis.data.signals import peaks, still
+from hystgen.diagnosis.findings.kinds import Line, Ripple, StickSlip
 from hystgen.diagnosis.search import acceptance
+
+Array = NDArray[np.float64]
+
+
+# Lines over time: mains hum and other steady tones -----------------------------------------------------------
+
+
+MAINS = (50.0, 60.0)
+"""Hz: the world's mains frequencies."""
+
+MAINS_HARMONICS = (1, 2, 3, 5)
+
+
+@dataclass(frozen=True)
+class Removed:
+    """A line or ripple, the errors without it, and the share of the variance of all errors that it takes."""
+
+    finding: Line | Ripple
+    errors: list[Array]
+    share: float
+
+
+def removed_share(before: Sequence[Array], after: Sequence[Array]) -> float:
+    """Share of the power of some errors that is gone in others."""
+    total = _power(before)
+    return 1.0 - _power(after) / total if total > 0.0 else 0.0
+
+
+def _power(errors: Sequence[Array]) -> float:
+    return float(sum(np.nansum(e**2) for e in errors))
+
+
+def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
+    """The strongest line that is in most of the records long enough for it, or that rules a few."""
+    found: list[tuple[float, float, int]] = []
+    for k, (item, error) in enumerate(zip(items, errors, strict=True)):
+        found += [(share, frequency, k) for share, frequency in peaks(item, error)]
+    times = [item.run.t[np.isfinite(e)] for item, e in zip(items, errors, strict=True)]
+    lengths = [float(np.ptp(t)) if len(t) > acceptance.LINE_SAMPLES else 0.0 for t in times]
+    rates = [1.0 / float(np.median(np.diff(item.run.t))) for item in items]
+    best: tuple[float, float, list[int], list[int]] | None = None
+    for _, frequency, k in found:
+        near = [p for p in found if abs(p[1] - frequency) < acceptance.SAME_BINS / min(lengths[p[2]], lengths[k])]
+        seen = sorted({p[2] for p in near})
+        able = [
+            j for j, n in enumerate(lengths)
+            if n * frequency >= acceptance.LINE_PERIODS and 2.0 * frequency <= rates[j]
+        ]  # fmt: skip
+        strength = sum(p[0] for p in near)
+        common = len(seen) >= max(2, acceptance.SEEN_IN * len(able)) or len(able) == len(seen)
+        rules = min(p[0] for p in near) > acceptance.RULING_SHARE
+        if (common or rules) and (best is None or strength > best[0]):
+            longest = max(near, key=lambda p: lengths[p[2]])  # the frequency is sharpest there
+            best = strength, longest[1], seen, able
+    if best is None:
+        return None
+    _, frequency, seen, able = best
+    frequency = _refined(items, errors, frequency, seen, lengths)
+    after, sizes, has = [], [], []
+    for k, (item, error) in enumerate(zip(items, errors, strict=True)):
+        if lengths[k] * frequency < 2.0:  # less than two periods are no line
+            after.append(error)
+            continue
+        e, size = _without(error, _phase(item, frequency))
+        after.append(e)
+        if k in seen or (k in able and removed_share([error], [e]) > acceptance.LINE_SHARE):
+            has.append(k)
+        # two samples a period do not show the amplitude
+        resolved = acceptance.AMPLITUDE_SAMPLES * frequency
+        if k in seen and (resolved < rates[k] or all(resolved > rates[j] for j in seen)):
+            sizes.append(size)
+    finding = Line(
+        frequency=float(f"{frequency:.4g}"),
+        amplitude=float(np.median(sizes)),
+        share=removed_share([errors[k] for k in has], [after[k] for k in has]),
+        records=tuple(dict.fromkeys(items[k].name for k in has)),
+        mains=_mains(frequency, 0.5 / max(lengths[k] for k in seen)),
+    )
+    return Removed(finding, after, removed_share(errors, after))
+
+
+def _mains(frequency: float, width: float) -> float | str | None:
+    """The mains frequency that a line belongs to, or which harmonic of it the line is; `width`: its uncertainty, Hz."""
+    for mains in MAINS:
+        for n in MAINS_HARMONICS:
+            if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):
+                return mains if n == 1 else f"{n} x {mains:g} Hz"
+    return None
+
+
+def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
+    """The strongest line, if in most of the records that have it one half predicts the line of the other half.
+
+    An actuator answers with the lines of its drive, which are excluded, or it rings and fades.
+    """
+    line = in_time(items, errors)
+    if line is None or not isinstance(line.finding, Line):
+        return None
+    holds = 0
+    having = [k for k, item in enumerate(items) if item.name in line.finding.records]
+    for k in having:
+        known = np.isfinite(errors[k])
+        phase, e = _phase(items[k], line.finding.frequency)[known], errors[k][known]
+        table = np.column_stack([np.cos(phase), np.sin(phase), np.ones(len(e))])
+        half = len(e) // 2
+        removed = 0.0
+        for here, other in ((slice(half), slice(half, None)), (slice(half, None), slice(half))):
+            wave = table[other, :2] @ np.linalg.lstsq(table[here], e[here], rcond=None)[0][:2]
+            rest = e[other] - e[other].mean()
+            removed += float(np.sum(rest**2) - np.sum((rest - wave) ** 2))
+        own = np.sum((e - e.mean()) ** 2) - np.nansum(_without(e, phase)[0] ** 2)
+        holds += bool(removed > acceptance.STEADY_SHARE * own)
+    return line if holds >= acceptance.COMMON_SHARE * len(having) else None
+
+
+def _refined(
+    items: Sequence[Item], errors: Sequence[Array], frequency: float, seen: Sequence[int], lengths: Sequence[float]
+) -> float:
+    """The frequency at which a sine removes most of the errors."""
+    places = frequency + np.linspace(-1.0, 1.0, 21) / max(lengths[k] for k in seen)
+    for _ in range(2):
+        removed = [
+            sum(
+                float(np.nansum(errors[k] ** 2) - np.nansum(_without(errors[k], _phase(items[k], f))[0] ** 2))
+                for k in seen
+            )
+            for f in places
+        ]
+        best, step = float(places[int(np.argmax(removed))]), float(places[1] - places[0])
+        places = best + np.linspace(-1.0, 1.0, 21) * step
+    return best
+
+
+def _phase(item: Item, frequency: float) -> Array:
+    return np.asarray(2.0 * np.pi * frequency * (item.run.t - item.run.t[0]))
+
+
+def _without(error: Array, phase: Array) -> tuple[Array, float]:
+    """The error without its sine and cosine over a phase, and their amplitude."""
+    known = np.isfinite(error)
+    table = np.column_stack([np.cos(phase[known]), np.sin(phase[known]), np.ones(int(np.count_nonzero(known)))])
+    solution = np.linalg.lstsq(table, error[known], rcond=None)[0]
+    residual = error.copy()
+    residual[known] -= table[:, :2] @ solution[:2]
+    return residual, float(np.hypot(solution[0], solution[1]))
+
+
+# A ripple with a fixed pitch over the position: interpolation errors and converter steps ---------------------
+
+
+MOST_SAMPLES = 20_000
+"""Samples that a pitch is refined with: it is then as fine as the noise allows."""
+
+FINER = 4
+"""Zero padding of the spectrum over position, so that pitches between whole parts of the range have a bin."""
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """The motion of a record, at the samples `at` that are compared.
+
+    `places`: predicted positions; `errors`: there; `moves`: how far the prediction moves from the sample before, NaN
+    where the drive holds: there one position is measured again and again, and the model has been fitted to it. The
+    measured position would not do: a ripple that is large against its pitch is no sine over itself.
+    """
+
+    at: NDArray[np.bool_]
+    places: Array
+    errors: Array
+    moves: Array
+
+    @classmethod
+    def of(cls, item: Item, error: Array) -> _Motion:
+        """The motion of a record."""
+        at = np.isfinite(error) & np.isfinite(item.y)
+        predicted = item.y - error
+        moves = np.diff(predicted, prepend=np.nan)
+        for first, last in still(item.run.v, acceptance.HOLD_SAMPLES):
+            moves[first + 1 : last] = np.nan
+        return cls(at, predicted[at], error[at], moves[at])
+
+    def resolves(self, pitch: float) -> NDArray[np.bool_]:
+        """The samples that resolve a ripple of this pitch."""
+        return np.asarray(np.abs(self.moves) < acceptance.RIPPLE_RESOLVED * pitch)
+
+
+def in_position(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
+    """A ripple over the predicted position, with the same phase in all records."""
+    motions = [_Motion.of(item, error) for item, error in zip(items, errors, strict=True)]
+    if sum(len(motion.places) for motion in motions) < acceptance.SPECTRUM_SAMPLES:
+        return None
+    low = min(float(motion.places.min()) for motion in motions if len(motion.places))
+    span = max(float(motion.places.max()) for motion in motions if len(motion.places)) - low
+    if span == 0.0:
+        return None
+    bins, periods = acceptance.POSITION_BINS, acceptance.LINE_PERIODS
+    summed = np.zeros(bins)
+    for motion in motions:
+        now = motion.resolves(span / periods)
+        if now.any():
+            place = np.minimum(((motion.places[now] - low) / span * bins).astype(int), bins - 1)
+            summed += np.bincount(place, motion.errors[now] - motion.errors[now].mean(), bins)
+    power = np.abs(np.fft.rfft(summed, FINER * bins)) ** 2
+    power[: FINER * periods] = 0.0
+    power[2 * bins // FINER :] = 0.0
+    reach, away = FINER * acceptance.SURROUNDINGS, FINER * 3
+    for k in _highest(power, acceptance.PITCHES):
+        around = np.concatenate(
+            [power[max(k - reach, FINER * periods) : k - away], power[k + away + 1 : k + reach]]
+        )
+        if not len(around) or power[k] <= acceptance.LINE_HEIGHT * float(np.median(around)):
+            continue
+        found = _ripple(items, errors, motions, _pitch(motions, FINER * span / k))
+        if found is not None:
+            return found
+    return None
+
+
+def _highest(power: Array, most: int) -> list[int]:
+    found: list[int] = []
+    for k in np.argsort(power)[::-1].tolist():
+        if len(found) == most or power[k] == 0.0:
+            break
+        if all(abs(k - other) > 2 * FINER for other in found):
+            found.append(k)
+    return found
+
+
+def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
+    """The pitch whose ripple removes most of the errors."""
+    parts = [(motion, now) for motion, now in ((motion, motion.resolves(pitch)) for motion in motions) if now.any()]
+    if not parts:
+        return pitch
+    every = max(1, sum(int(np.count_nonzero(now)) for _, now in parts) // MOST_SAMPLES)
+    y = np.concatenate([motion.places[now][::every] for motion, now in parts])
+    e = np.concatenate([motion.errors[now][::every] - motion.errors[now].mean() for motion, now in parts])
+
+    def removed(waves: float) -> float:
+        table = np.column_stack([np.cos(2.0 * np.pi * waves * y), np.sin(2.0 * np.pi * waves * y)])
+        right = table.T @ e
+        return float(right @ np.linalg.lstsq(table.T @ table, right, rcond=None)[0])
+
+    best, step = 1.0 / pitch, 0.05 / max(float(np.ptp(y)), pitch)
+    for _ in range(2):
+        places = best + step * np.arange(-10, 11)
+        best, step = float(max(places, key=removed)), 0.1 * step
+    return 1.0 / best
+
+
+def _ripple(
+    items: Sequence[Item], errors: Sequence[Array], motions: Sequence[_Motion], pitch: float
+) -> Removed | None:
+    """The ripple, if the ripple of all other passes holds in most of the passes up and down over several pitches.
+
+    What a lag or a loop leaves differs between the way up and the way down.
+    """
+    tables = [
+        np.column_stack([np.cos(2.0 * np.pi * motion.places / pitch), np.sin(2.0 * np.pi * motion.places / pitch)])
+        for motion in motions
+    ]
+    pieces, parts = [], []
+    for k, (motion, table) in enumerate(zip(motions, tables, strict=True)):
+        for way in (1.0, -1.0):
+            now = motion.resolves(pitch) & (way * motion.moves > 0.0)
+            passed = np.sum(np.abs(motion.moves[now])) / pitch
+            if np.count_nonzero(now) > acceptance.PASS_SAMPLES and passed > acceptance.PASS_PITCHES:
+                pieces.append((table[now], motion.errors[now] - motion.errors[now].mean()))
+                parts.append(k)
+    if len(pieces) < 2:
+        return None
+    squares = [(x.T @ x, x.T @ e) for x, e in pieces]
+    matrix, right = sum(s[0] for s in squares), sum(s[1] for s in squares)
+    holds = 0
+    for (x, e), (own, own_right) in zip(pieces, squares, strict=True):
+        others = np.linalg.lstsq(matrix - own, right - own_right, rcond=None)[0]
+        holds += bool(np.sum((e - x @ others) ** 2) < (1.0 - acceptance.LINE_SHARE) * np.sum(e**2))
+    solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    if holds < acceptance.COMMON_SHARE * len(pieces):
+        return None
+    share = removed_share([e for _, e in pieces], [e - x @ solution for x, e in pieces])
+    if share < acceptance.LINE_SHARE:
+        return None
+    after = []
+    for error, motion, table in zip(errors, motions, tables, strict=True):
+        e = error.copy()
+        e[motion.at] -= table @ solution
+        after.append(e)
+    finding = Ripple(
+        pitch=float(f"{pitch:.4g}"),
+        amplitude=float(np.hypot(solution[0], solution[1])),
+        share=share,
+        records=tuple(dict.fromkeys(items[k].name for k in parts)),
+        converter_step=all(abs(_step(items[k].y) / pitch - 1.0) < acceptance.CONVERTER_STEP for k in parts),
+    )
+    return Removed(finding, after, share)
+
+
+def _step(y: Array) -> float:
+    """The smallest step between two outputs that occur."""
+    return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))
+
+
+# The strongest line or ripple first --------------------------------------------------------------------------
+
+
+Way = Callable[[Sequence[Item], Sequence[Array]], Removed | None]
+
+
+def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
+    """Lines in the errors of several records, the strongest first, and the errors without them."""
+    return _strongest_first(items, errors, (in_time, in_position), 0.0)
+
+
+def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
+    """The same for lines that rule the errors and do not come from the actuator: steady ones and ripples."""
+    return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
+
+
+def _strongest_first(
+    items: Sequence[Item], errors: Sequence[Array], ways: Sequence[Way], least: float
+) -> tuple[list[Line | Ripple], list[Array]]:
+    remaining, found = list(errors), []
+    for _ in range(acceptance.MOST_LINES):
+        seen = [line for line in (way(items, remaining) for way in ways) if line is not None and line.share >= least]
+        if not seen:
+            break
+        best = max(seen, key=lambda line: line.share)
+        found.append(best.finding)
+        remaining = best.errors
+    return found, remaining
+
+
+# Records without the lines and ripples that rule their errors ------------------------------------------------
+
 
 Fitted = TypeVar("Fitted", bound=Model)
 
@@ -40,9 +375,10 @@ class Cleaned:
             error + (item.y - without.y)
             for item, without, error in zip(measured, clean, fitted.errors(clean), strict=True)
         ]
-        found, left = periodic.ruling(measured, errors)
+        found, remaining = ruling(measured, errors)
         items = [
-            replace(item, y=item.y - (error - rest)) for item, error, rest in zip(measured, errors, left, strict=True)
+            replace(item, y=item.y - (error - rest))
+            for item, error, rest in zip(measured, errors, remaining, strict=True)
         ]
         number = len(self.measured.to_fit)
         lines = tuple(replace(line, repaired=True) for k, line in enumerate(found) if not is_known(line, found[:k]))
@@ -51,7 +387,7 @@ class Cleaned:
     def left_by(self, fitted: Model) -> bool:
         """Whether a model leaves further such lines."""
         clean = _items(self.clean)
-        return bool(periodic.ruling(clean, fitted.errors(clean))[0])
+        return bool(ruling(clean, fitted.errors(clean))[0])
 
     def notes(self, unit: str | None) -> list[str]:
         """What was done to the records, one sentence each."""
@@ -59,7 +395,7 @@ class Cleaned:
 
 
 def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Cleaned:
-    """The records without the lines that a model shows, which is refitted to what is left of them each time."""
+    """The records without the lines that a model shows; the model is refitted to them in every round."""
     for _ in range(ROUNDS):
         seen = found.seen_by(fitted)
         if not seen.lines:
@@ -89,3 +425,48 @@ def is_known(line: Line | Ripple, others: Sequence[Line | Ripple]) -> bool:
 
 def _items(ready: Prepared) -> list[Item]:
     return [*ready.to_fit, *ready.held]
+
+
+# Stick-slip --------------------------------------------------------------------------------------------------
+
+
+def stick_slip(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[StickSlip]:
+    """Stick-slip: the output stands still while it should move, then catches up in a jump."""
+    found = (_stick_slip(item, error, noise) for item, error in zip(items, errors, strict=True))
+    return [each for each in found if each is not None]
+
+
+def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
+    """How often the output stands and leaps over stretches in which the prediction moves by a few times the noise.
+
+    What a lag or ringing misses is smooth: it continues from one stretch to the next, where a leap makes up for the
+    standing before it.
+    """
+    known = np.isfinite(error) & np.isfinite(item.y)
+    e, y = error[known], item.y[known]
+    predicted = y - e
+    move = np.abs(np.diff(predicted))
+    moving = move > acceptance.SLIP_MOVING * float(np.quantile(move, 0.75)) if len(move) else move > 0.0
+    if np.count_nonzero(moving) < 10 * acceptance.SLIP_JUMPS or noise <= 0.0:
+        return None
+    resolved = acceptance.SLIP_RESOLVED * noise
+    m = max(1, int(np.ceil(resolved / float(np.median(move[moving])))))
+    edges = np.arange(0, len(e), m)
+    should, does = np.diff(predicted[edges]), np.diff(y[edges])
+    slow, fast = acceptance.SLIP_STRETCH
+    inside = (np.abs(should) > slow * resolved) & (np.abs(should) < fast * resolved)
+    if np.count_nonzero(inside) < 5 * acceptance.SLIP_JUMPS:
+        return None
+    ratio = does[inside] / should[inside]
+    off = acceptance.SLIP_OFF
+    stands, leaps = float(np.mean(ratio < 1.0 - off)), float(np.mean(ratio > 1.0 + off))
+    around = ratio - np.mean(ratio)
+    again = float(around[1:] @ around[:-1]) / max(float(around @ around), 1e-300)
+    if stands < acceptance.SLIP_STANDS or leaps < acceptance.SLIP_LEAPS or again > acceptance.SLIP_CONTINUES:
+        return None
+    step = np.diff(e)
+    at = np.flatnonzero((np.abs(step) > resolved) & (np.sign(step) == np.sign(np.diff(predicted))))
+    if len(at) < acceptance.SLIP_JUMPS:
+        return None
+    first = float(item.run.t[np.flatnonzero(known)[at[0] + 1]])
+    return StickSlip(item.name, len(at), first, float(np.median(np.abs(step[at]))))

@@ -1,19 +1,26 @@
-"""A record as a diagnosis compares it, and arrays remembered for it."""
+"""Records as a diagnosis compares them: a record with its compared samples, and the same with fewer of them.
+
+A stretch over which drive and plays are straight needs no samples in it: plays depend on turning points alone, and
+filters are exact on straight lines.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
 
 Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
 MOVEMENTS = 5, 2**25
 """Play movements that are remembered for a record, and their bytes in all."""
@@ -26,7 +33,7 @@ COMPARISONS = 40, 2**23
 
 
 class Recent:
-    """The arrays used last, by key: at most `most` of them and `most_bytes` in all."""
+    """The arrays used last, by key: at most `most` of them, of `most_bytes` together."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self._most, self._most_bytes = most, most_bytes
@@ -53,7 +60,7 @@ class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
     `session`: all records of a session on one time axis, if they are of one, and `part` this record's samples of it.
-    `moved`: the last movements of the plays, which most numbers of a search do not change; `left`: the last errors
+    `moved`: the last movements of the plays, which most numbers of a search do not change; `residuals`: the last errors
     before the free offsets are fitted; `errors`: the same behind that.
     """
 
@@ -65,7 +72,7 @@ class Item:
     session: Run | None = None
     part: slice = field(default_factory=lambda: slice(None))
     moved: Recent = field(default_factory=lambda: Recent(*MOVEMENTS), init=False, repr=False, compare=False)
-    left: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
+    residuals: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
     errors: Recent = field(default_factory=lambda: Recent(*COMPARISONS), init=False, repr=False, compare=False)
 
     @cached_property
@@ -105,3 +112,91 @@ class Model(Protocol):
 
     def errors(self, items: Sequence[Item]) -> list[Array]:
         """Measured less predicted, (N,) a record, NaN where it is not compared."""
+
+
+# Fewer samples to search with --------------------------------------------------------------------------------
+
+
+def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[Mask]:
+    """Samples of each record without which the prediction at the others would change by a part of the noise.
+
+    `errors`: errors of a model over the records, NaN where they are not known.
+    """
+    return [_needed(item, residual, noise) for item, residual in zip(items, errors, strict=True)]
+
+
+def _needed(item: Item, residual: Array, noise: float) -> Mask:
+    run, known, number = item.run, np.isfinite(residual), len(item.run.t)
+    if np.count_nonzero(known) < 2:
+        return np.ones(number, dtype=bool)
+    residual, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (residual, item.y - residual))
+    as_drive = float(np.ptp(run.v)) / max(float(np.ptp(predicted)), 1e-300)
+    bends = [  # signal, how far it may be off a straight line, and whether that is its rms or every sample
+        (predicted, acceptance.THIN_STRAIGHT * noise, False),
+        (run.v, acceptance.THIN_STRAIGHT * noise * as_drive, False),
+        (residual, acceptance.THIN_RESIDUAL * noise, True),
+        *((column, acceptance.THIN_COLUMN * float(np.ptp(column)), True) for column in run.extra.values()),
+    ]
+    found, straight = np.zeros(number, dtype=bool), np.zeros(number, dtype=bool)
+    size = acceptance.THIN_STEPS
+    while size > 1:
+        first = np.arange(0, number, size)
+        ends, sizes = np.append(first, number - 1), np.diff(np.append(first, number))
+        here = np.ones(len(first), dtype=bool)
+        for x, most, typical in bends:
+            off = np.abs(x - np.interp(run.t, run.t[ends], x[ends]))
+            much = np.sqrt(np.add.reduceat(off**2, first) / sizes) if typical else np.maximum.reduceat(off, first)
+            here &= much <= most
+        now = np.repeat(here, sizes) & ~straight
+        found[first[now[first]]] = True
+        straight |= now
+        size //= 2
+    found |= ~straight
+    found[[0, -1]] = True
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(run.v)))) + 1  # the plays remember these
+    kept = np.flatnonzero(found)
+    beyond = np.abs(run.v[turns] - np.interp(run.t[turns], run.t[kept], run.v[kept]))
+    found[turns[beyond > acceptance.THIN_TURNING * noise * as_drive]] = True
+    return found
+
+
+def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
+    """Masks under which no sample may be left out."""
+    return [[np.ones(len(item.run.t), dtype=bool) for item in group] for group in groups]
+
+
+def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
+    """Groups of records with evenly spaced samples, at most `most` of them compared in each group, and the needed ones.
+
+    `masks`: the needed samples of each record. Groups that are small enough come back as they are.
+    """
+    every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
+    if max(every) == 1:
+        return [list(group) for group in groups]
+    kept: dict[int, Mask] = {}  # by run, since two records may be parts of one
+    for group, step, needs in zip(groups, every, masks, strict=True):
+        for item, mask in zip(group, needs, strict=True):
+            keep = mask.copy()
+            keep[::step] = True
+            kept[id(item.run)] = keep | kept.get(id(item.run), False)
+    sessions: dict[int, tuple[Run, Mask]] = {}
+    for item in itertools.chain(*groups):
+        if item.session is not None:
+            _, whole = sessions.setdefault(id(item.session), (item.session, np.ones(len(item.session.t), dtype=bool)))
+            whole[item.part] = kept[id(item.run)]
+    picked = {key: (run.picked(np.flatnonzero(mask)), np.cumsum(mask)) for key, (run, mask) in sessions.items()}
+    runs: dict[int, Run] = {}
+
+    def less(item: Item, step: int) -> Item:
+        keep = kept[id(item.run)]
+        run = runs.setdefault(id(item.run), item.run.picked(np.flatnonzero(keep)))
+        y = np.full_like(item.y, np.nan)
+        y[::step] = item.y[::step]
+        made = replace(item, run=run, y=y[keep])
+        if item.session is None:
+            return made
+        session, number = picked[id(item.session)]
+        begin = int(number[item.part.start]) - 1
+        return replace(made, session=session, part=slice(begin, begin + len(run.t)))
+
+    return [[less(item, step) for item in group] for group, step in zip(groups, every, strict=True)]

@@ -1,31 +1,258 @@
-"""Records made ready for the fits: what is fitted, what is held out, and what was done to them."""
+"""From records to the samples that fits compare: whole records and samples checked, held-out records set aside."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.problems import counted
 from hystgen.chain import chain
-from hystgen.diagnosis.data import bad_samples, held_out
-from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.findings.kinds import Finding, IsolatedSamples, Saturated
+from hystgen.diagnosis.data.items import Item, Model, rms
+from hystgen.diagnosis.findings.kinds import (
+    DropOuts,
+    ExchangedRecords,
+    Finding,
+    HeldSamples,
+    IsolatedSamples,
+    OtherHistory,
+    Saturated,
+    Scale,
+    SwappedChannels,
+)
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
-from hystgen.identification import faults, pi, prepared, thresholds
+from hystgen.identification import faults, pi, prepared
+from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
-from hystgen.identification.reduction import Course
-from hystgen.records import Record
+from hystgen.identification.quality import STARTS, UNLIKE
+from hystgen.identification.reduction import Course, settled
+from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]
+Kind = TypeVar("Kind", bound=Finding)
+
+
+# Whether records are what they claim: their units, columns, displacement, and the history before them --------
+
+
+Predict = Callable[[Record], Array]
+"""What the nominal model predicts of a record, (N,) in output units up to an offset."""
+
+
+@dataclass(frozen=True)
+class Against:
+    """A record's output as `factor * prediction + offset`, with the correlation of the two.
+
+    `sense`: area of the measured loop over that of the predicted one, negative where the output is ahead of the drive,
+    0 where it is not significant.
+    """
+
+    factor: float
+    correlation: float
+    sense: float
+
+
+def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | None], list[Finding]]:
+    """The records that can be used, None in place of the others, and the findings, one a record.
+
+    Exchanged columns are put right; a record in other units than the others, or with another's output, is left out.
+    Wrong samples take no part in the judgement.
+    """
+    kept: list[Record | None] = []
+    seen: list[Record] = []
+    findings: list[Finding] = []
+    found: dict[int, Against] = {}
+    predicted: dict[int, Array] = {}
+    for k, record in enumerate(records):
+        plain = right = faults.smooth(record) if _whole(record) else record
+        if _moves(plain):
+            right, predicted[k], found[k] = _right_way_round(plain, predict)
+        swapped = right is not plain
+        if swapped:
+            findings.append(SwappedChannels(record.name))
+        kept.append(replace(record, v=np.asarray(record.y), y=record.v) if swapped else record)
+        seen.append(right)
+    records, judged = seen, list(found)
+    widths = np.array([float(np.ptp(record.v)) for record in records])
+    moving = widths[widths > 0.0]
+    widest = float(np.max(moving[moving <= acceptance.OTHER_UNIT * np.median(moving)], initial=0.0))
+    wide = [k for k in judged if np.ptp(records[k].v) > acceptance.WIDE_DRIVE * widest]
+    for k in wide:
+        other = _other(k, records, predicted, found)
+        if other is not None:
+            kept[k] = None
+            findings.append(ExchangedRecords(records[k].name, records[other].name))
+    sure = [k for k in wide if kept[k] is not None and abs(found[k].correlation) > acceptance.FOLLOWS]
+    usual = float(np.median([found[k].factor for k in sure])) if sure else 1.0
+    if not 1.0 / acceptance.SCALE_OF_ALL < usual < acceptance.SCALE_OF_ALL:
+        findings.append(Scale("all", usual))
+    little = [k for k in judged if k not in wide and found[k].correlation > acceptance.FOLLOWS]
+    for k in (*sure, *little):
+        factor = found[k].factor / usual
+        least, most = (
+            (1.0 / acceptance.SCALE_OF_ONE, acceptance.SCALE_OF_ONE) if k in sure else (0.0, acceptance.OTHER_UNIT)
+        )
+        if not least < factor < most:
+            kept[k] = None
+            findings.append(Scale(records[k].name, factor))
+    for k in (k for k in wide if sure and k not in sure and kept[k] is not None):
+        size = _spread(records[k].y) / max(usual * _spread(predicted[k]), 1e-300)
+        if size < acceptance.DEAD_SENSOR:
+            kept[k] = None
+            findings.append(Scale(records[k].name, size))
+    return kept, findings
+
+
+def _spread(x: Any) -> float:
+    return float(np.subtract(*np.quantile(x, (0.75, 0.25))))
+
+
+def _whole(record: Record) -> bool:
+    """Whether nearly all samples have values of drive and output; other faults are reported later."""
+    v, y = record.v, record.y
+    if y is None or len(y) != len(v) or not (np.isfinite(y).all() and np.isfinite(v).all()):
+        return False
+    return all(np.count_nonzero(no_value(x)) <= faults.most(len(x)) for x in (v, y))
+
+
+def _moves(record: Record) -> bool:
+    """Whether drive and output of a whole record move."""
+    return _whole(record) and bool(np.ptp(np.asarray(record.y)) > 0.0 and np.ptp(record.v) > 0.0)
+
+
+def _against(record: Record, predicted: Array) -> Against:
+    assert record.y is not None
+    y, v = np.asarray(record.y, dtype=np.float64), np.asarray(record.v, dtype=np.float64)
+    factor, correlation, scatter = _line(predicted, y)
+    own, model = _area(v, y), _area(v, predicted)
+    # white noise of the output gives the area this standard deviation
+    around = scatter * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))) / 2.0
+    expected = abs(factor) * model
+    significant = abs(own) > acceptance.LOOP_SIGMAS * around and expected > 0.0
+    return Against(factor, correlation, own / expected if significant else 0.0)
+
+
+def _line(x: Array, y: Array) -> tuple[float, float, float]:
+    """Slope, correlation and scatter of y over x, without the few samples that lie far off."""
+    inside = np.ones(len(x), dtype=bool)
+    slope, scatter = 0.0, 0.0
+    for _ in range(4):
+        dx, dy = x - np.mean(x[inside]), y - np.mean(y[inside])
+        power = float(dx[inside] @ dx[inside])
+        if power <= 1e-18 * max(float(np.max(x**2)), 1e-300) * len(x):
+            return 0.0, 0.0, 0.0
+        slope = float(dx[inside] @ dy[inside]) / power
+        off = np.abs(dy - slope * dx - np.median(dy - slope * dx))
+        scatter = 1.4826 * float(np.median(off))
+        inside = off <= max(acceptance.OFF_LINE * scatter, 1e-12)
+        if np.count_nonzero(inside) < acceptance.ON_LINE * len(x):
+            inside[:] = True
+            break
+    dx, dy = x[inside] - np.mean(x[inside]), y[inside] - np.mean(y[inside])
+    size = float(np.sqrt((dx @ dx) * (dy @ dy)))
+    return slope, float(dx @ dy) / size if size > 0.0 else 0.0, scatter
+
+
+def _area(v: Array, y: Array) -> float:
+    """Area that (v, y) encloses counterclockwise, the sense of an output that is late."""
+    return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
+
+
+def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
+    """A record, with its columns exchanged if they were, its prediction, and how the two compare."""
+    predicted = predict(record)
+    found = _against(record, predicted)
+    if found.sense <= 0.0:
+        assert record.y is not None
+        swapped = replace(record, v=record.y, y=record.v)
+        otherwise = predict(swapped)
+        seen = _against(swapped, otherwise)
+        if _better(seen, found):
+            return swapped, otherwise, seen
+    return record, predicted, found
+
+
+def _better(swapped: Against, found: Against) -> bool:
+    """Whether a record's columns are exchanged: with the output as drive, the model predicts the drive.
+
+    Its loop then runs the right way, as wide as expected; where no loop is visible, the sensitivity decides.
+    """
+    if swapped.correlation < acceptance.FOLLOWS:
+        return False
+    least, most = 1.0 / acceptance.SCALE_OF_ALL, acceptance.SCALE_OF_ALL
+    if swapped.sense == 0.0:
+        as_one = 1.0 / acceptance.SCALE_OF_ONE < swapped.factor < acceptance.SCALE_OF_ONE
+        return not least < found.factor < most and as_one
+    better = swapped.correlation > found.correlation
+    return better and swapped.sense > acceptance.LOOP_AREA and least < swapped.factor < most
+
+
+def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found: dict[int, Against]) -> int | None:
+    """The record whose prediction the output of record k follows, where it does not follow its own."""
+    if abs(found[k].correlation) > acceptance.OWN_CORRELATION:
+        return None
+    y = np.asarray(records[k].y)
+    others = [(j, _line(x, y)[1]) for j, x in predicted.items() if j != k and len(x) == len(y)]
+    best = max(others, key=lambda each: each[1], default=(k, 0.0))
+    return best[0] if best[1] > acceptance.FOREIGN_CORRELATION else None
+
+
+# Whether the records begin in the memory to which the given history leads ------------------------------------
+
+
+def contradicted(items: Sequence[Item], fitted: Model) -> OtherHistory | None:
+    """The finding where the starts, which depend on the history, are off by far more than the rest, else None.
+
+    `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. Of a session only
+    the first record begins behind the history.
+    """
+    return _off(*_parts(items, fitted, False))
+
+
+def bends(items: Sequence[Item], fitted: Model, free: Model) -> OtherHistory | None:
+    """The same where a model fitted with the history can follow it, at the cost of the rest.
+
+    `free`: the model fitted to what does not depend on the history, which predicts what the starts should have been.
+    Starts that are off alone, and cost the rest nothing, may be an effect that fades.
+    """
+    starts, rest = _parts(items, free, True)
+    _, bent = _parts(items, fitted, True)
+    return _off(starts, rest) if rms(bent) > acceptance.HISTORY_COSTS * rms(rest) else None
+
+
+def _parts(items: Sequence[Item], fitted: Model, own: bool) -> tuple[list[Array], list[Array]]:
+    """Errors that depend on the history, and errors that do not; `own`: with the offset of the latter."""
+    first, later = [], []
+    for item, e in zip(items, fitted.errors(items), strict=True):
+        if item.history is None or (item.session is not None and item.part.start):
+            continue
+        end = settled(item.run.v, fitted.reach)
+        if own and np.isfinite(e[end:]).any():
+            e = e - float(np.nanmean(e[end:]))
+        first.append(e[:end])
+        later.append(e[end:])
+    return first, later
+
+
+def _off(first: Sequence[Array], later: Sequence[Array]) -> OtherHistory | None:
+    samples, others = (sum(int(np.count_nonzero(np.isfinite(e))) for e in part) for part in (first, later))
+    if min(samples, others) < STARTS:
+        return None
+    start, rest = rms(first), rms(later)
+    return OtherHistory("all", samples, start, rest) if start > UNLIKE * rest else None
+
+
+# Records made ready for the fits -----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Records to fit and held-out ones, and what was done to them.
+    """Records to fit and held-out ones, with notes on every change to them.
 
     `repaired`: faults that were left out or bridged; `drive`: range of the fitted drives; `thresholds`: of the plays.
     """
@@ -47,23 +274,23 @@ def prepare(
     """
     notes: list[str] = []
     held_courses, held_rails = _courses(holdout, history)
-    if holdout and len(records) > 2 and not held_out.enough(held_courses):
-        notes.append(held_out.too_little(held_courses, held_out.JUDGE))
+    if holdout and len(records) > 2 and not enough(held_courses):
+        notes.append(too_little(held_courses, JUDGE))
         holdout = []
     if not holdout and len(records) > 2:
-        aside = held_out.set_aside(records)
+        aside = set_aside(records)
         holdout = [records[k] for k in aside]
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
         held_courses, held_rails = _courses(holdout, history)
     fit_courses, fit_rails = _courses(records, history)
-    if not held_out.enough(fit_courses):
-        raise IdentificationError(held_out.too_little(fit_courses, "fit"))
-    if holdout and not held_out.enough(held_courses):
-        raise IdentificationError(held_out.too_little(held_courses, held_out.JUDGE))
-    if not holdout and not held_out.enough(fit_courses, acceptance.SET_ASIDE):
-        raise IdentificationError(held_out.too_little(fit_courses, f"fit and {held_out.JUDGE}", acceptance.SET_ASIDE))
+    if not enough(fit_courses):
+        raise IdentificationError(too_little(fit_courses, "fit"))
+    if holdout and not enough(held_courses):
+        raise IdentificationError(too_little(held_courses, JUDGE))
+    if not holdout and not enough(fit_courses, acceptance.SET_ASIDE):
+        raise IdentificationError(too_little(fit_courses, f"fit and {JUDGE}", acceptance.SET_ASIDE))
     repaired: list[Finding] = [*fit_rails, *held_rails]
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
@@ -78,27 +305,27 @@ def prepare(
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
     if not held:
-        to_fit, held = held_out.parted(to_fit)
+        to_fit, held = parted(to_fit)
         share = f"{100 * acceptance.SET_ASIDE:g} %"
         notes.append(f"no record was given that can judge: the last {share} of each is set aside")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
-    reach = thresholds.largest(fit_courses)
+    reach = pi.largest(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
-    places = np.array(thresholds.dense(reach, samples, acceptance.PLAYS).thresholds)
-    notes.extend(held_out.hardly_compared([*to_fit, *held]))
+    places = np.array(pi.dense(reach, samples, acceptance.PLAYS).thresholds)
+    notes.extend(hardly_compared([*to_fit, *held]))
     return _without_faults(Prepared(to_fit, held, notes, repaired, drive, places))
 
 
 def _courses(
     records: Sequence[Record], history: tuple[float, ...] | None
 ) -> tuple[list[Course], list[Saturated]]:
-    """The records as they take part, and what was left out at a converter's end."""
+    """The records as they take part, and the samples left out at a converter's end."""
     courses, saturated = [], []
     for record in records:
-        course, ends = prepared.without_rails(pi.course(record, history, 0))
+        course, ends = prepared.without_rails(prepared.course_of(record, history, 0))
         courses.append(course)
         for name, level, number in ends:
             saturated.append(Saturated(course.name, None, name, level, number))
@@ -107,14 +334,14 @@ def _courses(
 
 def _without_faults(ready: Prepared) -> Prepared:
     """The records without samples that are plainly wrong, unless hardly any would be left."""
-    repaired = bad_samples.not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
+    repaired = not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
-    items, wrong = bad_samples.without_faults([*ready.to_fit, *ready.held], repaired)
+    items, wrong = without_faults([*ready.to_fit, *ready.held], repaired)
     to_fit, held = items[:number], items[number:]
     least = acceptance.COMPARED_SAMPLES
     if any(max(np.count_nonzero(item.known) for item in group) <= least for group in (to_fit, held)):
         return ready
-    return replace(ready, to_fit=to_fit, held=held, repaired=bad_samples.merged([*repaired, *wrong]))
+    return replace(ready, to_fit=to_fit, held=held, repaired=merged([*repaired, *wrong]))
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:
@@ -143,3 +370,157 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
         [replace(item, session=whole.run, part=parts[id(item)]) for item in group] for group in (to_fit, held)
     )
     return first, second
+
+
+# Which records judge, and whether there is enough to compare -------------------------------------------------
+
+
+JUDGE = "judge by"
+"""The purpose of held-out records, in words."""
+
+
+def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
+    """Whether a share of any of them is enough to compare."""
+    return any(share * course.used > acceptance.COMPARED_SAMPLES for course in courses)
+
+
+def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
+    """The message where there is not; `what`: the purpose they are too short for."""
+    names = ", ".join(course.name for course in courses)
+    most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
+    return (
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
+        f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
+        "or records that sweep their range again"
+    )
+
+
+def hardly_compared(items: Sequence[Item]) -> list[str]:
+    """Notes on records that show nothing beside others that do, and on those that are mostly not compared."""
+    known: dict[str, NDArray[np.bool_]] = {}
+    for item in items:  # the two ends of a record are two items
+        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
+    notes = []
+    for name, compared in known.items():
+        number = int(np.count_nonzero(compared))
+        if number <= acceptance.COMPARED_SAMPLES:
+            notes.append(
+                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
+                "known give --history, or let it sweep its range again"
+            )
+        elif np.argmax(compared) > len(compared) // 2:
+            notes.append(
+                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
+                "drive, from where its memory is known; more with --history"
+            )
+    return notes
+
+
+def set_aside(records: Sequence[Record]) -> list[int]:
+    """Numbers of the records to hold out: every third one, shifted where that gives both sides fast and wide drives.
+
+    What a fast edge shows cannot be found where none is fitted, nor judged where none is held out.
+    """
+    rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
+    swings = np.array([float(np.ptp(record.v)) for record in records])
+    least = acceptance.FAST_RECORD
+    showing = [{k for k, x in enumerate(found) if x >= least * np.max(found)} for found in (rates, swings)]
+
+    def shared(aside: Sequence[int]) -> int:
+        return sum(bool(some.intersection(aside)) and bool(some.difference(aside)) for some in showing)
+
+    counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
+    others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
+    return max(counts + others, key=shared)
+
+
+def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
+    """Every item twice: its beginning to be fitted, its end to be held out."""
+    beginnings, ends = [], []
+    for item in items:
+        known = np.flatnonzero(item.known)
+        split = int(known[int((1.0 - acceptance.SET_ASIDE) * len(known))])
+        front, end = item.y.copy(), item.y.copy()
+        front[split:], end[:split] = np.nan, np.nan
+        beginnings.append(replace(item, y=front))
+        ends.append(replace(item, y=end))
+    return beginnings, ends
+
+
+# Samples that are plainly wrong: drop-outs, held samples, a converter at its end -----------------------------
+
+
+Runs = Sequence[tuple[int, int]]
+
+
+def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
+    """The items without wrong samples, and findings about these; `repaired`: findings so far.
+
+    A level that is a drop-out or the converter's end in one record is the same in all others.
+    """
+    ends = {each.level for each in repaired if isinstance(each, Saturated) and each.level is not None}
+    dropped = [faults.drop_outs(item.y, item.run.v) for item in items]
+    lost = {level for item, runs in zip(items, dropped, strict=True) for level in _levels(item.y, runs)} - ends
+    kept: list[Item] = []
+    found: list[Finding] = []
+    for item, away in zip(items, dropped, strict=True):
+        y = item.y.copy()
+        levelled = {level: [run for run in runs_of(y == level) if run[1] - run[0] > 1] for level in ends | lost}
+        full = sorted(run for level in ends for run in levelled[level])
+        away = sorted({*away, *(run for level in lost for run in levelled[level])})
+        for kind, runs in ((Saturated, full), (DropOuts, away), (HeldSamples, None)):
+            if runs is None:
+                runs = faults.held(y, item.run.v)
+            wrong = np.zeros(len(y), dtype=bool)
+            for a, b in runs:
+                wrong[a:b] = True
+            if np.isfinite(y[wrong]).any():
+                found.append(_finding(kind, item, y, runs))
+            y[wrong] = np.nan
+        changed = np.isfinite(item.y) & ~np.isfinite(y)
+        known = y[np.isfinite(y)]
+        kept.append(replace(item, y=y, output_range=float(np.ptp(known))) if changed.any() and len(known) else item)
+    return kept, found
+
+
+def merged(findings: Sequence[Kind]) -> list[Kind]:
+    """One finding a kind and record: a record whose end is held out was examined in two parts."""
+    found: dict[object, Kind] = {}
+    for each in findings:
+        key = type(each), *(getattr(each, name, None) for name in ("record", "channel", "end"))
+        if key in found:
+            numbers = [name for name in ("count", "samples") if hasattr(each, name)]
+            each = replace(found[key], **{name: getattr(found[key], name) + getattr(each, name) for name in numbers})
+        found[key] = each
+    return list(found.values())
+
+
+def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[Finding]:
+    """What was repaired, with samples as held, not saturated, where another record goes beyond their level."""
+    highest, lowest = (f([float(f(item.y[item.known])) for item in items if item.known.any()]) for f in (max, min))
+    span = highest - lowest
+    found: list[Finding] = []
+    for each in repaired:
+        if isinstance(each, Saturated) and each.level is not None:
+            beyond = highest - each.level if each.end == "largest" else each.level - lowest
+            if beyond > acceptance.RAIL_PASSED * span:
+                each = HeldSamples(each.record, None, 1, each.count)
+        found.append(each)
+    return found
+
+
+def _levels(y: Array, runs: Runs) -> set[float]:
+    """Levels of runs with one value."""
+    return {float(y[a]) for a, b in runs if b - a >= faults.SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
+
+
+def _finding(kind: type[Finding], item: Item, y: Array, runs: Runs) -> Finding:
+    values = np.concatenate([y[a:b] for a, b in runs])
+    samples = int(np.count_nonzero(np.isfinite(values)))
+    first = float(item.run.t[runs[0][0]])
+    level = float(np.nanmin(values)) if np.nanmax(values) == np.nanmin(values) else None
+    if kind is Saturated:
+        return Saturated(item.name, first, None, level, samples)
+    if kind is DropOuts:
+        return DropOuts(item.name, first, level, len(runs), samples)
+    return HeldSamples(item.name, first, len(runs), samples)

@@ -1,29 +1,32 @@
-"""The result of a search put together: what is left of the error, what was found, and how sure that is."""
+"""The result of a search: the effects found and their certainty, the remaining error, and its place in the records."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.data import bad_samples, disturbances, periodic, stick_slip
+from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.noise_floor import NoiseFloor
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.findings import intervals, residual, stretches
+from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure
-from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, rounded
-from hystgen.diagnosis.search import acceptance
+from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, Stretch
+from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.selection import Found, Outcome
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 
 ONE_LOOP = (
-    "all records pass one loop, which tells little more than of one effect: add smaller loops inside it, other speeds "
-    "and holds"
+    "all records pass one loop, which shows little more than one effect: add smaller loops inside it, other speeds and "
+    "holds"
 )
 """Advice about records of one loop alone."""
 
@@ -55,31 +58,47 @@ def result_of(
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
     gap = Gap(as_given, *(Errors(*map(rms, each)) for each in (before, after)))
-    left = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
+    remaining = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
     everything = [*ready.to_fit, *ready.held]
     rivals = tuple((each.name, rival) for each in found.found for rival in each.rivals)
-    structured = any(isinstance(each, Structure) for each in left)
+    structured = any(isinstance(each, Structure) for each in remaining)
     result = Result(
-        verdict="effects_found" if found.found else "unexplained" if left else "nothing_missing",
+        verdict="effects_found" if found.found else "unexplained" if remaining else "nothing_missing",
         noise_floor=noise.rms,
         output_range=max(float(np.ptp(item.y[item.known])) for item in everything if item.known.any()),
         unit=unit,
         gap=gap,
         effects=_effects(found, ready.to_fit, gap.refitted.holdout),
-        unexplained=(*left, *(each for each in odd if each not in left), *ready.repaired),
-        where=stretches.worst(everything, [*before[0], *before[1]], noise.rms),
+        unexplained=(*remaining, *(each for each in odd if each not in remaining), *ready.repaired),
+        where=worst(everything, [*before[0], *before[1]], noise.rms),
         not_separable=rivals,
         advice=(
             *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
             *([ONE_LOOP] if (rivals or structured) and one_loop else []),
-            *(more for each in left for more in each.advice()),
+            *(more for each in remaining for more in each.advice()),
         ),
         ranking=tuple(
             tuple(Contender(t.name, t.option.label, t.fitted.rms, t.held_out) for t in each) for each in found.rankings
         ),
         inverse=inverse,
     )
-    return rounded(result)
+    in_digits: Result = _in_digits(result)
+    return in_digits
+
+
+def _in_digits(value: Any) -> Any:
+    """The value with eight digits in all its numbers, so that the same input gives the same text."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return type(value)(**{each.name: _in_digits(getattr(value, each.name)) for each in fields(value)})
+    if isinstance(value, Mapping):
+        return {key: _in_digits(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(map(_in_digits, value))
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and math.isfinite(value):
+        return float(f"{value:.8g}")
+    return value
 
 
 def _unexplained(
@@ -87,29 +106,29 @@ def _unexplained(
 ) -> list[Finding]:
     """What the model leaves that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
-    lines, errors = periodic.lines(everything, errors)
+    lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
     new = [line for line in lines if not disturbances.is_known(line, known)]
     # a ripple hides jumps as noise does, where the position is not predicted well enough to take it out
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
-    sticking = bad_samples.merged(stick_slip.stick_slip(everything, errors, jumping))
-    left = [each for each in odd if not isinstance(each, Fault)] + new + sticking
+    sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
+    remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
     held = errors[len(ready.to_fit) :]
-    share, _ = residual.shares(ready.held, held)
-    share = max(share, *residual.together(everything, errors))
+    share, _ = shares(ready.held, held)
+    share = max(share, *together(everything, errors))
     if not acceptance.is_noise(rms(held), noise, share):
         alone = tuple(
             item.name for item, e in zip(ready.held, after[1], strict=True)
             if rms([e]) > acceptance.HELD_OUT_ALONE * usual
         )  # fmt: skip
-        left.append(residual.described(everything, errors, noise, alone))
-    return left
+        remaining.append(described(everything, errors, noise, alone))
+    return remaining
 
 
 def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[NamedEffect, ...]:
     if not found.found:
         return ()
-    sure = intervals.intervals(found.fitted, to_fit)
+    sure = fits.intervals(found.fitted, to_fit)
     effects = []
     for k, each in enumerate(found.found):
         later = sum(other.name == each.name for other in found.found[k + 1 :])
@@ -129,7 +148,7 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
 
 
 def _advice(one: str, other: str) -> str:
-    return f"{one} and {other} cannot be told apart by these records; hystgen diagnose --plan writes drives that can"
+    return f"{one} and {other} cannot be separated by these records; hystgen diagnose --plan writes drives that can"
 
 
 def _evidence(each: Found) -> str:
@@ -138,8 +157,288 @@ def _evidence(each: Found) -> str:
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-    """The entry's keys without the name; for a front its stage. `later`: how many of that name were found after it."""
-    k = intervals.place(fitted, name, later)
+    """The entry's keys without the name; for a front its stage. `later`: number of that name found after it."""
+    k = fits.place(fitted, name, later)
     if k is None:
-        return intervals.stage(fitted, fitted.shape)
-    return intervals.entry(fitted.structure.effects(fitted.shape)[k])
+        return fits.stage(fitted, fitted.shape)
+    return fits.entry(fitted.structure.effects(fitted.shape)[k])
+
+
+# The remaining error: which variables it goes with -----------------------------------------------------------
+
+
+DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
+"""Thresholds of the plays that stand for the memory, as shares of the drive range."""
+
+MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+"""Time constants of the averages of the drive that stand for rates and creep, in samples."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable that an error may depend on: its name, and its values over a record."""
+
+    name: str
+    of: Callable[[Item], Array]
+
+
+def rate(item: Item) -> Array:
+    """Slope of the drive, input/s."""
+    return np.asarray(np.gradient(item.run.v, item.run.t))
+
+
+def displacement(item: Item) -> Array:
+    """The measured output, interpolated where it is not compared."""
+    if not item.known.any():
+        return np.zeros(len(item.y))
+    return np.interp(item.run.t, item.run.t[item.known], item.y[item.known])
+
+
+def travel(item: Item) -> Array:
+    """Distance that the drive has gone since the session began, as far as the records show it."""
+    whole = item.session or item.run
+    return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(whole.v)))])[item.part]
+
+
+def loop_centre(v: Array) -> Array:
+    """Midpoint of the last two reversals of the drive, at every sample."""
+    at = reversals(v)
+    ends = v[at] if len(at) else v[:1]
+    middles = np.concatenate([[ends[0]], (ends[:-1] + ends[1:]) / 2.0]) if len(ends) > 1 else ends
+    place = np.searchsorted(at, np.arange(len(v)), side="right") - 1
+    return np.asarray(middles[np.clip(place, 0, len(middles) - 1)])
+
+
+def since_reversal(item: Item) -> Array:
+    """Distance of the drive from its last reversal."""
+    v = item.run.v
+    at = np.concatenate([[0], reversals(v)])
+    return np.asarray(np.abs(v - v[at[np.searchsorted(at, np.arange(len(v)), side="right") - 1]]))
+
+
+VARIABLES = (
+    Variable("drive", lambda item: item.run.v),
+    Variable("rate", rate),
+    Variable("displacement", displacement),
+    Variable("memory", since_reversal),
+    Variable("loop centre", lambda item: loop_centre(item.run.v)),
+    Variable("session time", lambda item: item.run.t),
+    Variable("time in the record", lambda item: item.run.t - item.run.t[0]),
+    Variable("travel", travel),
+)
+
+
+def described(items: Sequence[Item], errors: Sequence[Array], noise: float, held_out_alone: Sequence[str]) -> Structure:
+    """The remaining errors of several records, `noise` rms; `held_out_alone`: held-out records that have most of it."""
+    share, by_variable = shares(items, errors)
+    total = np.concatenate([e[np.isfinite(e)] for e in errors])
+    rms = float(np.sqrt(np.mean(total**2))) if len(total) else 0.0
+    free, with_rates = together(items, errors)
+    main = max(by_variable, key=lambda name: by_variable[name], default=None)
+    if free > acceptance.MEMORY_WINS * max(share, acceptance.VARIABLE_SHARE):
+        by_variable["memory"], main = round(free, 4), "memory"
+    repeats = repeatable(items, errors)
+    even = even_share(items, errors)
+    return Structure(
+        rms=rms,
+        above_floor=rms / noise if noise else None,
+        main_variable=main,
+        share_by_variable=dict(sorted(by_variable.items(), key=lambda pair: -pair[1])),
+        rate_free=_rate_free(free, with_rates),
+        repeatable=None if repeats is None else bool(repeats > acceptance.REPEATABLE_SHARE),
+        repeatable_share=None if repeats is None else round(repeats, 4),
+        even_share=None if even is None else round(even, 4),
+        held_out_alone=tuple(held_out_alone),
+    )
+
+
+def _rate_free(free: float, with_rates: float) -> bool | None:
+    """Whether drive and memory explain the error without rates; None where nothing explains much of it."""
+    if with_rates < acceptance.VARIABLE_SHARE and free < acceptance.VARIABLE_SHARE:
+        return None
+    return bool(free > acceptance.RATE_FREE_SHARE * with_rates)
+
+
+def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[str, float]]:
+    """Share of the errors' variance that a smooth function of one variable explains on samples it was not fitted to.
+
+    Returns the largest such share, and that of each variable which matters.
+    """
+    found = {each.name: _share([each.of(item) for item in items], errors) for each in VARIABLES}
+    mattering = {name: round(share, 4) for name, share in found.items() if share > acceptance.VARIABLE_SHARE}
+    return max(found.values(), default=0.0), mattering
+
+
+def _share(values: Sequence[Array], errors: Sequence[Array]) -> float:
+    """Cross-validated share of a function of one variable: means in bins with the same number of samples each."""
+    x = np.concatenate([v[np.isfinite(e)] for v, e in zip(values, errors, strict=True)])
+    e = np.concatenate([e[np.isfinite(e)] for e in errors])
+    if len(e) < acceptance.DESCRIBED_SAMPLES or np.ptp(x) == 0.0:
+        return 0.0
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, acceptance.VARIABLE_BINS + 1)))
+    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, max(len(edges) - 2, 0))
+    fold = _folds(len(e))
+    unexplained = 0.0
+    for k in (0, 1):
+        train, test = fold != k, fold == k
+        count = np.bincount(place[train], minlength=len(edges))
+        mean = np.bincount(place[train], e[train], minlength=len(edges)) / np.maximum(count, 1)
+        unexplained += float(np.sum((e[test] - mean[place[test]]) ** 2))
+    return max(0.0, 1.0 - unexplained / max(float(np.sum(e**2)), 1e-300))
+
+
+def _folds(n: int) -> NDArray[np.intp]:
+    """0 or 1 for each of n samples: blocks that alternate between fit and test."""
+    return np.asarray((np.arange(n) * acceptance.FOLD_BLOCKS // n) % 2)
+
+
+def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
+    """Cross-validated shares explained by rate-free variables (drive and plays), and by these together with averages of
+    the drive over several times, which stand for rates and creep."""
+    widest = max(float(np.ptp(item.run.v)) for item in items)
+    low = min(float(item.run.v.min()) for item in items)
+    every = max(1, sum(int(np.isfinite(e).sum()) for e in errors) // acceptance.SEARCHED)
+    tables, values = [], []
+    for item, error in zip(items, errors, strict=True):
+        at = np.flatnonzero(np.isfinite(error))[::every]
+        if not len(at):
+            continue
+        v = (item.run.v - low) / max(widest, 1e-300)
+        plays = operators.plays(v, DESCRIBED_PLAYS, np.full(len(DESCRIBED_PLAYS), v[0])) - v
+        powers = [v, v**2, v**3]
+        rates = [v - _averaged(v, np.exp(-1.0 / n)) for n in MEMORIES]
+        tables.append(np.stack([*powers, *plays, *(plays * v), *rates])[:, at])
+        values.append(error[at])
+    if not values:
+        return 0.0, 0.0
+    x, e = np.concatenate(tables, axis=1), np.concatenate(values)
+    if len(e) < acceptance.DESCRIBED_SAMPLES:
+        return 0.0, 0.0
+    x = (x - x.mean(axis=1, keepdims=True)) / np.maximum(x.std(axis=1, keepdims=True), 1e-12)
+    free, with_rates = _regressed(x[: 3 + 2 * len(DESCRIBED_PLAYS)], e), _regressed(x, e)
+    return free, max(free, with_rates)
+
+
+def _averaged(v: Array, decay: float) -> Array:
+    from scipy.signal import lfilter
+
+    found, _ = lfilter([1.0 - decay], [1.0, -decay], v, zi=[decay * v[0]])
+    return np.asarray(found)
+
+
+def _regressed(x: Array, e: Array) -> float:
+    """Cross-validated share that a slightly ridged linear regression on rows x (k, N) explains of e (N,)."""
+    fold = _folds(len(e))
+    unexplained = 0.0
+    for k in (0, 1):
+        train, test = fold != k, fold == k
+        matrix = x[:, train] @ x[:, train].T + 1e-3 * np.count_nonzero(train) * np.eye(len(x))
+        solution = np.linalg.solve(matrix, x[:, train] @ e[train])
+        unexplained += float(np.sum((e[test] - solution @ x[:, test]) ** 2))
+    return max(0.0, 1.0 - unexplained / max(float(np.sum(e**2)), 1e-300))
+
+
+def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
+    """Share of the error's variance that returns when the drive repeats itself; None where it never does."""
+    products = powers = 0.0
+    count = 0
+    for item, error in zip(items, errors, strict=True):
+        period = repetition(item.run.v)
+        if period is None:
+            continue
+        one, other = error[:-period], error[period:]
+        both = np.isfinite(one) & np.isfinite(other)
+        if np.count_nonzero(both) < period:
+            continue
+        one, other = one[both] - one[both].mean(), other[both] - other[both].mean()
+        products += float(one @ other)
+        powers += 0.5 * float(one @ one + other @ other)
+        count += len(one)
+    return max(0.0, products / powers) if count >= acceptance.DESCRIBED_SAMPLES and powers > 0.0 else None
+
+
+def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
+    """Share of the mean error over drive and direction that is even: the same when drive and direction are reversed.
+
+    None where that mean is small against the error.
+    """
+    v = np.concatenate([item.run.v[np.isfinite(e)] for item, e in zip(items, errors, strict=True)])
+    up = np.concatenate([rate(item)[np.isfinite(e)] > 0.0 for item, e in zip(items, errors, strict=True)])
+    e = np.concatenate([e[np.isfinite(e)] for e in errors])
+    if len(e) < acceptance.DESCRIBED_SAMPLES or np.ptp(v) == 0.0:
+        return None
+    bins = acceptance.PARITY_BINS
+    place = np.minimum(((v - v.min()) / np.ptp(v) * bins).astype(int), bins - 1)
+    means = []
+    for flag in (True, False):
+        count = np.bincount(place[up == flag], minlength=bins)
+        summed = np.bincount(place[up == flag], e[up == flag], minlength=bins)
+        means.append(np.where(count > acceptance.PARITY_SAMPLES, summed / np.maximum(count, 1), np.nan))
+    rising, turned = means[0], means[1][::-1]
+    both = np.isfinite(rising) & np.isfinite(turned)
+    if np.count_nonzero(both) < bins // 2:
+        return None
+    even, odd = 0.5 * (rising + turned)[both], 0.5 * (rising - turned)[both]
+    power = float(even @ even + odd @ odd)
+    if power / np.count_nonzero(both) < acceptance.PARITY_SHARE * float(np.mean(e**2)):
+        return None
+    return float(even @ even) / power
+
+
+# Where model and measurement disagree, and what the drive does there -----------------------------------------
+
+
+STRETCH_WINDOWS = 24
+"""Windows that each record is cut into; neighbours of one kind become one stretch."""
+
+LISTED_STRETCHES = 12
+"""Most stretches that are listed: a reader looks at no more."""
+
+
+def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple[Stretch, ...]:
+    """The worst stretches of all records, the largest rms first."""
+    found = [each for item, error in zip(items, errors, strict=True) for each in _stretches(item, error, noise)]
+    return tuple(sorted(found, key=lambda each: -each.rms)[:LISTED_STRETCHES])
+
+
+def _stretches(item: Item, error: Array, noise: float) -> list[Stretch]:
+    """The windows of a record with more than noise, those next to each other joined where their kinds agree."""
+    kind_of = _Kinds(item)
+    merged: list[tuple[int, int, float, str]] = []
+    edges = np.linspace(0, len(error), STRETCH_WINDOWS + 1).astype(int)
+    for a, b in itertools.pairwise(edges.tolist()):
+        part = error[a:b]
+        known = np.isfinite(part)
+        rms = float(np.sqrt(np.mean(part[known] ** 2))) if known.any() else 0.0
+        if rms <= acceptance.STRETCH_ABOVE_NOISE * noise or rms == 0.0:
+            continue
+        kind = kind_of(a, b)
+        if merged and merged[-1][1] == a and merged[-1][3] == kind:
+            first, _, before, _ = merged.pop()
+            width, own = a - first, b - a
+            a, rms = first, float(np.sqrt((before**2 * width + rms**2 * own) / (width + own)))
+        merged.append((a, b, rms, kind))
+    t = item.run.t
+    return [Stretch(item.name, kind, (float(t[a]), float(t[b - 1])), rms) for a, b, rms, kind in merged]
+
+
+class _Kinds:
+    """What the drive of a record does in samples [a, b): `after_step`, `range_end`, `fast` or `moving`."""
+
+    def __init__(self, item: Item) -> None:
+        self._v = item.run.v
+        self._holds = still(item.run.v, max(16, len(item.y) // 100))
+        self._rate = np.abs(np.gradient(item.run.v, item.run.t))
+        self._fast = float(np.quantile(self._rate, acceptance.FAST_QUANTILE))
+        low, high = float(item.run.v.min()), float(item.run.v.max())
+        self._low = low + acceptance.RANGE_END * (high - low)
+        self._high = high - acceptance.RANGE_END * (high - low)
+
+    def __call__(self, a: int, b: int) -> str:
+        held = sum(max(0, min(b, last) - max(a, first)) for first, last in self._holds)
+        if held > 0.5 * (b - a):
+            return "after_step"
+        v = self._v[a:b]
+        if np.mean((v > self._high) | (v < self._low)) > acceptance.RANGE_END_SHARE:
+            return "range_end"
+        return "fast" if self._fast > 0.0 and float(np.mean(self._rate[a:b])) > self._fast else "moving"

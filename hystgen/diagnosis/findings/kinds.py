@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
-from hystgen.basics.words import counted
+from hystgen.basics.problems import counted
 
 INTERPOLATION = "the sensor's interpolation error looks like this"
 
@@ -44,7 +44,7 @@ class Finding(ABC):
 class Fault(Finding):
     """A fault of the recording that is left out of the comparison or put right: the remaining record is sound.
 
-    `noun`: the thing that is counted of it; `qualifier`: the words behind that.
+    `noun`: for the count in a sentence; `qualifier`: the words behind it.
     """
 
     noun: ClassVar[str]
@@ -52,8 +52,8 @@ class Fault(Finding):
 
     @property
     def times(self) -> int:
-        """How often it occurred."""
-        return 1
+        """How often it occurred: its `count`, or once."""
+        return int(getattr(self, "count", 1))
 
 
 # Whole records -----------------------------------------------------------------------------------------------
@@ -139,10 +139,6 @@ class Saturated(Fault):
     level: float | None
     count: int
 
-    @property
-    def times(self) -> int:
-        return self.count
-
     def sentence(self, unit: str | None) -> str:
         samples = f"{counted(self.count, 'sample')} at the converter's end, {self.level:.6g}{_unit(unit)}"
         return f"{self.record}: {samples}, not compared{_first(self.first)}"
@@ -160,14 +156,9 @@ class DropOuts(Fault):
     count: int
     samples: int
 
-    @property
-    def times(self) -> int:
-        return self.count
-
     def sentence(self, unit: str | None) -> str:
         level = "" if self.level is None else f" to {self.level:.6g}{_unit(unit)}"
-        number = counted(self.count, "drop-out")
-        return f"{self.record}: {number}{level}, {counted(self.samples, 'sample')} not compared{_first(self.first)}"
+        return f"{self.record}: {counted(self.count, 'drop-out')}{level}, {_not_compared(self.samples, self.first)}"
 
 
 @dataclass(frozen=True)
@@ -181,14 +172,9 @@ class HeldSamples(Fault):
     count: int
     samples: int
 
-    @property
-    def times(self) -> int:
-        return self.count
-
     def sentence(self, unit: str | None) -> str:
-        held = counted(self.samples, "sample")
         stands = f"the output stands still {counted(self.count, 'time')} while the drive moves"
-        return f"{self.record}: {stands}, {held} not compared{_first(self.first)}"
+        return f"{self.record}: {stands}, {_not_compared(self.samples, self.first)}"
 
 
 @dataclass(frozen=True)
@@ -200,10 +186,6 @@ class IsolatedSamples(Fault):
     channel: str
     first: float
     count: int
-
-    @property
-    def times(self) -> int:
-        return self.count
 
     def sentence(self, unit: str | None) -> str:
         done = "bridged" if self.channel == "v" else "not compared"
@@ -323,7 +305,7 @@ class Structure(Finding):
         return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
 
     def words(self) -> str:
-        """What it depends on, a predicate."""
+        """The dependence of the error, as a predicate."""
         parts = []
         if self.main_variable:
             share = 100.0 * self.share_by_variable[self.main_variable]
@@ -348,10 +330,10 @@ class Structure(Finding):
             advice.append(f"fit {alone} too and hold out others: what is left shows in held-out records alone")
         if self.rate_free is None:
             advice.append(
-                "record the same loops at two rates a decade apart: that tells whether what is left is rate-free"
+                "record the same loops at two rates a decade apart: that shows whether the remaining error is rate-free"
             )
         if self.repeatable is None:
-            advice.append("repeat a record ten times: that tells what of the rest comes back and what is noise")
+            advice.append("repeat a record ten times: that separates the part that comes back from noise")
         return advice
 
 
@@ -389,6 +371,10 @@ def _unit(unit: str | None) -> str:
 
 def _first(first: float | None) -> str:
     return "" if first is None else f", the first at {first:.6g} s"
+
+
+def _not_compared(samples: int, first: float | None) -> str:
+    return f"{counted(samples, 'sample')} not compared{_first(first)}"
 
 
 def _taken_out(repaired: bool) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from hystgen.parameters.files import Parameters
 
 Array = NDArray[np.float64]
-Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -218,25 +217,6 @@ class Diagnosis:
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
         return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
-
-
-def rounded(value: Value) -> Value:
-    """The value with eight digits in all its numbers, so that the same input gives the same text."""
-    return _rounded(value)  # type: ignore[no-any-return]
-
-
-def _rounded(value: Any) -> Any:
-    if is_dataclass(value) and not isinstance(value, type):
-        return type(value)(**{each.name: _rounded(getattr(value, each.name)) for each in fields(value)})
-    if isinstance(value, Mapping):
-        return {key: _rounded(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple(map(_rounded, value))
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and math.isfinite(value):
-        return float(f"{value:.8g}")
-    return value
 
 
 def plain(value: Any) -> Any:

@@ -6,12 +6,11 @@ says what the number is derived from or compared with, and `Changed by` names th
 - blind: `make blind`, the cases of the report block, seeds from 0 (single 260, pair 80, none 200, foreign 100, poor 65,
   snr 130); `blind none` is that kind alone;
 - tune: the same commands with `--block tune`, whose cases may be looked at;
-- disturbances, selection, diagnosis, thinning, faults: `pytest tests/test_NAME.py`.
+- `disturbances::test_x`: the test of `tests/test_disturbances.py` that fails when the number is doubled, or halved.
 
-`tests/test_acceptance.py` has a case just below and one just above most of them.
-`python -m tests.threshold_mutants` doubles and halves every number and lists the tests that notice. Other modules read
-the numbers as attributes of this one, so that a number can be changed in one place. Tolerances of the searches and
-sizes of caches, which decide nothing, are where they are used.
+`docs/thresholds.csv` has such tests for every number, each with its case, written by `python -m tests.threshold_mutants
+--write`. Other modules read the numbers as attributes of this one, so that a number can be changed in one place.
+Tolerances of the searches and sizes of caches, which decide nothing, are where they are used.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ def apart(more: float, less: float) -> float:
 
 
 def above_noise(removed: float) -> float:
-    """An error as a multiple of the noise, if it consists of noise and `removed` times as much of something else."""
+    """An error as a multiple of the noise, if it consists of noise and something else of `removed` times its rms."""
     return math.sqrt(1.0 + removed**2)
 
 
@@ -62,7 +61,7 @@ in a wrong shape leaves to a second name is up to 0.05. Set by: tune single (see
 
 NEARLY_ALL = 0.25
 """[share of the error before it] Or it leaves at most this: beside a far larger effect `NAME_SHARE` is out of reach.
-Changed by: blind pair, selection."""
+Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
 
 FIRST_REMOVES = 0.6
 """[times the remaining error or the noise, whichever is larger] The least that a first effect removes, and the least
@@ -90,15 +89,16 @@ P_DIFFERENT = 0.01
 
 BLOCK_MEMORIES = 2.0
 """[correlation times] Length of the blocks that a test takes as independent: neighbours are then hardly correlated.
-Changed by: selection (coloured noise), blind none."""
+Changed by: blind none, acceptance::test_blocks_are_longer_than_errors_remember."""
 
 BLOCKS = 20
 """[blocks] Least number of blocks of a record where its errors remember longer than that allows. Changed by:
-selection."""
+acceptance::test_blocks_are_longer_than_errors_remember."""
 
 SEEN_IN_FIT = 0.25
 """[times the remaining error or the noise] What an effect removes at least from the records its numbers are fitted to;
-an effect of held-out records alone may be another one's. Changed by: selection, blind pair."""
+an effect of held-out records alone may be another one's. Changed by: blind pair,
+acceptance::test_an_effect_has_to_show_in_fitted_records."""
 
 ALIKE = 0.25
 """[share of the held-out rms] Effects within this are not separable, unless chance explains it with less than
@@ -106,15 +106,16 @@ ALIKE = 0.25
 
 BETTER = 0.05
 """[share of an error] An error lower by less than this is no reason for more numbers, for another effect in the place
-of an accepted one, or for following a shape further. Changed by: blind single, selection."""
+of an accepted one, or for following a shape further. Changed by: blind single,
+selection::test_all_records_decide_between_equal_numbers."""
 
 FAR_LESS = 0.5
 """[share of an error] A fitted error at most this of another outweighs a small lead of that on held-out records, which
-yet another effect may rule. Changed by: selection."""
+yet another effect may rule. Changed by: acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
 
 EQUAL = 0.005
 """[share of an error] Errors closer than this are equal, and the order of the catalogue decides: far above what the
-last steps of a search change. Changed by: selection."""
+last steps of a search change. Changed by: acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
 """[share of the gap above the noise] Records of one loop support a name only where at most this is left, and leave open
@@ -133,7 +134,7 @@ by: run time of blind."""
 
 HELD_OUT_ALONE = 3.0
 """[times the fitted error] A held-out record with more than this shows something that no fitted one does. Changed by:
-diagnosis."""
+acceptance::test_held_out_records_that_are_alone."""
 
 # How far a search goes ---------------------------------------------------------------------------------------
 
@@ -181,7 +182,7 @@ SHAPES_OF_ONE = 2
 
 TWIN = 0.02
 """[share of the errors] An effect that leaves as much as one of those, fitted and held out, is followed too: which of a
-lag and a delay is cut off would be chance. Changed by: selection."""
+lag and a delay is cut off would be chance. Changed by: acceptance::TestScreening::test_a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape that leaves more, fitted and held out, is not searched jointly. Changed
@@ -212,76 +213,84 @@ LIMITERS = (0.03, 0.1)
 
 NOMINAL_RANGE = 3.0
 """[factor] Numbers of the nominal model's effects are refitted up to this times as large and as small: farther off, the
-effect is a different one. Changed by: diagnosis."""
+effect is a different one. Changed by: acceptance::TestNominal::test_numbers_move_by_up_to_a_factor."""
 
 SINGLE_FACTORS = 4
 """[numbers] A longer list of numbers has one common factor: each of more would be a fit of its own. Changed by:
-diagnosis."""
+acceptance::TestNominal::test_long_lists_have_one_factor."""
 
 TOUCHING = 1e-6
 """[of the slack] By this a nominal front may violate its constraints: ten digits of a file are rounded. Derived."""
 
 START_SPAN = 2.0
 """[times the recorded drive range] The start state comes from a drive at most this wide: farther off its response would
-explain a drift. Changed by: diagnosis."""
+explain a drift. Changed by: acceptance::test_what_limits_the_start_of_an_effect."""
 
 # What a front is called --------------------------------------------------------------------------------------
 
 LIMITER_STRAIGHT = 0.6
-"""[share of the range] A limiter has the middle slope over at least this. Changed by: diagnosis."""
+"""[share of the range] A limiter has the middle slope over at least this. Changed by:
+acceptance::test_what_a_front_is_called."""
 
 LIMITER_NEAR = 0.1
-"""[share of the range of slopes] A slope within this of the middle one is equal to it. Changed by: diagnosis."""
+"""[share of the range of slopes] A slope within this of the middle one is equal to it. Changed by:
+acceptance::test_what_a_front_is_called."""
 
 LIMITER_SLOPE = 0.6
-"""[times the middle slope] A smaller slope at an end is a limit's alone. Changed by: diagnosis."""
+"""[times the middle slope] A smaller slope at an end is a limit's alone. Changed by:
+acceptance::test_what_a_front_is_called."""
 
 ODD_FRONT = 2.0
 """[times] A front whose odd bend has more than this times the power of the even one saturates. Changed by:
-diagnosis."""
+acceptance::test_what_a_front_is_called."""
 
 # Which records are fitted and held out -----------------------------------------------------------------------
 
 COMPARED_SAMPLES = 100
 """[samples] More than this are compared of a record that fits or judges: `BLOCKS` of five samples. Changed by:
-diagnosis."""
+acceptance::TestHeldOut::test_enough_to_compare."""
 
 SET_ASIDE = 0.3
 """[share of a record] Its end, held out where no record can be: nearly the third that is taken of several records.
-Changed by: diagnosis."""
+Changed by: acceptance::TestHeldOut::test_the_end_of_a_record."""
 
 FAST_RECORD = 0.5
-"""[share of the largest] A record is fast, or wide, from this rate, or swing, on. Changed by: diagnosis."""
+"""[share of the largest] A record is fast, or wide, from this rate, or swing, on. Changed by:
+acceptance::TestHeldOut::test_a_fast_record."""
 
 THIN_STEPS = 32
-"""[samples] Longest stretch without a needed sample, a power of two. Changed by: run time, thinning."""
+"""[samples] Longest stretch without a needed sample, a power of two. Changed by: run time,
+acceptance::TestThinning::test_the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] The prediction over a stretch is off a straight line by at most this, and the drive by what makes
-that much output. Changed by: thinning."""
+that much output. Changed by: acceptance::TestThinning::test_a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
-"""[times the noise] The same at a turning point, which the plays remember: a tenth. Changed by: thinning."""
+"""[times the noise] The same at a turning point, which the plays remember: a tenth. Changed by:
+acceptance::TestThinning::test_a_small_turn_of_the_drive."""
 
 THIN_RESIDUAL = 1.6
 """[times the noise, rms] The same for the remaining error: white noise is off lines through itself by sqrt(1 + 2/3) =
 1.3, and noise of an unlucky stretch by a quarter more. Derived."""
 
 THIN_COLUMN = 0.01
-"""[share of its range, rms] The same for a further column. Changed by: thinning."""
+"""[share of its range, rms] The same for a further column. Changed by:
+acceptance::TestThinning::test_a_column_that_jitters."""
 
 # Noise floor -------------------------------------------------------------------------------------------------
 
 HOLD_SAMPLES = 40
 """[samples] Fewest of a hold that measures noise: its trend has four numbers, and 24 samples behind `HOLD_SETTLING`.
-Changed by: diagnosis."""
+Changed by: acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 
 HOLD_DRIVE = 2e-4
 """[share of the drive range] The drive holds while it stays within this: three codes of a 14-bit converter. Changed by:
-diagnosis, disturbances."""
+acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 
 HOLD_SETTLING = 0.4
-"""[share of a hold] Its beginning, which is left out: what still moves there is no noise. Changed by: diagnosis."""
+"""[share of a hold] Its beginning, which is left out: what still moves there is no noise. Changed by:
+acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 
 HOLD_WEIGHT = 50
 """[times] A long hold counts at most this often. Changed by: blind none."""
@@ -290,71 +299,77 @@ QUIET_HOLDS = 0.25
 """[quantile of the variances] The holds that count: in others something may still ring or creep. Changed by: blind."""
 
 RING_DECAY = 0.9
-"""[1 a sample] A hold rings where its oscillation decays less. Changed by: diagnosis (holds that ring)."""
+"""[1 a sample] A hold rings where its oscillation decays less. Changed by:
+acceptance::TestNoiseFloor::test_a_hold_that_rings."""
 
 RING_UNPREDICTED = 0.3
-"""[share of the variance] And two samples leave at most this of the next unpredicted. Changed by: the same."""
+"""[share of the variance] And two samples leave at most this of the next unpredicted. Changed by:
+acceptance::TestNoiseFloor::test_a_hold_that_rings."""
 
 PERIOD_REPEATS = 2e-3
 """[share of the drive range, rms] Periods whose drives differ by less measure noise: the response to the difference
-adds as large a share of the output to it. Changed by: diagnosis."""
+adds as large a share of the output to it. Changed by: acceptance::TestNoiseFloor::test_periods_of_a_jittering_drive."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 
 SCALE_OF_ALL = 3.0
 """[factor] An output of all records this far off the prediction is in other units, or of another actuator. Changed by:
-disturbances, blind foreign."""
+blind foreign, acceptance::TestWholeRecords::test_other_units_of_all."""
 
 SCALE_OF_ONE = 1.7
 """[factor] The same of one record against the others: an actuator's sensitivity changes less with amplitude and rate.
-Changed by: disturbances, blind foreign."""
+Changed by: blind foreign, acceptance::TestWholeRecords::test_a_narrow_record_shows_no_scale."""
 
 WIDE_DRIVE = 0.3
-"""[share of the widest drive] Only records with a wider drive show their scale. Changed by: disturbances."""
+"""[share of the widest drive] Only records with a wider drive show their scale. Changed by:
+acceptance::TestWholeRecords::test_a_narrow_record_shows_no_scale."""
 
 OTHER_UNIT = 30.0
 """[times the median width] A wider drive is in another unit, and no measure for the others: between the swing of small
-loops and a factor of 1000. Changed by: disturbances."""
+loops and a factor of 1000. Changed by: acceptance::TestWholeRecords::test_a_drive_in_another_unit_is_no_measure."""
 
 DEAD_SENSOR = 0.1
 """[share of the expected spread] An output that moves less and does not follow the drive is dead. Changed by:
-disturbances."""
+acceptance::TestWholeRecords::test_a_dead_sensor."""
 
 FOLLOWS = 0.9
-"""[correlation] Least correlation with the prediction at which a scale means something. Changed by: disturbances."""
+"""[correlation] Least correlation with the prediction at which a scale means something. Changed by:
+acceptance::TestWholeRecords::test_an_output_follows_its_drive."""
 
 FOREIGN_CORRELATION, OWN_CORRELATION = 0.95, 0.5
 """[correlation] An output belongs to another record whose prediction it follows better than the first number, if it
-follows its own worse than the second. Changed by: disturbances, blind foreign."""
+follows its own worse than the second. Changed by: blind foreign,
+acceptance::TestWholeRecords::test_the_output_of_another_record."""
 
 LOOP_AREA = 0.3
 """[share of the expected area] An output follows its drive if its loop has at least this, in the right sense. Changed
-by: disturbances."""
+by: acceptance::TestWholeRecords::test_an_output_follows_its_drive."""
 
 LOOP_SIGMAS = 5.0
 """[standard deviations] An area counts if it exceeds this times what white noise makes. Derived: one in a million."""
 
 OFF_LINE, ON_LINE = 6.0, 0.8
 """[scatters], [share of the samples] Samples farther off a line do not count, unless they are more than the second
-number leaves. Changed by: disturbances."""
+number leaves. Changed by: acceptance::TestWholeRecords::test_a_few_samples_far_off_do_not_count."""
 
 RAIL_PASSED = 0.01
 """[share of the output range] Another record may pass a converter's end by this: two records differ by an offset.
-Changed by: disturbances."""
+Changed by: acceptance::TestWholeRecords::test_a_converter_ends_at_its_end."""
 
 HISTORY_COSTS = 1.5
 """[times the error] A history that raises the error of what does not depend on it by more has bent the model. Changed
-by: diagnosis, blind single (wrong histories)."""
+by: blind single (wrong histories), acceptance::TestWholeRecords::test_a_history_that_costs_the_rest."""
 
 # Lines and ripples -------------------------------------------------------------------------------------------
 
 LINE_SHARE = 0.03
 """[share of the error's variance] Of a line at least: smaller ones are not worth a sentence. Changed by:
-disturbances."""
+acceptance::TestSpectra::test_share_of_a_line."""
 
 RULING_SHARE = 0.3
 """[share of the error's variance] Of a line that is taken out before effects are sought, or that is in a few records
-alone: what a missing effect leaves may look like a weaker one. Changed by: disturbances, blind foreign."""
+alone: what a missing effect leaves may look like a weaker one. Changed by: blind foreign,
+acceptance::TestLines::test_a_line_rules."""
 
 LINE_HEIGHT = 30.0
 """[times the median power around it] Of a line: the highest of 10000 bins of noise reaches 13. Changed by: blind
@@ -362,35 +377,38 @@ none."""
 
 PEAK_HEIGHT = 10.0
 """[the same] Of a line of the drive, and of ringing in averaged spectra, whose noise is lower. Changed by:
-disturbances."""
+acceptance::TestSpectra::test_height_of_a_line_of_the_drive."""
 
 DRIVE_LINE_SHARE = 1e-6
 """[share of the drive's power] A peak of the drive with at least this is a line of its own: an amplitude of a
-thousandth. Changed by: disturbances."""
+thousandth. Changed by: acceptance::TestSpectra::test_a_line_of_the_drive."""
 
 CARRIER_SHARE = 0.5
 """[share of the drive's power] A drive with this in one line makes harmonics, even if its swing changes. Changed by:
-disturbances."""
+acceptance::TestSpectra::test_harmonics_of_a_carrier."""
 
 HARMONICS = 10
-"""[harmonics] Of that line which the actuator answers with. Changed by: disturbances."""
+"""[harmonics] Of that line which the actuator answers with. Changed by:
+acceptance::TestSpectra::test_harmonics_of_a_carrier."""
 
 LINE_PERIODS = 8
 """[periods] Fewest in a record for a line, and pitches in the travel: trends fill the bins below. Changed by:
-disturbances."""
+acceptance::TestSpectra::test_periods_of_a_line."""
 
 LINE_SAMPLES = 64
 """[samples] Fewest of a record with a line or a period: eight for each of `LINE_PERIODS`. Derived."""
 
 SPECTRUM_SAMPLES = 256
-"""[samples] Fewest of a spectrum, and of a ripple: three surroundings of a peak. Changed by: disturbances."""
+"""[samples] Fewest of a spectrum, and of a ripple: three surroundings of a peak. Changed by:
+acceptance::TestSpectra::test_samples_of_a_spectrum."""
 
 SPECTRUM_PARTS = (8, 64)
 """[parts of a record] Whose mean spectra show ringing that fades: of 0.4 to 3 % damping in steps of five seconds. Set
 by: disturbances (commit 8380866)."""
 
 SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
-"""[bins] On either side of a peak, in the spectrum of a record and in those of its parts. Changed by: disturbances."""
+"""[bins] On either side of a peak, in the spectrum of a record and in those of its parts. Changed by:
+acceptance::TestSpectra::test_surroundings_of_a_line."""
 
 SAME_BINS = 1.5
 """[bins] Lines closer than this are one: less than the two bins of half a Hann window's main lobe. Derived."""
@@ -399,7 +417,8 @@ SAME_RINGING = 0.02
 """[share of the frequency] Ringing closer than this is one start for a resonance. Changed by: blind single."""
 
 SAME_LINE = 0.05
-"""[share of the frequency or pitch] A line within this of a stronger one is its remainder. Changed by: disturbances."""
+"""[share of the frequency or pitch] A line within this of a stronger one is its remainder. Changed by:
+acceptance::TestLines::test_the_rest_of_a_line."""
 
 MOST_LINES = 4
 """[lines] That are sought: mains, two harmonics and a ripple. Changed by: blind foreign."""
@@ -409,14 +428,15 @@ CRESTS = 5
 
 SEEN_IN = 0.4
 """[share of the records that are long enough] A line is in at least this of them, unless it rules. Changed by:
-disturbances."""
+acceptance::TestLines::test_a_line_in_many_records."""
 
 COMMON_SHARE = 0.6
-"""[share of the records, or of the passes] In which a line holds: most. Changed by: disturbances."""
+"""[share of the records, or of the passes] In which a line holds: most. Changed by:
+acceptance::TestRipple::test_pitches_of_a_pass."""
 
 STEADY_SHARE = 0.5
 """[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this of what the
-other half's own fit removes. Changed by: disturbances (ringing is no line)."""
+other half's own fit removes. Changed by: acceptance::TestLines::test_a_line_that_fades."""
 
 AMPLITUDE_SAMPLES = 2.2
 """[samples a period] Below this the amplitude of a line cannot be seen. Derived: Nyquist's two, and a tenth."""
@@ -430,24 +450,26 @@ RIPPLE_RESOLVED = 0.25
 
 CONVERTER_STEP = 0.02
 """[share of the pitch] A pitch within this of the smallest step of the output is the converter's. Changed by:
-disturbances."""
+acceptance::TestRipple::test_a_pitch_of_the_converter."""
 
 POSITION_BINS = 4096
 """[bins] Of the range, in which errors are averaged to find a pitch: pitches of a thousandth of it are found. Changed
-by: disturbances."""
+by: acceptance::TestRipple::test_the_finest_pitch."""
 
 PITCHES = 3
-"""[pitches] The highest that are examined. Changed by: disturbances."""
+"""[pitches] The highest that are examined. Changed by: acceptance::TestRipple::test_pitches_that_are_examined."""
 
 PASS_SAMPLES, PASS_PITCHES = 32, 3.0
-"""[samples], [pitches] Fewest of a pass up or down that confirms a ripple. Changed by: disturbances."""
+"""[samples], [pitches] Fewest of a pass up or down that confirms a ripple. Changed by:
+acceptance::TestRipple::test_pitches_of_a_pass."""
 
 DRIVE_REPEATS = 0.01
 """[share of the drive range, rms] A drive repeats itself where it differs by less from itself a period later: the noise
-of a measured drive is less. Changed by: disturbances."""
+of a measured drive is less. Changed by: acceptance::TestSpectra::test_a_noisy_drive_repeats."""
 
 DRIVE_AWAY = 0.25
-"""[share of the drive range, rms] A period begins once it differed by more. Changed by: disturbances."""
+"""[share of the drive range, rms] A period begins once it differed by more. Changed by:
+acceptance::TestSpectra::test_a_drive_that_mostly_rests."""
 
 # Stick-slip --------------------------------------------------------------------------------------------------
 
@@ -456,31 +478,34 @@ SLIP_RESOLVED = 7.0
 in one of a hundred. Derived."""
 
 SLIP_STRETCH = 0.5, 3.0
-"""[times that] Least and most motion of a stretch that counts. Changed by: disturbances."""
+"""[times that] Least and most motion of a stretch that counts. Changed by:
+acceptance::TestStickSlip::test_how_much_stands."""
 
 SLIP_OFF = 0.6
 """[share of the predicted motion] The output stands where it misses this of it, and leaps where it exceeds it by this.
-Changed by: disturbances."""
+Changed by: acceptance::TestStickSlip::test_how_much_stands."""
 
 SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
-"""[share of the stretches] In which the output stands, and leaps, at least. Changed by: disturbances, blind foreign."""
+"""[share of the stretches] In which the output stands, and leaps, at least. Changed by: blind foreign,
+acceptance::TestStickSlip::test_how_much_stands."""
 
 SLIP_CONTINUES = 0.3
 """[correlation] Largest of neighbouring stretches: a lag continues, a leap makes up for the standing before it. Changed
-by: disturbances (a lag is no stick-slip)."""
+by: acceptance::TestStickSlip::test_what_goes_on."""
 
 SLIP_MOVING = 0.25
-"""[share of the upper quartile of moves] A drive that moves less stands. Changed by: disturbances."""
+"""[share of the upper quartile of moves] A drive that moves less stands. Changed by:
+acceptance::TestStickSlip::test_samples_that_hardly_move_do_not_count."""
 
 SLIP_JUMPS = 5
 """[jumps] Fewest of stick-slip; ten times as many samples, and five times as many stretches, have to move. Changed by:
-disturbances."""
+acceptance::TestStickSlip::test_how_many_jumps."""
 
 # What drives are like ----------------------------------------------------------------------------------------
 
 REVERSAL = 0.02
 """[share of the drive range] A reversal is at least this large: above the noise of a measured drive. Changed by:
-disturbances."""
+acceptance::TestDrives::test_a_small_turn."""
 
 LOOP_ENDS = 0.1
 """[share of the drive range] Loops are one if their ends lie within this. Changed by: blind poor."""
@@ -489,7 +514,8 @@ LOOP_SPEEDS = 1.5
 """[ratio of times] And at one speed up to this. Changed by: blind poor."""
 
 LOOP_STANDS = 0.3
-"""[share of the time between turns] A drive that stands still longer holds. Changed by: disturbances."""
+"""[share of the time between turns] A drive that stands still longer holds. Changed by:
+acceptance::TestDrives::test_a_loop_that_stands_is_none."""
 
 # How the remaining error is described ------------------------------------------------------------------------
 
@@ -502,36 +528,41 @@ STRETCH_ABOVE_NOISE = 1.5
 coloured noise over so few scatters more than over all. Changed by: blind none."""
 
 FAST_QUANTILE = 0.9
-"""[quantile of the rates] A stretch that is faster on average is fast. Changed by: disturbances."""
+"""[quantile of the rates] A stretch that is faster on average is fast. Changed by:
+acceptance::TestStretches::test_above_the_noise."""
 
 RANGE_END, RANGE_END_SHARE = 0.1, 0.6
 """[share of the drive range], [share of a stretch] A stretch that is mostly this near to the ends. Changed by:
-disturbances."""
+acceptance::TestStretches::test_ends_of_the_range."""
 
 VARIABLE_SHARE = 0.1
-"""[share of the error's variance] A variable that explains less does not matter. Changed by: disturbances."""
+"""[share of the error's variance] A variable that explains less does not matter. Changed by:
+acceptance::TestDescription::test_a_variable_that_matters."""
 
 VARIABLE_BINS = 24
-"""[bins] Of a function of one variable. Changed by: disturbances."""
+"""[bins] Of a function of one variable. Changed by: acceptance::TestDescription::test_folds."""
 
 FOLD_BLOCKS = 16
-"""[blocks] In which samples alternate between fit and test: longer than errors remember. Changed by: disturbances."""
+"""[blocks] In which samples alternate between fit and test: longer than errors remember. Changed by:
+acceptance::TestDescription::test_folds."""
 
 DESCRIBED_SAMPLES = 200
 """[samples] Fewest that describe an error: eight a bin. Derived."""
 
 MEMORY_WINS = 1.25
-"""[times] Memory is reported in place of one variable if it explains more by this. Changed by: disturbances."""
+"""[times] Memory is reported in place of one variable if it explains more by this. Changed by:
+acceptance::TestDescription::test_memory_in_place_of_one_variable."""
 
 RATE_FREE_SHARE = 0.75
 """[share] An error is rate-free if drive and memory explain this of what they explain with rates. Changed by:
-disturbances."""
+acceptance::TestDescription::test_rate_free."""
 
 REPEATABLE_SHARE = 0.5
 """[share of the error's variance] That returns with the drive, for an error to be repeatable: most. Derived."""
 
 PARITY_BINS, PARITY_SAMPLES = 20, 10
-"""[bins], [samples] Of the drive's range, and more than this in each, for the even share. Changed by: disturbances."""
+"""[bins], [samples] Of the drive's range, and more than this in each, for the even share. Changed by:
+acceptance::TestDescription::test_parity."""
 
 PARITY_SHARE = 0.05
 """[share of the error's variance] The mean over drive and direction has at least this, or parity means nothing: half of

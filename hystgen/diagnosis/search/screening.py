@@ -1,4 +1,4 @@
-"""Screening of every shape of every effect beside a hypothesis: ranked on thinned records, the best fitted jointly."""
+"""Extensions of a hypothesis by one effect: all shapes of the catalogue ranked quickly, the best fitted jointly."""
 
 from __future__ import annotations
 
@@ -10,25 +10,154 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen import effects
 from hystgen.basics import parallel
 from hystgen.basics.problems import EffectsError
-from hystgen.diagnosis.data import drives, spectra
-from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.data.thinning import everything, needed, thinned
+from hystgen.diagnosis.data import signals
+from hystgen.diagnosis.data.items import Item, everything, needed, rms, thinned
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, Search
-from hystgen.diagnosis.search.options import Option, about, front_names, options
-from hystgen.diagnosis.search.structure import Structure
-from hystgen.effects import recursions
+from hystgen.diagnosis.search.hypothesis import Part, Structure
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
+from hystgen.identification.joint import Bent, DeadZones, Ends, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
+
+
+# Every shape of every effect of the catalogue, and fronts ----------------------------------------------------
+
+
+SLOPE_PLACES = 201
+"""Drives at which the slope of a front is judged."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named once it is fitted.
+
+    `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`. `beyond`: label of
+    the simpler one that it contains, and without which it is not tried; `grown`: a start from the numbers of that.
+    """
+
+    label: str
+    name: str
+    structure: Structure
+    alone: Structure
+    starts: tuple[Array, ...]
+    front: bool = False
+    beyond: str = ""
+    grown: Callable[[Array], Array] | None = None
+
+    def joined(self, now: Fitted, numbers: Array) -> Array:
+        """The shape of the whole hypothesis with these numbers of the extension; the others stay."""
+        front_shape, _ = now.structure.pieces(now.shape)
+        if self.front:
+            return np.concatenate([numbers, now.shape[len(front_shape) :]])
+        return np.concatenate([now.shape, numbers])
+
+
+def about(items: Sequence[Item], thresholds: Array) -> About:
+    """Ranges, rates and times of the records, from which effects choose their candidates."""
+    low = min(float(item.run.v.min()) for item in items)
+    high = max(float(item.run.v.max()) for item in items)
+    finest = min(float(np.median(np.diff(item.run.t))) for item in items)
+    rates = [float(np.max(np.abs(np.diff(item.run.v) / np.diff(item.run.t)))) for item in items]
+    columns = set(items[0].run.extra)
+    for item in items:
+        columns &= set(item.run.extra)
+    begin, end = min(float(item.run.t[0]) for item in items), max(float(item.run.t[-1]) for item in items)
+    return About(
+        (low, high),
+        max(item.output_range for item in items),
+        finest,
+        max(float(np.ptp(item.run.t)) for item in items),
+        end - begin,
+        max(rates),
+        float(sum(np.sum(np.abs(np.diff(item.run.v))) for item in items)),
+        tuple(float(r) for r in thresholds),
+        frozenset(columns),
+    )
+
+
+def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> list[Option]:
+    """Every extension of a hypothesis by one effect."""
+    structure, held = now.structure, now.structure.held(now.shape)
+    there = [part.name for part in structure.parts]
+    moved = any(effect.moves_plays() for effect in structure.effects(now.shape))
+    found = []
+    if not held.front.stages(np.empty(0)):
+        found += _fronts(structure, held, known.drive)
+    kinds = [(name, kind) for name in effects.CATALOGUE for kind in effects.shapes(name)]
+    kinds += [(kind.model_fields["name"].annotation.__args__[0], kind) for kind in user]  # type: ignore[union-attr]
+    for name, kind in kinds:
+        if (name in there and not kind.repeatable) or not known.columns.issuperset(kind.columns):
+            continue
+        if moved and kind.moves_plays():
+            continue
+        for candidate in kind.candidates(known):
+            part = Part(name, candidate)
+            pair = replace(structure, parts=(*structure.parts, part)), replace(held, parts=(*held.parts, part))
+            starts = (candidate.start, *candidate.others)
+            found.append(Option(candidate.label, name, *pair, starts, False, candidate.beyond, candidate.grown))
+    return found
+
+
+def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -> list[Option]:
+    """The memoryless parts that may be added in front."""
+
+    def one(label: str, front: Front, starts: Sequence[Array], beyond: str = "") -> Option:
+        pair = replace(structure, front=front), replace(held, front=front)
+        return Option(label, "asymmetry", *pair, tuple(starts), True, beyond)
+
+    one_way, both_ways = Bent(drive, 1), Bent(drive, 2)
+    dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (acceptance.BREAKS, acceptance.FINER_BREAKS))
+    tanh = Tanh(drive)
+    sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
+    bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # one way over the whole range
+    # a limit outside the range does nothing, nor does a small change of it: start inside
+    limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
+    return [
+        one("front that bends one way", one_way, [one_way.straight]),
+        one("front that bends both ways", both_ways, [both_ways.straight]),
+        one("front of dead zones", dead_zones, [dead_zones.straight]),
+        one("front of more dead zones", finer, [finer.straight], "front of dead zones"),
+        one("front of one tanh", tanh, [tanh.straight, *bent]),
+        one("front with flatter ends", Ends(drive), limiters),
+    ]
+
+
+def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
+    """`saturation` for a front that is straight between flatter ends, or bends alike at both; else `asymmetry`.
+
+    Both names where one end alone is a little flatter: a soft limit there and a bent actuator give the same front.
+    """
+    v = np.linspace(*drive, SLOPE_PLACES)
+    w = v
+    for stage in front.stages(shape):
+        w = stage.forward(w)
+    slopes = np.diff(w) / np.diff(v)
+    middle, near = float(np.median(slopes)), acceptance.LIMITER_NEAR * float(np.ptp(slopes))
+    flatter, other = sorted(float(end.mean()) for end in (slopes[: SLOPE_PLACES // 16], slopes[-SLOPE_PLACES // 16 :]))
+    straight = float(np.mean(np.abs(slopes - middle) <= near)) >= acceptance.LIMITER_STRAIGHT
+    if straight and other <= middle + near and flatter < middle - near:
+        sure = flatter < acceptance.LIMITER_SLOPE * middle or other < middle - near
+        return ("saturation",) if sure else ("saturation", "asymmetry")
+    bent = w - np.polyval(np.polyfit(v, w, 1), v)
+    odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
+    ends = 0.5 * (slopes[: SLOPE_PLACES // 8].mean() + slopes[-SLOPE_PLACES // 8 :].mean())
+    odd_wins = np.sum(odd**2) > acceptance.ODD_FRONT * np.sum(even**2)
+    flat_ends = ends < slopes[SLOPE_PLACES // 3 : -SLOPE_PLACES // 3].mean()
+    return ("saturation",) if odd_wins and flat_ends else ("asymmetry",)
+
+
+# Their screening beside a hypothesis -------------------------------------------------------------------------
+
 
 COARSE = 1e-3
 """A search of the screening ends with a step that lowers the error by a smaller share: ranks differ by per cents."""
 
-LARGE = 5_000
+WORTH_PROCESSES = 5_000
 """Samples to fit from which the options are tried in several processes; fewer are not worth starting them."""
 
 
@@ -105,20 +234,20 @@ class Records:
         known = about(to_fit, structure.thresholds)
         return cls(
             to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
-            drives.one_loop([*to_fit, *held]), drives.one_speed(to_fit),
+            signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit),
         )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """The hypothesis with one effect more, the best shapes first; `worth`: selects the options to try."""
-        rings = spectra.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
+        rings = signals.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
         known = replace(self.known, ringing=rings)
         rough = _rough(now, self.thin)
         roughly = replace(known, thresholds=tuple(rough.structure.thresholds.tolist()))
         both = zip(options(now, known, self.user), options(rough, roughly, self.user), strict=True)
         found = [_Pair(*each) for each in both if worth is None or worth(each[0])]
         searches = _Searches(now, rough, found, self)
-        with parallel.Crew(searches, self.jobs) as crew:
-            return _followed_up(searches, _screened(searches, crew), crew)
+        with parallel.Pool(searches, self.jobs) as pool:
+            return _followed_up(searches, _screened(searches, pool), pool)
 
     def residual(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
@@ -137,11 +266,11 @@ def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
 
 def _jobs(to_fit: Sequence[Item]) -> int:
     """Number of processes; the compiled functions of effects are loaded before they fork."""
-    if sum(len(item.run.t) for item in to_fit) < LARGE:
+    if sum(len(item.run.t) for item in to_fit) < WORTH_PROCESSES:
         return 1
     jobs = parallel.cores()
     if jobs > 1:
-        recursions.load()
+        effects.load_compiled()
     return jobs
 
 
@@ -245,10 +374,10 @@ class _Searches:
         return (search.further(task.steps, little) if task.steps else search).found(task.weights)
 
 
-_Crew = parallel.Crew[_Task, _Numbers]
+_Pool = parallel.Pool[_Task, _Numbers]
 
 
-def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
+def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     """The options after a few steps on thinned records: the best on fitted records, and on held-out ones.
 
     What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
@@ -276,7 +405,7 @@ def _screened(searches: _Searches, crew: _Crew) -> list[_Screened]:
         return [_Task(_SCREEN, k, numbers.shape) for k in containing(found[task.k])]
 
     first = sorted((k for k, option in enumerate(found) if not option.beyond), key=cost, reverse=True)
-    done = {task.k: numbers for task, numbers in crew.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
+    done = {task.k: numbers for task, numbers in pool.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
     every = [screened(k, done[k]) for k in sorted(done)]
     tried = [each for each in every if not each.option.beyond]
     simpler = {each.option.label: each for each in tried if helps(each, *without)}
@@ -319,7 +448,7 @@ def _twins(one: _Screened, other: _Screened) -> bool:
     return all(abs(a - b) <= acceptance.TWIN * b for a, b in both)
 
 
-def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) -> list[Tried]:
+def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) -> list[Tried]:
     """The options fitted jointly and judged on held-out records, the best one first."""
     now, records = searches.now, searches.records
     found = {each.k: searches.found[each.k].option for each in kept}
@@ -333,7 +462,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], crew: _Crew) ->
 
     def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
-        return {task.k: numbers for task, numbers in crew.each(order, records.tick)}
+        return {task.k: numbers for task, numbers in pool.each(order, records.tick)}
 
     done = all_of([join(each) for each in kept])
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)

@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import NotNegative
-from hystgen.effects import recursions
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, follow, from_zero
 
 
 class Lag(Effect):
@@ -31,7 +30,7 @@ class Lag(Effect):
         """The drive behind the lag."""
         out = np.empty_like(a)
         decay, early, late = run.factors(self.time_constant)
-        recursions.follow(a, decay, early, late, float(a[0]), out)
+        follow(a, decay, early, late, float(a[0]), out)
         return out
 
     @classmethod

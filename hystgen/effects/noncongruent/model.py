@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import MAX_PLAYS, Number, Positive
-from hystgen.effects import recursions
 from hystgen.effects.base import (
     About,
     Array,
@@ -19,6 +18,7 @@ from hystgen.effects.base import (
     Effect,
     Place,
     Problem,
+    curve,
     not_one_a_play,
     span,
     without_plays,
@@ -94,7 +94,7 @@ class PlayFunctions(_Noncongruent):
 
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
         """What its polynomial adds to a play."""
-        recursions.curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
+        curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

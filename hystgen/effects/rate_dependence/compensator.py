@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hystgen.effects.base import Array
-from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
-from hystgen.effects.recursions import relaxed
+from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, relaxed
 
 
 class Movement:

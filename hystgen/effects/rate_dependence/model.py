@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from hystgen.basics import parallel
+from hystgen.basics.jit import jit
 from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Positive
-from hystgen.effects import recursions
 from hystgen.effects.base import (
     About,
     Array,
@@ -27,11 +28,212 @@ from hystgen.effects.base import (
     without_plays,
 )
 from hystgen.plays import operators
+from hystgen.plays.operators import followed
 
 Places = NDArray[np.intp]
 
 LARGE, TOGETHER = 10_000, 4
 """Samples of plays with a nonlinear dashpot from which on threads share them, and plays that one takes at a time."""
+
+
+MOST_PIECES = 1000
+"""Most pieces into which a step of a nonlinear relaxation is cut."""
+
+CLOSE = 1e-7
+"""Error of a piece of a nonlinear relaxation, in largest thresholds."""
+
+SLOW = 1.0
+"""Share of a disturbance that friction may take in a piece by the Taylor series."""
+
+NEARLY = 0.3
+"""Share of a stretch by which it may change in a piece whose curvature counts with its leading term."""
+
+SLIGHT = 1e-4
+"""Share of the speed that friction may take while what it takes is summed along the way without it."""
+
+
+@jit
+def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, out: Array) -> None:
+    """Plays whose thresholds are `r + beta rate_k`, from `states`, into the rows of `out`."""
+    # Four side by side, since each by itself waits for its own last sample
+    fours = len(r) // 4 * 4
+    for i in range(0, fours, 4):
+        r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
+        b0, b1, b2, b3 = beta[i], beta[i + 1], beta[i + 2], beta[i + 3]
+        s0, s1, s2, s3 = states[i], states[i + 1], states[i + 2], states[i + 3]
+        for k in range(len(w)):
+            s0, s1 = followed(s0, w[k], r0 + b0 * rate[k]), followed(s1, w[k], r1 + b1 * rate[k])
+            s2, s3 = followed(s2, w[k], r2 + b2 * rate[k]), followed(s3, w[k], r3 + b3 * rate[k])
+            out[i, k], out[i + 1, k], out[i + 2, k], out[i + 3, k] = s0, s1, s2, s3
+    for i in range(fours, len(r)):
+        state = states[i]
+        for k in range(len(w)):
+            state = followed(state, w[k], r[i] + beta[i] * rate[k])
+            out[i, k] = state
+
+
+@jit
+def mean_decay(x: float) -> float:
+    """`(1 - exp(-x))/x`."""
+    if x < 0.1:  # the series is as exact and far quicker
+        return 1.0 - x * (0.5 - x * (1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320))))))
+    return -math.expm1(-x) / x
+
+
+@jit
+def bent_decay(x: float) -> float:
+    """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, what a growing disturbance leaves of its square's sum; 1/6 at 0."""
+    if x < 0.1:
+        return 1 / 6 - x * (1 / 6 - x * (11 / 120 - x * (13 / 360 - x * 57 / 5040)))
+    decay = math.exp(-x)
+    return (1.0 - decay * (2.0 * x + decay)) / (2.0 * x * x * x)
+
+
+@jit
+def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
+    """What `e` gains over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
+
+    The terms `q_k` of q follow from `e q' = m q e'`, those of e from the second on are `-step q_(k-1)/k`.
+    """
+    d = 1.0 / e
+    q1 = m * c1 * q0 * d
+    c2 = -step * q1 / 2
+    q2 = ((m - 1) * c1 * q1 + 2 * m * c2 * q0) * d / 2
+    c3 = step * q2 * (-1 / 3)
+    q3 = ((m - 2) * c1 * q2 + (2 * m - 1) * c2 * q1 + 3 * m * c3 * q0) * d * (1 / 3)
+    c4 = -step * q3 / 4
+    q4 = ((m - 3) * c1 * q3 + (2 * m - 2) * c2 * q2 + (3 * m - 1) * c3 * q1 + 4 * m * c4 * q0) * d / 4
+    c5 = step * q4 * (-1 / 5)
+    q5 = (m - 4) * c1 * q4 + (2 * m - 3) * c2 * q3 + (3 * m - 2) * c3 * q2 + (4 * m - 1) * c4 * q1 + 5 * m * c5 * q0
+    c6 = step * q5 * d * (-1 / 30)
+    return c1 + (c2 + (c3 + (c4 + (c5 + c6)))), c6
+
+
+@jit
+def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
+    """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
+
+    The linear case is exact. Else pieces by the equation's Taylor series where friction takes its time, and where it is
+    fast pieces that are exact for the equation straightened about `e` (exponential Rosenbrock-Euler) with the leading
+    term of the curvature, each as long as what is left out allows.
+    """
+    if exponent == 1.0:
+        final = e + (speed - e / tau) * duration * mean_decay(duration / tau)
+        if final > 0.0 or (final == 0.0 and speed >= 0.0):
+            return final, 0.0
+        taken = tau * math.log1p(e / (-speed * tau))
+        return 0.0, duration - taken if taken < duration else 0.0
+    left = duration
+    step = left
+    fall = scale / tau * (e / scale) ** exponent
+    for _ in range(MOST_PIECES):
+        if not fall < 1e200:
+            return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
+        change = speed - fall
+        if fall < 0.5 * SLIGHT * speed:  # hardly anything but the speed counts
+            little = scale * (SLIGHT * speed * tau / scale) ** (1.0 / exponent)
+            taken = min((little - e) / speed, left)
+            final = e + speed * taken
+            e = final - (scale / tau * (final / scale) ** exponent * final - fall * e) / ((exponent + 1.0) * speed)
+            left -= taken
+            if not left > 0.0:
+                break
+            fall = scale / tau * (e / scale) ** exponent
+            continue
+        if not e > 0.0:
+            return 0.0, left if speed < 0.0 else 0.0
+        slope = exponent * fall / e
+        step = min(step, left)
+        part = slope * step
+        if part <= SLOW and abs(change) * step <= 0.5 * e:
+            gain, last = taylor(e, change * step, fall, exponent, step)
+            if abs(last) > CLOSE * scale:
+                step *= 0.5
+                continue
+            e += gain
+            left -= step
+            if left <= 1e-12 * duration:
+                break
+            step *= 4.0
+            fall = scale / tau * (e / scale) ** exponent
+            continue
+        gain = change * step * mean_decay(part)
+        final = e + gain
+        if speed == 0.0:
+            final = max(final, 0.0)
+        bend = slope / e
+        end, after = 0.0, 0.0
+        if abs(gain) > NEARLY * e:
+            end = max(final, 0.1 * e)
+            after = scale / tau * (end / scale) ** exponent
+            bend = max(bend, exponent * after / end / end)
+            wrong = step * gain * gain * bend * abs(exponent - 1.0) / 12.0
+        else:  # the curvature about e adds its leading term
+            more = (1.0 - exponent) * bend * change * change * bent_decay(part) * step * step * step
+            final += more
+            wrong = abs(more * gain) / e * (abs(exponent - 2.0) / 3.0 + 2.0 * abs(exponent - 1.0))
+        if wrong > CLOSE * scale and (final > 0.0 or e > CLOSE * scale):
+            step *= max(0.2, 0.9 * (CLOSE * scale / wrong) ** (1.0 / 3.0))
+            continue
+        if final < 0.0:
+            taken = -math.log1p(slope * e / change) / slope if part > 1e-8 else -e / change
+            return 0.0, max(left - min(taken, step), 0.0)
+        e = final
+        left -= step
+        if left <= 1e-12 * duration or not e > 0.0:
+            break
+        step *= 4.0
+        fall = after if e == end else scale / tau * (e / scale) ** exponent
+    return e, 0.0
+
+
+@jit
+def relaxed(
+    x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
+) -> float:
+    """State of a play that follows its input viscously, after the input's way from `x` to `target` in the time `left`.
+
+    `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold.
+    """
+    speed = (target - x) / left
+    side = 0.0
+    if x - r - state > 0.0:
+        side = 1.0
+    elif state - r - x > 0.0:
+        side = -1.0
+    if side != 0.0:
+        e, left = stretch(side * (x - state) - r, side * speed, left, tau, exponent, scale)
+        if left > 0.0:  # caught up, with the input on its way back
+            x = target - speed * left
+            state = x - side * r
+            side = 0.0
+        else:
+            state = target - side * (r + e)
+    if side == 0.0 and left > 0.0 and target != x:
+        way = 1.0 if target > x else -1.0
+        beyond = way * (target - state) - r
+        if beyond > 0.0:
+            taken = left * min(beyond / (way * (target - x)), 1.0)
+            e, _ = stretch(0.0, way * speed, taken, tau, exponent, scale)
+            state = target - way * (r + e)
+    return state
+
+
+@jit
+def relaxing_plays(
+    w: Array, steps: Array, r: Array, tau: float, exponent: float, scale: float, states: Array, out: Array
+) -> None:
+    """Plays of thresholds `r` that follow their input viscously, from `states`, into the rows of `out`.
+
+    Side by side, since each by itself waits for its own last sample.
+    """
+    for i in range(len(r)):
+        states[i] = min(max(states[i], w[0] - r[i]), w[0] + r[i])
+        out[i, 0] = states[i]
+    for k in range(len(w) - 1):
+        for i in range(len(r)):
+            states[i] = relaxed(w[k], w[k + 1], steps[k], r[i], tau, exponent, scale, states[i])
+            out[i, k + 1] = states[i]
 
 
 class _RateDependence(Effect):
@@ -100,7 +302,7 @@ class ThresholdRate(_RateDependence):
             slope = np.minimum(np.abs(np.diff(w)) / run.steps, 1e300)
         rate = np.concatenate([[0.0], slope])
         betas = np.array(self.betas)[chosen - 1]
-        recursions.dilated_plays(w, rate, thresholds[chosen], betas, start[chosen], out)
+        dilated_plays(w, rate, thresholds[chosen], betas, start[chosen], out)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -153,7 +355,7 @@ class RelaxingPlays(_RateDependence):
         starts = start[chosen]
 
         def move(some: slice) -> None:
-            recursions.relaxing_plays(w, run.steps, thresholds[chosen[some]], *about, starts[some], out[some])
+            relaxing_plays(w, run.steps, thresholds[chosen[some]], *about, starts[some], out[some])
 
         if self.exponent == 1.0 or out.size < LARGE:
             move(slice(None))
@@ -186,3 +388,10 @@ class RelaxingPlays(_RateDependence):
 
 
 SHAPES = (ThresholdRate, RelaxingPlays)
+
+
+def load() -> None:
+    """Have the recursions compiled, or read from the cache, on two samples."""
+    w, one = np.arange(2.0), np.ones(1)
+    dilated_plays(w, w, one, one, np.zeros(1), np.empty((1, 2)))
+    relaxing_plays(w, one, one, 1.0, 1.0, 1.0, np.zeros(1), np.empty((1, 2)))

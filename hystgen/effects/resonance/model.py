@@ -7,9 +7,51 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from hystgen.basics.jit import jit
 from hystgen.basics.quantities import Positive
-from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+
+
+@jit
+def rung(
+    y: float, rate: float, u: float, after: float, c: float, s: float, ramp: float, step: float, damping: float
+) -> tuple[float, float]:
+    """Output and rate of `ring` after a step in which its input goes from `u` to `after`."""
+    off = y - u
+    change = after - u
+    return (
+        u + (c + damping * s) * off + s * rate + ramp * change,
+        (c - damping * s) * rate - s * off + step * change,
+    )
+
+
+@jit
+def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float, out: Array) -> None:
+    """Second-order low pass of every row of `u` (R, N), from rest, over steps with straight `u`.
+
+    `c`, `s`: decaying cosine and sine of each step; `ramp`, `step`: what the output, and its rate, gain by a change of
+    `u` by 1 over the step. Rates are per radian of the undamped oscillation.
+    """
+    # Four side by side, since each by itself waits for its own last sample
+    rows, number = u.shape
+    fours = rows // 4 * 4
+    for i in range(0, fours, 4):
+        u0, u1, u2, u3 = u[i], u[i + 1], u[i + 2], u[i + 3]
+        y0, y1, y2, y3 = u0[0], u1[0], u2[0], u3[0]
+        v0, v1, v2, v3 = 0.0, 0.0, 0.0, 0.0
+        out[i, 0], out[i + 1, 0], out[i + 2, 0], out[i + 3, 0] = y0, y1, y2, y3
+        for k in range(number - 1):
+            y0, v0 = rung(y0, v0, u0[k], u0[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            y1, v1 = rung(y1, v1, u1[k], u1[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            y2, v2 = rung(y2, v2, u2[k], u2[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            y3, v3 = rung(y3, v3, u3[k], u3[k + 1], c[k], s[k], ramp[k], step[k], damping)
+            out[i, k + 1], out[i + 1, k + 1], out[i + 2, k + 1], out[i + 3, k + 1] = y0, y1, y2, y3
+    for i in range(fours, rows):
+        y, v = u[i, 0], 0.0
+        out[i, 0] = y
+        for k in range(number - 1):
+            y, v = rung(y, v, u[i, k], u[i, k + 1], c[k], s[k], ramp[k], step[k], damping)
+            out[i, k + 1] = y
 
 
 class Resonance(Effect):
@@ -64,7 +106,7 @@ class Resonance(Effect):
         out = np.empty_like(rows)
         factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self._forced))
         a, b, early, late = factors
-        recursions.ring(rows, a, b, early, late, self.damping, out)
+        ring(rows, a, b, early, late, self.damping, out)
         return out.reshape(np.shape(h))
 
     def transients(self, run: Run) -> Array:
@@ -103,3 +145,9 @@ class Resonance(Effect):
 
 
 SHAPES = (Resonance,)
+
+
+def load() -> None:
+    """Have the recursions compiled, or read from the cache, on two samples."""
+    one = np.ones(1)
+    ring(np.arange(2.0)[None, :], one, one, one, one, 1.0, np.empty((1, 2)))

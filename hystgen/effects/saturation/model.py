@@ -19,7 +19,8 @@ INSIDE, GIVE = (0.03, 0.1), 0.2
 """Stops from which a search starts: shares of the output range inside its ends, and what they give."""
 
 AWAY, FARTHEST = -0.3, 0.45
-"""Stops are sought up to so far beyond the ends, where they do nothing, and inside them."""
+"""Least and largest distance of the sought stops from the ends, as shares of the range: outside, where they do nothing,
+and inside."""
 
 
 class _Saturation(Effect):

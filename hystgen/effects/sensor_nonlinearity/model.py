@@ -8,8 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from hystgen.basics.quantities import Number, Positive
-from hystgen.effects import recursions
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, curve
 
 BENT = 1.0
 """Parabolas from which a search starts, 10 % at the range's end: from a straight sensor its step may overshoot."""
@@ -37,7 +36,7 @@ class SensorPolynomial(Effect):
     def mapped(self, y: Array, run: Run) -> Array:
         """What the sensor shows."""
         shown = np.array(y)
-        recursions.curve(np.asarray(y), self.scale, np.array(self.coefficients), 1.0, shown)
+        curve(np.asarray(y), self.scale, np.array(self.coefficients), 1.0, shown)
         return shown
 
     @classmethod

@@ -7,15 +7,37 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from pydantic import Field, model_validator
 
+from hystgen.basics.jit import jit
 from hystgen.basics.quantities import Positive
-from hystgen.effects import recursions
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""Starts below the fastest recorded rate, in decades: a limit that is never met, or always, tells nothing of itself."""
+"""Starts below the fastest recorded rate, in decades: a limit met never, or always, leaves no trace."""
 
 LEAST = 3.0
 """The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
+
+
+@jit
+def limit(u: Array, up: Array, down: Array, out: Array) -> None:
+    """`u`, straight between samples, followed at no more than `up_k` upwards and `down_k` downwards in a step.
+
+    Where it is met within a step, the rest of the step goes along with it, or as fast as it may.
+    """
+    x = u[0]
+    out[0] = x
+    for k in range(len(u) - 1):
+        change = u[k + 1] - u[k]
+        ahead = u[k] - x
+        closing = up[k] - change if ahead > 0.0 else down[k] + change
+        if ahead != 0.0 and not closing > abs(ahead):
+            x = x + up[k] if ahead > 0.0 else x - down[k]
+        elif -down[k] <= change <= up[k]:
+            x = u[k + 1]
+        else:
+            part = abs(ahead) / closing if ahead != 0.0 else 0.0
+            x = u[k] + part * change + (1.0 - part) * (up[k] if change > 0.0 else -down[k])
+        out[k + 1] = x
 
 
 class SlewLimit(Effect):
@@ -44,7 +66,7 @@ class SlewLimit(Effect):
     def drive(self, a: Array, run: Run) -> Array:
         """The drive as fast as it may be."""
         out = np.empty_like(a)
-        recursions.limit(a, self.rate * run.steps, self.falling_rate * run.steps, out)
+        limit(a, self.rate * run.steps, self.falling_rate * run.steps, out)
         return out
 
     @classmethod
@@ -67,3 +89,8 @@ class SlewLimit(Effect):
 
 
 SHAPES = (SlewLimit,)
+
+
+def load() -> None:
+    """Have the recursions compiled, or read from the cache, on two samples."""
+    limit(np.arange(2.0), np.ones(1), np.ones(1), np.empty(2))

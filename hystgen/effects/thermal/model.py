@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from hystgen.basics.jit import jit
 from hystgen.basics.quantities import NotNegative, Number, Positive
-from hystgen.effects import recursions
-from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, span
+from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, follow, span
 
 COLUMN = "temperature"
 
@@ -21,6 +21,52 @@ SHARES = (0.3, 0.15, 0.5)
 
 SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
 """Decimal logarithms of the reach of what rubs, in ranges of the drive: bounds and start."""
+
+
+@jit
+def rubbed(way: float, reach: float) -> float:
+    """What plays of thresholds up to `reach` lose to friction on a way on which more and more of them follow.
+
+    One of threshold r follows behind r and then loses r a unit of the way, all that follow `min(way, reach)^2/2`.
+    """
+    rising = min(way, reach)
+    return rising * rising * (rising / 6.0 + 0.5 * (way - rising))
+
+
+@jit
+def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
+    """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `v[0]`, lose in each step of `v`.
+
+    Behind a turning point a play follows when the way is twice its threshold. Turning points that are passed are
+    forgotten (Madelung's rules): there the way goes on from an earlier one, or on the initial curve.
+    """
+    depth = 0
+    w = v[0]
+    up = True
+    for k in range(len(v) - 1):
+        x = v[k + 1]
+        out[k] = 0.0
+        if x == w:
+            continue
+        if (x > w) != up:
+            up = x > w
+            if w != v[0] or depth > 0:
+                corner[depth] = w
+                depth += 1
+        sign = 1.0 if up else -1.0
+        while x != w:
+            if depth == 0:
+                out[k] += rubbed(abs(x - v[0]), reach) - rubbed(abs(w - v[0]), reach)
+                w = x
+                break
+            last = corner[depth - 1]
+            end = corner[depth - 2] if depth > 1 else 2.0 * v[0] - last
+            ends = sign * (x - end) >= 0.0
+            to = end if ends else x
+            out[k] += 2.0 * (rubbed(0.5 * sign * (to - last), reach) - rubbed(0.5 * sign * (w - last), reach))
+            w = to
+            if ends:
+                depth -= min(depth, 2)
 
 
 class _Thermal(Effect):
@@ -99,7 +145,7 @@ class _OwnHeat(_Thermal):
     def _rise(self, run: Run) -> Array:
         decay, kept, none = run.of_steps(lambda steps: _kept(steps / self.time_constant))
         out = np.empty(len(run.t))
-        recursions.follow(np.append(self.heat(run), 0.0), decay, kept, none, 0.0, out)
+        follow(np.append(self.heat(run), 0.0), decay, kept, none, 0.0, out)
         return out
 
 
@@ -155,7 +201,7 @@ class HysteresisHeating(_OwnHeat):
 
     def _lost(self, run: Run) -> Array:
         out = np.empty(len(run.steps))
-        recursions.lost(run.v, self.reach, np.empty(len(run.v)), out)
+        lost(run.v, self.reach, np.empty(len(run.v)), out)
         return out
 
     @classmethod
@@ -209,3 +255,8 @@ def _kept(share: Array) -> Array:
 
 
 SHAPES = (LoggedThermal, SelfHeating, HysteresisHeating)
+
+
+def load() -> None:
+    """Have the recursions compiled, or read from the cache, on two samples."""
+    lost(np.arange(2.0), 1.0, np.empty(2), np.empty(1))

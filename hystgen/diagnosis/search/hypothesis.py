@@ -1,24 +1,39 @@
-"""The forward model of a hypothesis over one record: plays behind a front, effects around them, free start states."""
+"""Hypotheses: thresholds, a front and effects whose numbers a fit may change, and their forward model over a record.
+
+The `Structure` of a hypothesis makes an `Actuator` of its numbers; the nominal model is the first structure.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.cascade import Cascade
 from hystgen.chain import chain
 from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.search import acceptance
-from hystgen.effects.base import Effect, Place, Run
+from hystgen.effects.base import Candidate, Effect, Place, Run
+from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
+from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import joint, reduction
-from hystgen.identification.joint import DIFFERENCE
+from hystgen.identification.joint import DIFFERENCE, DeadZones, Front, Kept, Tanh
 from hystgen.plays import operators
+from hystgen.records import Record
 
 Array = NDArray[np.float64]
+
+
+# The forward model: plays behind a front, effects around them, free start states -----------------------------
+
+
 Sums = dict[object, Array]
 
 ALL = slice(None)
@@ -215,12 +230,12 @@ class Actuator:
             if not np.isfinite(bent).all():
                 raise NotFiniteError
             moved = (self.mapped(h, level + step, item) - bent) / step
-            left, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
+            residuals, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
             if not np.any(slopes[0]):
                 break
-            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ left, rcond=1e-12)
+            change, *_ = np.linalg.lstsq(slopes @ slopes.T, slopes @ residuals, rcond=1e-12)
             if np.any(np.abs(factors + change) > limits):
-                change = _within(slopes, left, -limits - factors, limits - factors)
+                change = _within(slopes, residuals, -limits - factors, limits - factors)
             factors += change
             shift = change @ free
             level = level + shift
@@ -229,7 +244,7 @@ class Actuator:
         return level, moved
 
     def added(self, item: Item) -> Array:
-        """The sum of what is added at the end of the chain, at the compared samples."""
+        """Sum of the terms added at the end of the chain, at the compared samples."""
         total = np.zeros(len(item.run.t))
         for effect in self.at(Place.ADDED):
             total = total + effect.added(item.run)
@@ -273,12 +288,12 @@ class Actuator:
         by = self._mark(p), None if like is None else like[0]._mark(like[1])
         whole = item.errors.recalled(by)
         if whole is None:
-            left, offset = self._left(item, p)
-            known = np.isfinite(left)
+            residuals, offset = self._residual(item, p)
+            known = np.isfinite(residuals)
             free = (self.nuisances(item, offset) if like is None else like[0].nuisances(item))[:, known]
             largest = self.largest(item, p) if like is None else like[0].largest(item, like[1])
-            e = np.full(len(left), np.nan)
-            e[known] = left[known] - _within(free, left[known], -largest, largest) @ free
+            e = np.full(len(residuals), np.nan)
+            e[known] = residuals[known] - _within(free, residuals[known], -largest, largest) @ free
             whole = np.full(len(item.y), np.nan)
             whole[item.compared] = e
             whole.setflags(write=False)
@@ -294,19 +309,19 @@ class Actuator:
         effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
         return self.thresholds.tobytes(), self.stages, effects
 
-    def _left(self, item: Item, p: Array) -> Array:
+    def _residual(self, item: Item, p: Array) -> Array:
         """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
         by = self._mark(p)
-        found = item.left.recalled(by)
+        found = item.residuals.recalled(by)
         if found is None:
             rows, constant = self.columns(item, p)
             h, moved = rows[0] + constant, np.ones(rows.shape[1])
             if self.bends:
                 level, moved = self.level(h, item, self.largest(item, p))
                 h = self.mapped(h, level, item)
-            left = item.y[item.compared] - self.compared(h, item) - self.added(item)
-            found = np.stack([left, self.compared(moved, item)])
-            item.left.remember(by, found)
+            residuals = item.y[item.compared] - self.compared(h, item) - self.added(item)
+            found = np.stack([residuals, self.compared(moved, item)])
+            item.residuals.remember(by, found)
         return found
 
 
@@ -324,3 +339,211 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
     found = np.zeros(len(low))
     found[able] = lsq_linear(triangle[:, :-1][:, able], triangle[:, -1], (low[able], high[able]), method="bvls").x
     return found
+
+
+# Structures: which numbers a fit may change ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Part:
+    """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted."""
+
+    name: str
+    candidate: Candidate
+
+
+def kept(effect: Effect) -> Part:
+    """An effect that stays as it is."""
+    none = np.empty(0)
+    return Part(effect.name, Candidate("as it is", none, none, none, lambda _: effect))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Thresholds, a front and effects; its shape is the front's, then the numbers of each effect."""
+
+    thresholds: Array
+    front: Front
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def start(self) -> Array:
+        """Where a search starts."""
+        return np.concatenate([self.front.straight, *(part.candidate.start for part in self.parts)])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of every shape number."""
+        low, high = self.front.bounds
+        return (
+            np.concatenate([low, *(part.candidate.low for part in self.parts)]),
+            np.concatenate([high, *(part.candidate.high for part in self.parts)]),
+        )
+
+    def slack(self, shape: Array) -> Array:
+        """Further constraints on a shape: numbers that must not be negative."""
+        return self.front.slack(shape[: len(self.front.straight)])
+
+    def pieces(self, shape: Array) -> tuple[Array, list[Array]]:
+        """The front's shape and the numbers of each effect."""
+        at = len(self.front.straight)
+        found = []
+        for part in self.parts:
+            found.append(shape[at : at + len(part.candidate.start)])
+            at += len(part.candidate.start)
+        return shape[: len(self.front.straight)], found
+
+    def effects(self, shape: Array) -> list[Effect]:
+        """The effects, in the order of the parts."""
+        return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
+
+    def held(self, shape: Array) -> Structure:
+        """The same without free numbers: front and effects stay as a shape makes them."""
+        front_shape, _ = self.pieces(shape)
+        front = Kept(self.front.stages(front_shape), self.front.name)
+        return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
+
+    def actuator(self, shape: Array) -> Actuator:
+        """The actuator of a shape."""
+        return Actuator(self.thresholds, self.front.stages(self.pieces(shape)[0]), tuple(self.effects(shape)))
+
+    def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
+        """The actuators of a shape with each number in turn changed by `DIFFERENCE`; the rest is shared with `here`."""
+        front, numbers = self.pieces(shape)
+        ends = len(front) + np.cumsum([len(x) for x in numbers])
+
+        def one(j: int) -> Actuator:
+            other = shape.copy()
+            other[j] += DIFFERENCE
+            front_shape, changed = self.pieces(other)
+            if j < len(front):
+                return replace(here, stages=self.front.stages(front_shape), gains=dict(here.gains))
+            k = int(np.searchsorted(ends, j, side="right"))
+            effects = (*here.effects[:k], self.parts[k].candidate.build(changed[k]), *here.effects[k + 1 :])
+            return replace(here, effects=effects, gains=dict(here.gains))
+
+        return [one(j) for j in range(len(shape))]
+
+
+# The nominal model as a structure ----------------------------------------------------------------------------
+
+
+def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front, Array]:
+    """The nominal front as a member of a family, and its shape in that family."""
+    if not stages:
+        return Kept(), np.empty(0)
+    if len(stages) == 1 and isinstance(stages[0], DeadZone):
+        kept = stages[0].over(*drive)
+        if kept.breaks:
+            family = DeadZones(drive, kept.breaks)
+            return family, family.shape(np.array(kept.slopes))
+    if len(stages) == 1 and isinstance(stages[0], TanhEnvelope):
+        half, middle = 0.5 * (drive[1] - drive[0]), 0.5 * (drive[0] + drive[1])
+        shape = []
+        for up in (True, False) if stages[0].branches_differ else (True,):
+            _, a1, a2, _ = stages[0].branch(up)
+            shape += [abs(a1) * half, (-a2 / a1 - middle) / half]
+        tanh = Tanh(drive)
+        if stages[0].branches_differ:
+            (low, high), (down_low, down_high) = (stages[0].image(*drive, up) for up in (True, False))
+            lift = float(stages[0].forward(middle, False) - stages[0].forward(middle, True))
+            scale = high - low
+            if scale > 0.0 and down_high > down_low:
+                tanh = Tanh(drive, 2)
+                shape += [math.log((down_high - down_low) / scale), max(lift / scale, 0.0)]
+        found = np.array(shape)
+        if len(found) == len(tanh.straight) and _inside(tanh, found):
+            return tanh, found
+    return Kept(tuple(stages)), np.empty(0)
+
+
+def _inside(front: Front, shape: Array) -> bool:
+    """Whether a search may begin at a shape: a neighbour of it would not be the nominal front."""
+    low, high = front.bounds
+    slack = front.slack(np.clip(shape, low, high))
+    return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -acceptance.TOUCHING))
+
+
+def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
+    """The nominal model with free weights, front and numbers of its effects, and the start of a search."""
+    front, shape = front_of(cascade.stages, found.drive)
+    places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
+    parts = tuple(Part(effect.name, _near(effect)) for effect in given)
+    return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
+
+
+def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
+    """The nominal weights at the structure's nearest thresholds; None behind a front, which has a scale of its own."""
+    if cascade.stages:
+        return None
+    p, places = np.zeros(len(structure.thresholds)), structure.thresholds
+    for r, weight in zip(cascade.pi.thresholds, cascade.pi.weights, strict=True):
+        p[int(np.argmin(np.abs(places - r)))] += weight
+    return p
+
+
+def _near(effect: Effect) -> Candidate:
+    """The effect with free factors on its numbers: zeros and signs stay."""
+    sizes = {key: _size(value) for key, value in effect if key not in effect.settled}
+    free = {key: size for key, size in sizes.items() if size}
+    number = sum(free.values())
+
+    def build(x: Array) -> Effect:
+        if not np.any(x):
+            return effect
+        at, changed = 0, {}
+        for key, size in free.items():
+            changed[key] = _times(getattr(effect, key), np.exp(x[at : at + size]).tolist(), effect, key)
+            at += size
+        return effect.model_copy(update=changed)
+
+    zeros, wide = np.zeros(number), math.log(acceptance.NOMINAL_RANGE)
+    return Candidate("as it is, or nearly", zeros - wide, zeros + wide, zeros, build)
+
+
+def _size(value: object) -> int:
+    """Number of factors of a key."""
+    if isinstance(value, float):
+        return int(value != 0.0)
+    if not isinstance(value, tuple) or not any(map(_size, value)):
+        return 0
+    singly = len(value) <= acceptance.SINGLE_FACTORS and all(isinstance(each, float) for each in value)
+    return len(value) if singly else 1
+
+
+def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> Any:
+    """The numbers times their factors, within the limits of the key."""
+    if isinstance(value, tuple):
+        each = factors if len(factors) == len(value) else list(factors) * len(value)
+        return tuple(_times(one, [factor], effect, key) for one, factor in zip(value, each, strict=True))
+    changed = value * factors[0]
+    for limit in type(effect).model_fields[key].metadata:
+        changed = max(changed, getattr(limit, "ge", changed))
+        changed = min(changed, getattr(limit, "le", changed))
+        if getattr(limit, "gt", -math.inf) >= changed:
+            changed = float(np.nextafter(limit.gt, math.inf))
+    return changed
+
+
+def _through(places: Array, nominal: Sequence[float]) -> Array:
+    """The places, those next to a nominal threshold moved there, so that a right nominal model is met exactly."""
+    moved = places.copy()
+    for r in nominal:
+        near = int(np.argmin(np.abs(places - r)))
+        if near and r < places[-1]:
+            moved[near] = r
+    return np.asarray(np.unique(moved))
+
+
+def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:
+    """The nominal model unchanged, and its weights."""
+    return Actuator(np.array(cascade.pi.thresholds), cascade.stages, tuple(given)), np.array(cascade.pi.weights)
+
+
+def predicted(record: Record, actuator: Actuator, weights: Array, history: tuple[float, ...] | None) -> Array:
+    """(N,) what an actuator with these weights predicts of a record, up to an offset, output units."""
+    assert record.y is not None
+    run = Run(np.ascontiguousarray(record.t, dtype=np.float64), np.ascontiguousarray(record.v, dtype=np.float64),
+              dict(record.extra))  # fmt: skip
+    rows, constant = actuator.columns(Item(record.name, run, np.asarray(record.y), history, 1.0), weights)
+    return np.asarray(rows[0] + constant)

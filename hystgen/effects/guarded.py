@@ -1,4 +1,4 @@
-"""What effects of a user's own answer is looked at before anything goes on with it."""
+"""Checks of what a user's own effects return, before anything depends on it."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
     "added": lambda run: run.t.shape,
     "transients": lambda run: (-1, len(run.t)),
 }
-"""Shape of what each method answers, by its arguments; -1 stands for any number."""
+"""Shape of the array that each method returns, by its arguments; -1 stands for any number."""
 
 
-def watch(effect: type[Any], base: type[Any], name: str) -> None:
-    """Make what a class, or one between it and `base`, defines raise EffectsError where it fails or is of no use."""
+def guard(effect: type[Any], base: type[Any], name: str) -> None:
+    """Make the methods of a class, and of its bases below `base`, raise EffectsError where they fail."""
     own: dict[str, Any] = {}
     for each in reversed(effect.__mro__[: effect.__mro__.index(base)]):
         own.update(vars(each))

@@ -1,0 +1,314 @@
+"""Properties of drives, outputs and errors: the noise, holds and turning points, spectral peaks."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
+from hystgen.plays import operators
+
+Array = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+
+# The noise of the measurement: from holds, from differences, from repeated periods ---------------------------
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """Noise rms in output units by each way that the records allow, and the one that is used.
+
+    Holds contain all noise that is faster than they last; repeated periods everything that does not repeat; differences
+    only the changes from sample to sample, so they are a lower bound where the noise is coloured.
+    """
+
+    rms: float
+    holds: float | None
+    differences: float | None
+    periods: float | None
+
+
+def noise_floor(items: Sequence[Item]) -> NoiseFloor:
+    """The noise of the measured outputs of several records."""
+    holds = _pooled([part for item in items for part in _holds(item)], acceptance.QUIET_HOLDS)
+    differences = _pooled([part for item in items for part in _differences(item)], 0.5)
+    periods = _pooled([part for item in items for part in _periods(item)], 0.5)
+    measured = [x for x in (holds, periods) if x is not None]
+    return NoiseFloor(min(measured) if measured else differences or 0.0, holds, differences, periods)
+
+
+def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None:
+    """Root of a quantile of the variances, so that odd parts do not count; longer parts count more."""
+    sample = acceptance.HOLD_SAMPLES
+    variances = np.array([v for v, n in parts for _ in range(max(1, min(n // sample, acceptance.HOLD_WEIGHT)))])
+    return float(np.sqrt(np.quantile(variances, quantile))) if len(variances) else None
+
+
+def still(v: Array, least: int) -> list[tuple[int, int]]:
+    """Stretches [first, last) of at least `least` samples over which the drive stands still."""
+    tolerance = acceptance.HOLD_DRIVE * max(float(np.ptp(v)), 1e-300)
+    found, first = [], 0
+    for k in np.append(np.flatnonzero(np.abs(np.diff(v)) > tolerance), len(v) - 1):
+        if k + 1 - first >= least and np.ptp(v[first : k + 1]) <= 2.0 * tolerance:
+            found.append((first, int(k) + 1))
+        first = int(k) + 1
+    return found
+
+
+def _holds(item: Item) -> list[tuple[float, int]]:
+    """Variance and samples of each hold, without what settles in it."""
+    parts = []
+    for first, last in still(item.run.v, acceptance.HOLD_SAMPLES):
+        begin = first + int(acceptance.HOLD_SETTLING * (last - first))
+        y, t = item.y[begin:last], item.run.t[begin:last]
+        known = np.isfinite(y)
+        if np.count_nonzero(known) < acceptance.HOLD_SAMPLES // 2:
+            continue
+        y, t = y[known], t[known] - item.run.t[first]
+        # creep and drift within a hold are smooth in the logarithm of time
+        s = np.log(np.maximum(t, 1e-12))
+        s = (s - s.mean()) / max(float(np.std(s)), 1e-300)
+        basis = np.column_stack([np.ones(len(y)), s, s**2, s**3])
+        solution, *_ = np.linalg.lstsq(basis, y, rcond=None)
+        residual = y - basis @ solution
+        if not _rings(residual):
+            parts.append((float(np.sum(residual**2) / max(len(y) - 4, 1)), len(y)))
+    return parts
+
+
+def _rings(x: Array) -> bool:
+    """Whether a signal is mostly one oscillation that hardly decays from sample to sample: an actuator, not noise.
+
+    Linear prediction from the two samples before; coloured noise is predictable too, but by real or small poles.
+    """
+    before = np.column_stack([x[1:-1], x[:-2]])
+    (a, b), *_ = np.linalg.lstsq(before, x[2:], rcond=None)
+    missed = float(np.sum((x[2:] - before @ np.array([a, b])) ** 2))
+    oscillates = a * a + 4.0 * b < 0.0 and -b > acceptance.RING_DECAY**2
+    return bool(oscillates and missed < acceptance.RING_UNPREDICTED * float(np.sum(x[2:] ** 2)))
+
+
+def _differences(item: Item) -> list[tuple[float, int]]:
+    """Variance of white noise with the third differences of a record, and its samples."""
+    y = item.y[item.known]
+    if len(y) < acceptance.HOLD_SAMPLES:
+        return []
+    # third differences of white noise have 20 times its variance; their median absolute deviation ignores events
+    third = np.diff(y, 3)
+    scale = 1.4826 * float(np.median(np.abs(third - np.median(third))))
+    return [(scale**2 / 20.0, len(y))]
+
+
+def _periods(item: Item) -> list[tuple[float, int]]:
+    """Variance of what does not repeat from one period of the drive to the next, behind the first one."""
+    v = item.run.v
+    n = len(v)
+    swing = float(np.ptp(v))
+    least = acceptance.HOLD_SAMPLES
+    if n < 4 * least or swing == 0.0:
+        return []
+    spectrum = np.abs(np.fft.rfft(v - v.mean(), 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[:n] / np.arange(n, 0, -1)
+    falls = np.flatnonzero(correlation < 0.5 * correlation[0])
+    if not len(falls):
+        return []
+    peak = int(falls[0] + np.argmax(correlation[falls[0] : n // 2])) if falls[0] < n // 2 else 0
+    for period in range(max(peak - 2, least), peak + 3):
+        apart = v[period:] - v[:-period]
+        if len(apart) > least and np.sqrt(np.mean(apart**2)) < acceptance.PERIOD_REPEATS * swing:
+            changed = item.y[2 * period :] - item.y[period:-period]
+            changed = changed[np.isfinite(changed)]
+            if len(changed) > least:
+                return [(float(np.var(changed) / 2.0), len(changed))]
+    return []
+
+
+# Where the drive turns, and whether all records pass one loop ------------------------------------------------
+
+
+def reversals(v: Array) -> Places:
+    """Samples at which the drive turns, by more than a share of its range."""
+    return _moves(v)[1]
+
+
+def one_loop(items: Sequence[Item]) -> bool:
+    """Whether the drive moves between the same two ends in all records without a hold, which would show more."""
+    ends = []
+    for item in items:
+        v, t = item.run.v, item.run.t
+        moved, turns = _moves(v)
+        if not len(turns):
+            return False
+        passing = float(np.ptp(t[moved])) / (len(turns) + 1)
+        if np.max(np.diff(t[moved])) > acceptance.LOOP_STANDS * passing:
+            return False
+        at = _between_ends(turns)
+        ends += [v[at], np.array([v[at[0] :].min(), v[at[0] :].max()])]
+    levels = np.concatenate(ends)
+    low, high = float(levels.min()), float(levels.max())
+    return bool(np.minimum(levels - low, high - levels).max() <= acceptance.LOOP_ENDS * (high - low))
+
+
+def one_speed(items: Sequence[Item]) -> bool:
+    """Whether the drive takes the same time from each of its ends to the next in all records."""
+    passed = np.concatenate([np.diff(item.run.t[_between_ends(reversals(item.run.v))]) for item in items])
+    return not len(passed) or bool(passed.max() <= acceptance.LOOP_SPEEDS * passed.min())
+
+
+def _moves(v: Array) -> tuple[Places, Places]:
+    """Samples behind which the drive moves on, and those at which it turns, without its noise: as a play follows it."""
+    z = operators.plays(v, np.array([0.5 * acceptance.REVERSAL * float(np.ptp(v))]), np.array([v[0]]))[0]
+    steps = np.diff(z)
+    moved = np.flatnonzero(steps)
+    return moved, moved[np.flatnonzero(np.diff(np.sign(steps[moved])))] + 1
+
+
+def _between_ends(turns: Places) -> Places:
+    """The turns without the first one: the way to it may begin anywhere."""
+    return turns[1:] if len(turns) > 1 else turns
+
+
+# Spectra of errors: narrow peaks that the drive does not make, ringing that fades, the period of a drive -----
+
+
+BESIDE = 2
+"""Bins on either side of a peak that belong to it: half the main lobe of a Hann window."""
+
+
+def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
+    """Share and frequency (Hz) of narrow peaks of an error that are neither lines nor harmonics of the drive."""
+    filled = _filled(item, error)
+    if filled is None:
+        return []
+    e, step = filled
+    n = len(e)
+    window = np.hanning(n)
+    power = np.abs(np.fft.rfft((e - e.mean()) * window)) ** 2
+    total = float(np.sum(power))
+    narrow: list[tuple[int, slice, float]] = []
+    for k in _crests(power):
+        beside = slice(max(k - BESIDE, 0), k + BESIDE + 1)
+        share = float(np.sum(power[beside])) / total
+        around = _around(power, k, acceptance.SURROUNDINGS)
+        if power[k] > acceptance.LINE_HEIGHT * around and share > acceptance.LINE_SHARE:
+            narrow.append((k, beside, share))
+    if not narrow:
+        return []
+    drive = np.abs(np.fft.rfft((item.run.v - item.run.v.mean()) * window)) ** 2
+    driven = float(np.sum(drive))
+    period = repetition(item.run.v)
+    carrier = _carrier(drive)
+    found: list[tuple[float, float]] = []
+    for k, beside, share in narrow:
+        # a line of the drive, which may be a small one of many harmonics
+        own = float(np.sum(drive[beside])) >= acceptance.DRIVE_LINE_SHARE * driven
+        if own and drive[k] > acceptance.PEAK_HEIGHT * _around(drive, k, acceptance.SURROUNDINGS):
+            continue
+        if period is not None and abs(k * period / n - round(k * period / n)) * n / period < acceptance.SAME_BINS:
+            continue  # a harmonic of the drive
+        if (
+            carrier is not None
+            and k < (acceptance.HARMONICS + 0.5) * carrier
+            and abs(k - round(k / carrier) * carrier) < acceptance.SAME_BINS
+        ):
+            continue
+        if not any(abs(other - k / (n * step)) < 2 * BESIDE / (n * step) for _, other in found):
+            found.append((share, k / (n * step)))
+    return found
+
+
+def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[float, ...]:
+    """Frequencies (Hz) of narrow peaks in any record and of fading ringing, the strongest first, close ones once."""
+    each = ([*peaks(item, error), *_fading(item, error)] for item, error in zip(items, errors, strict=True))
+    found = sorted(itertools.chain(*each), reverse=True)
+    kept: list[float] = []
+    for _, frequency in found:
+        if len(kept) < most and all(abs(frequency / other - 1.0) > acceptance.SAME_RINGING for other in kept):
+            kept.append(frequency)
+    return tuple(kept)
+
+
+def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
+    """Share and frequency of the highest peaks in the mean spectra of a record's parts.
+
+    Ringing that fades is too broad to be a peak in the spectrum of the whole record.
+    """
+    from scipy.signal import welch
+
+    filled = _filled(item, error)
+    if filled is None:
+        return []
+    e, step = filled
+    found: list[tuple[float, float]] = []
+    for size in (len(e) // parts for parts in acceptance.SPECTRUM_PARTS):
+        if size < acceptance.SPECTRUM_SAMPLES:
+            continue
+        places, power = welch(e, 1.0 / step, nperseg=size)
+        near = acceptance.SURROUNDINGS_OF_PARTS
+        high = [k for k in _crests(power) if power[k] > acceptance.PEAK_HEIGHT * _around(power, k, near)]
+        if not high:
+            continue
+        drive = welch(item.run.v, 1.0 / step, nperseg=size)[1]
+        for k in high:
+            if drive[k] <= acceptance.PEAK_HEIGHT * _around(drive, k, near):
+                share = float(np.sum(power[k - BESIDE : k + BESIDE + 1]) / np.sum(power))
+                found.append((share, float(np.average(places[k - 1 : k + 2], weights=power[k - 1 : k + 2]))))
+    return found
+
+
+def repetition(v: Array) -> int | None:
+    """Samples after which the drive repeats itself for at least as long again; None where it does not."""
+    n = len(v)
+    swing = float(np.ptp(v))
+    if n < acceptance.LINE_SAMPLES or swing == 0.0:
+        return None
+    x = v - v.mean()
+    squares = np.concatenate([[0.0], np.cumsum(x**2)])
+    lag = np.arange(n // 2 + 1)
+    both = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * n)) ** 2)[: n // 2 + 1]
+    apart = (squares[n - lag] + squares[n] - squares[lag] - 2.0 * both) / (n - lag)
+    gone = np.flatnonzero(apart > (acceptance.DRIVE_AWAY * swing) ** 2)
+    if not len(gone):
+        return None
+    back = np.flatnonzero(apart[gone[0] :] < (acceptance.DRIVE_REPEATS * swing) ** 2)
+    if not len(back):
+        return None
+    first = int(gone[0] + back[0])
+    last = min(first + 1 + int(acceptance.DRIVE_REPEATS * first), n // 2)
+    return first + int(np.argmin(apart[first : last + 1]))
+
+
+def _filled(item: Item, error: Array) -> tuple[Array, float] | None:
+    """An error with its gaps bridged, and the time between samples; None where too few of them are compared."""
+    known = np.isfinite(error)
+    if np.count_nonzero(known) < acceptance.SPECTRUM_SAMPLES:
+        return None
+    step = float(np.median(np.diff(item.run.t)))
+    return np.interp(np.arange(len(error)), np.flatnonzero(known), error[known]), step
+
+
+def _crests(power: Array) -> list[int]:
+    """Bins of the highest local maxima of a spectrum."""
+    highest = np.argsort(power)[::-1][: acceptance.CRESTS].tolist()
+    periods = acceptance.LINE_PERIODS
+    return [k for k in highest if k >= periods and power[k] > 0.0 and power[k] >= np.max(power[k - 1 : k + 2])]
+
+
+def _around(power: Array, k: int, reach: int) -> float:
+    """The median of a spectrum on both sides of a bin."""
+    away = BESIDE + 1
+    return float(np.median(np.concatenate([power[max(k - reach, 1) : k - away], power[k + away + 1 : k + reach]])))
+
+
+def _carrier(power: Array) -> float | None:
+    """Place (bins) of the line that holds most of a windowed drive's power; None where none holds enough of it."""
+    k = int(np.argmax(power))
+    near = np.arange(max(k - BESIDE, 0), min(k + BESIDE + 1, len(power)))
+    held = float(np.sum(power[near]))
+    return float(near @ power[near]) / held if k and held >= acceptance.CARRIER_SHARE * float(np.sum(power)) else None
