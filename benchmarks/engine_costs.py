@@ -33,7 +33,7 @@ from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, cross, emulator, sources, targets
 
 PLAYS = (1, 2, 3, 4, 6, 8, 16)
-CODE_PLAYS = 10  # with 64 it is at most 16 bytes more or less: gcc, float32 and q31, both cores
+CODE_PLAYS = 10  # plays where code is measured; with 64 at most 16 bytes more or less: gcc, float32 and q31, both cores
 KINDS = ("pi", "gpi")
 DEAD_ZONE = "{kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}"
 TANH = "{kind: tanh, ascending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.2}}"

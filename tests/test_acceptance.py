@@ -36,6 +36,7 @@ from hystgen.diagnosis.search.hypothesis import Actuator, Structure
 from hystgen.diagnosis.search.screening import Option
 from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
+from hystgen.effects.resonance.model import Resonance
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification.joint import Kept
 from hystgen.identification.quality import correlation_time
@@ -466,6 +467,13 @@ def test_what_limits_the_start_of_an_effect() -> None:
     actuator = Actuator(np.array([0.0]), (), (effect,))
     responses = actuator.largest(item, np.array([0.1]))[1:]
     assert np.allclose(responses, 2.0 * 0.1 * item.run.drive_range * effect.largest(item.run))
+
+
+def test_a_start_without_a_limit_has_none_beside_plays_that_weigh_nothing() -> None:
+    ringing = Resonance(name="resonance", frequency=5.0, damping=0.02)
+    item = sine(2000)
+    item = Item("r", item.run, item.y, None, 10.0)
+    assert np.all(Actuator(np.array([0.0]), (), (ringing,)).largest(item, np.array([0.0])) == np.inf)
 
 
 # Thinning and the noise floor --------------------------------------------------------------------------------

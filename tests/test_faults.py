@@ -81,13 +81,14 @@ def row(fit: Any, part: str) -> Any:
 class TestOneWrongSample:
     @pytest.mark.parametrize("name", DRIVES)
     @pytest.mark.parametrize("channel", ["v", "y"])
-    @pytest.mark.parametrize("place", ["first", "last", "inside"])
+    @pytest.mark.parametrize("place", ["first", "second", "last but one", "last", "inside"])
     def test_the_fit_is_that_of_the_record_without_it(self, name: str, channel: str, place: str) -> None:
         v = DRIVES[name]
         y = output(v)
         rng = np.random.default_rng([len(name), len(channel), len(place)])
         for _ in range(3):
-            k = {"first": 0, "last": len(v) - 1, "inside": int(rng.integers(8, len(v) - 8))}[place]
+            inside, n = int(rng.integers(8, len(v) - 8)), len(v)
+            k = {"first": 0, "second": 1, "last but one": n - 2, "last": n - 1, "inside": inside}[place]
             if place == "inside" and name == "coarser" and min(v[k], 100.0 - v[k]) < 20.0:
                 k += 4  # the record without a tip is another one
             by = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.4, 3.0))
@@ -105,7 +106,7 @@ class TestOneWrongSample:
             assert figures[0] == pytest.approx(figures[1], rel=0.15), (k, by)
             assert any("1 isolated sample" in text for text in fit.warnings)
 
-    @pytest.mark.parametrize("place", [0, -1, 700])
+    @pytest.mark.parametrize("place", [0, 1, -2, -1, 700])
     @pytest.mark.parametrize(("channel", "value"), [("v", 118.0), ("v", -30.0), ("y", 40.0), ("y", -200.0)])
     def test_of_the_shipped_recording(self, place: int, channel: str, value: float) -> None:
         _, v, y = (x.copy() for x in columns(EXAMPLES / "stage_recording.csv"))
@@ -123,7 +124,7 @@ class TestOneWrongSample:
         given, other = record(DRIVES["lines"], output(DRIVES["lines"])), wander(7)
         held = {"v": other.copy(), "y": output(other)}
         clean = hystgen.identify(given, holdout=record(held["v"], held["y"]))
-        for k in (0, 500, -1):
+        for k in (0, 1, 500, -2, -1):
             wrong = {name: x.copy() for name, x in held.items()}
             wrong[channel][k] = value
             fit = hystgen.identify(given, holdout=record(wrong["v"], wrong["y"]))

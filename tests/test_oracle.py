@@ -154,6 +154,22 @@ input_range: [0, 0.0003]
 model:
   pi: {thresholds: [0, 0.15], weights: [1, 4.0e-5], initial_state: [0, -0.1499]}
 """,
+    # plays that never move, each with a start of its own: thresholds cut to what fits left these no room
+    "never_moved": """
+hystgen: 1
+name: never_moved
+input_range: [0, 1]
+model:
+  pi: {thresholds: [0, 0.25, 2, 3, 10], weights: [1, 0.5, 0.3, 0.2, 0.1], initial_state: [0, 0.1, -0.9, 0.05, 0.9]}
+""",
+    "all_never_moved": """
+hystgen: 1
+name: all_never_moved
+input_range: [0.2, 1]
+model:
+  pi: {thresholds: [0, 2, 3, 10], weights: [1, 0.3, 0, 0.1], initial_state: [0, -0.4, 0.3, -0.2]}
+  memoryless: {kind: tanh, ascending: {a0: 2, a1: 0.8, a2: -0.1, a3: 0.1}}
+""",
 }
 
 
@@ -164,8 +180,20 @@ def test_models_that_were_once_wrong(name: str, arithmetic: str, engine: str, tm
     path = tmp_path / f"{name}.yaml"
     path.write_text(ONCE_WRONG[name])
     found, refused = check.follow_file(path, arithmetic, engine, tmp_path, seeds=4, calls=check.CALLS)
-    assert refused == ((name, arithmetic) in {("reset_afar", "q31"), ("flat_first", "q15"), ("narrow_range", "q31")})
+    refusals = {("reset_afar", "q31"), ("flat_first", "q15"), ("narrow_range", "q31"), ("never_moved", "q31")}
+    assert refused == ((name, arithmetic) in refusals)
     assert not [finding.result.message.decode() for finding in found if finding.result.faults]
+
+
+@pytest.mark.parametrize("name", ["never_moved", "all_never_moved"])
+@pytest.mark.parametrize("engine", ["corners", "loop"])
+def test_plays_that_never_move_cost_no_accuracy(name: str, engine: str, tmp_path: Path) -> None:
+    case = check.emit(check.Case(name, ONCE_WRONG[name], "q15", engine, 1), tmp_path)
+    assert case
+    stated = re.search(r"_FORWARD_MAX_ERROR_LSB (\S+)", (tmp_path / f"{name}.h").read_text())
+    assert stated
+    assert float(stated[1]) < 2.0
+    assert not any(finding.result.faults for finding in check.follow([case], tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -195,6 +223,9 @@ def test_models_are_of_every_kind() -> None:
         )
         kinds["wide thresholds"] += not stages and pi["thresholds"][-1] > high - low
         kinds["many plays"] += len(pi["weights"]) > 60
+        kinds["plays that never move, listed"] += (
+            isinstance(pi.get("initial_state"), list) and not stages and pi["thresholds"][-1] > high - low
+        )
         kinds["no play"] += len(pi["weights"]) == 1
         kinds["start list"] += isinstance(pi.get("initial_state"), list)
         start = pi.get("initial_state", low)

@@ -77,14 +77,18 @@ def read_inside() -> set[str]:
 # Tests run here ----------------------------------------------------------------------------------------------
 
 
+class TooLong(BaseException):
+    """A test has used up its processor time; no `except Exception` of the test itself takes it for another failure."""
+
+
 class Watch:
-    """A pytest plugin: the numbers that each test reads, and its processor time; a long test is given up."""
+    """A pytest plugin: the numbers that each test reads, and its processor time; long tests fail and are listed."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         self.tests: dict[str, tuple[float, list[str]]] = {}
+        self.too_long: list[str] = []
         self._read: set[str] = set()
-        self._passed = False
 
     @contextlib.contextmanager
     def watching(self) -> Iterator[None]:
@@ -109,7 +113,7 @@ class Watch:
         self._read.clear()
 
         def late(*_: object) -> None:
-            pytest.skip("takes too long")
+            raise TooLong
 
         signal.signal(signal.SIGPROF, late)
         signal.setitimer(signal.ITIMER_PROF, self.seconds)
@@ -118,6 +122,9 @@ class Watch:
             result = yield
             self.tests[item.nodeid] = time.process_time() - began, sorted(self._read)
             return result
+        except TooLong:
+            self.too_long.append(item.nodeid)
+            pytest.fail(f"takes more than {self.seconds:g} s; no number counts as noticed by it", pytrace=False)
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
 
@@ -143,16 +150,16 @@ def apart(what: Callable[[], Any]) -> Any:
         os.waitpid(child, 0)
 
 
-def table(files: Sequence[str], seconds: float) -> dict[str, tuple[float, list[str]]]:
-    """The fast tests: their seconds, and the numbers that each reads."""
+def table(files: Sequence[str], seconds: float) -> tuple[dict[str, tuple[float, list[str]]], list[str]]:
+    """The fast tests: their seconds, and the numbers that each reads; and the tests that take too long."""
 
-    def run() -> dict[str, tuple[float, list[str]]]:
+    def run() -> tuple[dict[str, tuple[float, list[str]]], list[str]]:
         watch = Watch(seconds)
         with watch.watching():
             pytest.main(["-q", "-p", "no:cacheprovider", *files], plugins=[watch])
-        return watch.tests
+        return watch.tests, watch.too_long
 
-    return apart(run) or {}
+    return apart(run) or ({}, [])
 
 
 class Failed:
@@ -231,8 +238,9 @@ def main(arguments: Sequence[str]) -> int:
     os.chdir(ROOT)
     with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):  # imported once for all processes
         pytest.main(["--collect-only", "-q", "-p", "no:cacheprovider", *(given.tests or FILES)])
-    fast = table(given.tests or FILES, given.seconds)
-    print(f"{len(fast)} fast tests, {sum(seconds for seconds, _ in fast.values()):.0f} s")
+    fast, too_long = table(given.tests or FILES, given.seconds)
+    print(f"{len(fast)} fast tests, {sum(seconds for seconds, _ in fast.values()):.0f} s; {len(too_long)} left out, "
+          f"which take more than {given.seconds:g} s")
     inside, before = read_inside(), recorded()
     quickest = sorted(fast, key=lambda test: fast[test][0])
     if not given.tests:

@@ -19,6 +19,7 @@ sent, misses the reference by a residual, and the exact inverse amplifies that b
 
 from __future__ import annotations
 
+import bisect
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -186,8 +187,8 @@ class _Builder:
         # where plays can be: in the range of their input, at the start memory, or at 0 behind a reset
         low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start), Fraction(0))
         high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
-        span = high - low
-        reach = max(abs(low), abs(high)) + 2 * min(span, Fraction(pi.thresholds[-1]))
+        self.span = high - low
+        reach = max(abs(low), abs(high)) + 2 * min(self.span, Fraction(pi.thresholds[-1]))
         if c.stages:
             self.fine = 0
             self.step = Fraction(2) ** (math.ceil(math.log2(reach)) - self.play_bits)
@@ -199,16 +200,23 @@ class _Builder:
 
         states = [nearest(Fraction(s) / self.step) for s in pi.start]
         if c.stages:
-            cap = math.floor(span / self.step) + 8  # what rounding of the curves can add
+            cap = math.floor(self.span / self.step) + 8  # what rounding of the curves can add
         else:
             cap = max(self.drive[1] << self.fine, *states, 0) - min(self.drive[0] << self.fine, *states, 0)
         # no input comes farther than `cap` from a play: one this wide never moves
         self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
-        if cap > TABLE_MAX:
-            needed = next((i for i, t in enumerate(self.threshold) if t > TABLE_MAX), None)
-            if needed is not None:
-                message = f"{pi.thresholds[needed]:g} does not fit {self.arithmetic}; use a larger emit.drive_lsb"
-                raise FormatError((("model", "pi", "thresholds", needed), message))
+        self.still = max(bisect.bisect_left(self.threshold, cap), 1)
+        for i in range(2, self.still):
+            room = self.threshold[i] - self.threshold[i - 1]
+            states[i] = min(max(states[i], states[i - 1] - room), states[i - 1] + room)
+        if len(states) > 1:
+            states[0] = states[1]
+        if self.still < len(states):
+            self._hold(states)
+        if self.threshold[-1] > TABLE_MAX:
+            needed = next(i for i, r in enumerate(pi.thresholds) if nearest(Fraction(r) / self.step) > TABLE_MAX)
+            message = f"{pi.thresholds[needed]:g} does not fit {self.arithmetic}; use a larger emit.drive_lsb"
+            raise FormatError((("model", "pi", "thresholds", needed), message))
         narrow = self.drive_lsb * Fraction(c.front_slopes[0]) if c.stages and self.invertible else self.drive_lsb
         finer = self._finer("drive_lsb")
         for i, (a, b) in enumerate(itertools.pairwise(self.threshold), 1):
@@ -220,11 +228,6 @@ class _Builder:
                     + f" in {self.arithmetic} with {float(self.drive_lsb):.6g} a drive code; "
                     f"{finer}, or leave this play out",
                 ))
-        for i in range(2, len(states)):
-            room = self.threshold[i] - self.threshold[i - 1]
-            states[i] = min(max(states[i], states[i - 1] - room), states[i - 1] + room)
-        if len(states) > 1:
-            states[0] = states[1]
         if max(map(abs, states)) > TABLE_MAX:
             message = (
                 f"reaches {max(map(abs, pi.start)):g}, beyond {self.arithmetic}; start nearer to the range, use a "
@@ -234,6 +237,22 @@ class _Builder:
         self.start = states
         self._curves()
         self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # of all that plays can be
+
+    def _hold(self, states: list[int]) -> None:
+        """Puts all plays that never move where their weighted mean is: their part of the output is the same.
+
+        Their thresholds, cut to what fits, leave their own start states too little room: they become wide enough for
+        the mean to be admissible beside the play before them.
+        """
+        pi, k = self.cascade.pi, self.still
+        weights = [Fraction(p) for p in pi.weights[k:]]
+        total = sum(weights)
+        terms = zip(weights, pi.start[k:], strict=True)
+        self.held = sum((p * Fraction(s) for p, s in terms), Fraction(0)) / total if total else Fraction(pi.start[k])
+        state = nearest(self.held / self.step)
+        wide = max(self.threshold[k], self.threshold[k - 1] + abs(state - states[k - 1]))
+        states[k:] = [state] * len(weights)
+        self.threshold[k:] = [wide] * len(weights)
 
     def _curves(self) -> None:
         c = self.cascade
@@ -403,16 +422,20 @@ class _Builder:
         return reported
 
     def _play_errors(self) -> list[Fraction]:
-        """How far each play can be from that of the exact model, in physical units of w."""
+        """How far each play can be from that of the exact model, in physical units of w.
+
+        Those that never move count together; the exact one may, by what rounding of its threshold hides.
+        """
         pi = self.cascade.pi
         front = self.step * Fraction(max((curve.error for curve in self.front[:2]), default=0.0))
         errors = []
         for i, (r, t) in enumerate(zip(pi.thresholds, self.threshold, strict=True)):
-            rounded = abs(t * self.step - Fraction(r)) if t * self.step < Fraction(r) + self.step else Fraction(0)
-            if t == self.threshold[-1] and t * self.step < Fraction(r) - self.step:
-                rounded = Fraction(0)  # a play that never moves, whatever its threshold
-            begun = abs(self.start[i] * self.step - Fraction(pi.start[i])) if i else Fraction(0)
-            errors.append(max(front + rounded, begun))
+            if i < self.still:
+                begun = abs(self.start[i] * self.step - Fraction(pi.start[i])) if i else Fraction(0)
+                errors.append(max(front + abs(t * self.step - Fraction(r)), begun))
+            else:
+                moved = max(self.span - Fraction(r), Fraction(0))
+                errors.append(abs(self.start[i] * self.step - self.held) + moved)
         return errors
 
     def _sum_error(self) -> Fraction:

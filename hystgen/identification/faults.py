@@ -196,8 +196,8 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     # three of them are not small at a sample that stands apart
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
     least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
-    # at most `LONGEST` + 1 of the steps around the two jumps belong to the pulse, and two to another one
-    usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="nearest")
+    # of as many steps around the two jumps at most `LONGEST` + 1 belong to the pulse, and two to another one
+    usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="mirror")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
     n = len(v)
     places = {(0, last) for last in range(1, LONGEST + 1)} | {(n - length, n) for length in range(1, LONGEST + 1)}

@@ -18,20 +18,6 @@ from hystgen.basics.names import name_problem
 from hystgen.basics.problems import Path, Problem, path_text, printable, shown
 from hystgen.basics.quantities import MAX_NUMBER
 from hystgen.parameters import schema
-from hystgen.parameters.schema import (
-    MEMBERS,
-    STAGE_KINDS,
-    DeadZoneParameters,
-    DensityParameters,
-    DensityTable,
-    EmitDefaults,
-    ModelParameters,
-    Parameters,
-    PIParameters,
-    TanhBranch,
-    TanhParameters,
-    Units,
-)
 from hystgen.parameters.yaml import Document
 
 if TYPE_CHECKING:
@@ -58,14 +44,14 @@ EFFECT_NAMES = (
 """The closed catalogue of effects."""
 
 _PARTS: dict[str, type[BaseModel]] = {
-    "units": Units,
-    "model": ModelParameters,
-    "pi": PIParameters,
-    "density": DensityParameters,
-    "table": DensityTable,
-    "ascending": TanhBranch,
-    "descending": TanhBranch,
-    "emit": EmitDefaults,
+    "units": schema.Units,
+    "model": schema.ModelParameters,
+    "pi": schema.PIParameters,
+    "density": schema.DensityParameters,
+    "table": schema.DensityTable,
+    "ascending": schema.TanhBranch,
+    "descending": schema.TanhBranch,
+    "emit": schema.EmitDefaults,
 }
 
 # How a key is written, where it is missing.
@@ -88,7 +74,7 @@ _WRITTEN = {
 
 def check(
     data: Mapping[str, Any], document: Document | None = None, user: Mapping[str, Shapes] | None = None
-) -> tuple[Parameters | None, list[Problem]]:
+) -> tuple[schema.Parameters | None, list[Problem]]:
     """Parameters of `data` (lists as tuples), or None and every problem.
 
     `document` gives the positions and what reading has refused already; its poisoned values are not judged again.
@@ -162,11 +148,11 @@ class _Checker:
 
     # Structure --------------------------------------------------------------------------------------------
 
-    def structure(self) -> Parameters | None:
+    def structure(self) -> schema.Parameters | None:
         """The parameters, or None and pydantic's findings among the problems."""
         parameters = None
         try:
-            parameters = Parameters.model_validate(self.data)
+            parameters = schema.Parameters.model_validate(self.data)
         except ValidationError as error:
             for found in error.errors(include_url=False):
                 path = self._path(found["loc"])
@@ -184,7 +170,7 @@ class _Checker:
                 if isinstance(value, Mapping):
                     continue
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
-            elif part in MEMBERS:
+            elif part in schema.MEMBERS:
                 continue
             else:
                 value = value.get(part) if isinstance(value, Mapping) else None
@@ -232,9 +218,9 @@ class _Checker:
         if effect := self._classes.get(path):
             return list(effect.model_fields)
         key = _last_key(path)
-        part = _PARTS.get(key, Parameters)
+        part = _PARTS.get(key, schema.Parameters)
         if key == "memoryless":
-            part = TanhParameters if self.at((*path, "kind")) == "tanh" else DeadZoneParameters
+            part = schema.TanhParameters if self.at((*path, "kind")) == "tanh" else schema.DeadZoneParameters
         return list(part.model_fields)
 
     def _empty_values(self) -> None:
@@ -552,8 +538,8 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if kind == "literal_error" and key == "hystgen":
         return f"must be 1, not {shown(value)}; this version reads format 1 only"
     if kind == "literal_error":
-        known: Any = EmitDefaults.model_fields[key].annotation if key != "kind" else None
-        return _choice(value, known.__args__ if known else STAGE_KINDS)
+        known: Any = schema.EmitDefaults.model_fields[key].annotation if key != "kind" else None
+        return _choice(value, known.__args__ if known else schema.STAGE_KINDS)
     bounds = (
         ("greater_than", "gt", "must be above"),
         ("greater_than_equal", "ge", "must be at least"),

@@ -33,9 +33,9 @@ from itertools import pairwise
 from typing import Any
 
 from hystgen.basics.checks import finite, positive, whole
+from hystgen.basics.quantities import MAX_PLAYS
 
 MAX_FORMULA = 1000
-MAX_PLAYS = 4096
 FUNCTIONS = ("exp", "log", "sqrt", "sin", "cos", "tanh")
 
 _DIGITS = 40

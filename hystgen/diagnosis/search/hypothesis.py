@@ -276,8 +276,9 @@ class Actuator:
     def largest(self, item: Item, p: Array) -> Array:
         """(k,) largest factors of `nuisances`: an effect of little weight has a small start response."""
         span = acceptance.START_SPAN * float(np.sum(p)) * (item.session or item.run).drive_range
-        limits = [np.full(1, np.inf), *(span * effect.largest(item.run) for effect in self._starting(item))]
-        return np.concatenate(limits)
+        found = np.concatenate([[np.inf], *(effect.largest(item.run) for effect in self._starting(item))])
+        limited = np.isfinite(found)
+        return np.where(limited, span * np.where(limited, found, 0.0), np.inf)  # a span of 0 limits no other either
 
     def error(self, item: Item, p: Array, like: tuple[Actuator, Array] | None = None) -> Array:
         """Measured less predicted with the free components fitted; NaN where the record is not compared.
