@@ -248,8 +248,8 @@ class _Builder:
         weights = [Fraction(p) for p in pi.weights[k:]]
         total = sum(weights)
         terms = zip(weights, pi.start[k:], strict=True)
-        self.held = sum((p * Fraction(s) for p, s in terms), Fraction(0)) / total if total else Fraction(pi.start[k])
-        state = nearest(self.held / self.step)
+        self.mean = sum((p * Fraction(s) for p, s in terms), Fraction(0)) / total if total else Fraction(pi.start[k])
+        state = nearest(self.mean / self.step)
         wide = max(self.threshold[k], self.threshold[k - 1] + abs(state - states[k - 1]))
         states[k:] = [state] * len(weights)
         self.threshold[k:] = [wide] * len(weights)
@@ -435,7 +435,7 @@ class _Builder:
                 errors.append(max(front + abs(t * self.step - Fraction(r)), begun))
             else:
                 moved = max(self.span - Fraction(r), Fraction(0))
-                errors.append(abs(self.start[i] * self.step - self.held) + moved)
+                errors.append(abs(self.start[i] * self.step - self.mean) + moved)
         return errors
 
     def _sum_error(self) -> Fraction:
