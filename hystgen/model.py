@@ -106,6 +106,21 @@ class Model:
             )
         if operator != "forward":
             self.inverse()
+            self._check_noise_gain(arithmetic)
+
+    def _check_noise_gain(self, arithmetic: str) -> None:
+        """Raise UnsupportedEffectsError where the inverse makes more of the reference's noise than is allowed."""
+        from hystgen.compensator.chain import tables as chain_tables
+
+        how, seconds = self.parameters.emit.compensation, self.parameters.sample_time
+        if how.noise_gain is None or seconds is None:
+            return
+        gain = chain_tables.build(self.chain, arithmetic, seconds, how).noise_gain
+        if gain > how.noise_gain:
+            raise UnsupportedEffectsError(
+                f"the inverse has a noise gain of {gain:.4g}, more than emit.compensation.noise_gain = "
+                f"{how.noise_gain:g}; round corners of the reference (corner), or allow more"
+            )
 
     def refusals(self, operator: str) -> list[tuple[Effect, str]]:
         """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""
@@ -144,7 +159,8 @@ class Model:
 
             self.need_compensated(arithmetic, self.parameters.emit.operator)
             assert self.parameters.sample_time is not None
-            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time).tables
+            how = self.parameters.emit.compensation
+            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time, how).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
 
     @property
@@ -209,7 +225,8 @@ class Model:
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any times"
             )
-        return run.answers(tables.build(self.chain, arithmetic, seconds), record, inverse)
+        how = self.parameters.emit.compensation
+        return run.answers(tables.build(self.chain, arithmetic, seconds, how), record, inverse)
 
     def run(
         self,

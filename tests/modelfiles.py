@@ -83,12 +83,14 @@ CHAINS = {
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
     "bumpy": chain("bumpy", "name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5"),
     "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
+    "straight": chain("straight", "name: resonance, frequency: 20, damping: 0.1", "name: lag, time_constant: 3.0e-3",
+                      CREEP).replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"),
     "late": chain("late", "name: delay, time: 2.6e-3", "name: resonance, frequency: 30, damping: 0.05", CREEP),
     "everything": chain("everything", CREEP, "name: lag, time_constant: 0.01", "name: delay, time: 2.0e-3",
                         "name: resonance, frequency: 40, damping: 0.3", "name: saturation, level: 15",
                         "name: slew_limit, rate: 3000", "name: ageing, loss: 0.01, travel: 100",
                         "name: thermal, gain_per_degree: 0.001", front=BRANCHES),
 }  # fmt: skip
-"""Models with effects, every block and every kind of each; the last three can be emitted as an inverse alone."""
+"""Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
-INVERSE_ALONE = ("viscous_twin", "late", "everything")
+INVERSE_ALONE = ("straight", "viscous_twin", "late", "everything")

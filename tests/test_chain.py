@@ -24,6 +24,7 @@ from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 T, N = 1e-3, 1500
@@ -227,6 +228,72 @@ def test_preview_reads_ahead_what_is_late() -> None:
     assert "#define LATE_PREVIEW 4 " in text
     assert "late_inverse_push(" in text
     assert "LATE_SAMPLE_TIME 0.001f" in text
+
+
+def with_options(name: str, **options: Any) -> Model:
+    one = model(name).parameters
+    how = Compensation(**options)
+    return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
+
+
+def header(one: Model, macro: str) -> str:
+    text = module.files(one.parameters, one.cascade, emit_options(one))[f"{one.name}.h"]
+    found = re.search(rf"#define {one.name.upper()}_{macro} (\S+)", text)
+    assert found
+    return found[1]
+
+
+def test_noise_gain_is_that_of_an_impulse() -> None:
+    """Without plays everything is linear: the spectrum of the answer to an impulse, over that at rest."""
+    one = model("straight")
+    numbers = compiled(one, "float64")
+    n = 1 << 15
+    u = np.full(n, 0.5)
+    u[200] += 1e-3
+    x = answers(numbers, Run(np.arange(n) * T, u, {}), True)
+    gain = np.abs(np.fft.rfft(x - x[0])) / 1e-3
+    rest = 1.0 / (2.0 * 1.1)  # weight 2, and creep of 10 % in the end
+    assert numbers.noise_gain == pytest.approx(float(np.max(gain)) / rest, rel=1e-2)
+    assert numbers.noise_gain > 50.0
+    assert float(header(one, "NOISE_GAIN").rstrip("f")) == pytest.approx(numbers.noise_gain, rel=1e-6)
+    allowed = with_options("straight", noise_gain=2.0 * numbers.noise_gain)
+    assert emit_options(allowed).engine == "loop"
+    with pytest.raises(UnsupportedEffectsError, match="noise gain of"):
+        emit_options(with_options("straight", noise_gain=0.5 * numbers.noise_gain))
+    rounded = with_options("straight", corner=9, noise_gain=0.5 * numbers.noise_gain)
+    assert emit_options(rounded).engine == "loop", "rounded corners hold less noise"
+
+
+def test_five_references_leave_less_of_a_mode_than_three() -> None:
+    left = []
+    one = model("mode", chain("mode", "name: resonance, frequency: 20, damping: 0.1"))
+    for number in (3, 5):
+        numbers = tables.build(one.chain, "float64", T, Compensation(taps=number))
+        u = 0.5 + 1.5 * np.sin(0.05 * np.arange(2000))
+        v = answers(numbers, Run(np.arange(2000) * T, u, {}), True)
+        left.append(float(np.std((one.simulate(v) - u)[1500:1990])))
+    assert left[1] < 0.3 * left[0] < 1e-3, "what is left are the corners where plays turn"
+
+
+def test_preview_hold_corner_and_rate_are_options() -> None:
+    assert header(with_options("late"), "PREVIEW") == "4"
+    assert header(with_options("late", preview=1), "PREVIEW") == "1"
+    assert header(with_options("late", preview=9), "PREVIEW") == "9"
+    assert header(with_options("late", taps=5), "PREVIEW") == "5"
+    assert header(with_options("late", resonance="none"), "PREVIEW") == "3"
+    assert header(with_options("creeping", drive_hold="held"), "PREVIEW") == "1"
+    assert header(with_options("creeping", corner=5), "PREVIEW") == "6"
+    assert header(with_options("creeping", max_rate=12.5), "MAX_RATE") == "12.5f"
+    for options in ({"preview": 9}, {"corner": 4}, {"drive_hold": "held"}, {"taps": 5, "corner": 3}):
+        one = with_options("late", **options)
+        found = tables.build(one.chain, "float64", T, one.parameters.emit.compensation).taps
+        assert found is not None
+        assert math.fsum(found.weights) == pytest.approx(1.0, abs=1e-12)
+        report = hystgen.verify(one, compiler=["gcc"], length=800)
+        assert report.ok, report.table()
+    ramp = preview.taps(0.0, [], T, corner=4)
+    middle = math.fsum((ramp.first + k) * w for k, w in enumerate(ramp.weights))
+    assert middle == pytest.approx(0.0, abs=1e-12), "rounding corners moves nothing in time"
 
 
 def test_only_what_the_model_has_is_emitted() -> None:

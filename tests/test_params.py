@@ -590,7 +590,19 @@ REFUSED = [
         '5:50: emit.engine: must be auto, corners or loop, not 5; choose one of them',
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',
-        '5:83: emit.x: unknown key; known here are operator, arithmetic, engine, optimize, drive_lsb, output_lsb',
+        '5:83: emit.x: unknown key; known here are operator, arithmetic, engine, optimize, drive_lsb, output_lsb, '
+        'compensation',
+    ]),
+    case('compensation', H + M + "emit:\n  compensation: {preview: -1, drive_hold: x, noise_gain: 0, taps: 4, corner: 1.5,"
+         " resonance: notch, quiet: true}\n", [
+        '6:27: emit.compensation.preview: must be at least 0, not -1; correct the number',
+        '6:43: emit.compensation.drive_hold: must be straight or held, not the text "x"; choose one of them',
+        '6:58: emit.compensation.noise_gain: must be above 0, not 0; correct the number',
+        '6:67: emit.compensation.taps: must be 3 or 5, not 4; choose one of them',
+        '6:78: emit.compensation.corner: must be a whole number, not 1.5; write it like 12',
+        '6:94: emit.compensation.resonance: must be inverse or none, not the text "notch"; choose one of them',
+        '6:101: emit.compensation.quiet: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
+        'resonance, taps, corner',
     ]),
     case('emit_lsb', H + M + "emit: {drive_lsb: q, output_lsb: 1e31}\n", [
         '5:19: emit.drive_lsb: must be a number, not the text "q"; write it like 0.45',
@@ -913,6 +925,15 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
             "optimize": draw(st.sampled_from(["auto", "speed", "size"])),
             "drive_lsb": draw(st.none() | sizes),
             "output_lsb": draw(st.none() | sizes),
+            "compensation": {
+                "preview": draw(st.none() | st.integers(0, 1000)),
+                "drive_hold": draw(st.sampled_from(["straight", "held"])),
+                "noise_gain": draw(st.none() | sizes),
+                "max_rate": draw(st.none() | sizes),
+                "resonance": draw(st.sampled_from(["inverse", "none"])),
+                "taps": draw(st.sampled_from([3, 5])),
+                "corner": draw(st.integers(0, 100)),
+            },
         },
     }
 

@@ -185,7 +185,8 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
     if not effects:
         return None
     assert parameters.sample_time is not None, "emit_options asks for it"
-    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time)
+    how = parameters.emit.compensation
+    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how)
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
@@ -307,9 +308,14 @@ def _limits(values: SimpleNamespace) -> list[str]:
 def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
     """Macros of a model with effects about time."""
     kind = compiled.tables.threshold.dtype.type
+    late = compiled.needed - compiled.ahead
+    ahead = "samples that the argument of step is ahead of the motion"
+    if late > 0:
+        ahead += f", which is {late} late"
     return [
         ("SAMPLE_TIME", literal(kind(parameters.sample_time)), "s, from step to step"),
-        ("PREVIEW", str(compiled.ahead), "samples that the argument of step is ahead of the motion"),
+        ("PREVIEW", str(compiled.ahead), ahead),
+        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
     ]
 

@@ -52,6 +52,7 @@ _PARTS: dict[str, type[BaseModel]] = {
     "ascending": schema.TanhBranch,
     "descending": schema.TanhBranch,
     "emit": schema.EmitDefaults,
+    "compensation": schema.Compensation,
 }
 
 # How a key is written, where it is missing.
@@ -498,7 +499,8 @@ def _nearest(word: str, known: Sequence[str]) -> str:
 def _choice(value: Any, known: Sequence[Any]) -> str:
     """Message for a value that is none of the known ones."""
     listed = ", ".join(str(choice) for choice in known[:-1]) + (" or " if len(known) > 1 else "") + str(known[-1])
-    near = _nearest(value, known) if isinstance(value, str) else ""
+    words = [choice for choice in known if isinstance(choice, str)]
+    near = _nearest(value, words) if isinstance(value, str) and words else ""
     return f"must be {listed}, not {shown(value)}; {near or 'choose one of them'}"
 
 
@@ -538,7 +540,8 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if kind == "literal_error" and key == "hystgen":
         return f"must be 1, not {shown(value)}; this version reads format 1 only"
     if kind == "literal_error":
-        known: Any = schema.EmitDefaults.model_fields[key].annotation if key != "kind" else None
+        fields = {**schema.EmitDefaults.model_fields, **schema.Compensation.model_fields}
+        known: Any = fields[key].annotation if key != "kind" else None
         return _choice(value, known.__args__ if known else schema.STAGE_KINDS)
     bounds = (
         ("greater_than", "gt", "must be above"),

@@ -18,6 +18,7 @@ from hystgen.basics.names import comment_text, name_problem
 from hystgen.basics.problems import ParameterError, Path, Problem, path_text
 from hystgen.parameters.checks import EFFECT_NAMES, check
 from hystgen.parameters.schema import (
+    Compensation,
     DeadZoneParameters,
     DensityParameters,
     DensityTable,
@@ -181,12 +182,14 @@ def _data(parameters: Parameters) -> dict[str, Any]:
 def canonical_json(parameters: Parameters) -> str:
     """The one text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
-    A density stands as it was given, not as the plays made from it. `emit.optimize` came later: it stands there only
-    where it is not the default, so that files without it keep their hash.
+    A density stands as it was given, not as the plays made from it. `emit.optimize` and `emit.compensation` came later:
+    they stand there only where they are not the default, so that files without them keep their hash.
     """
     data = _data(parameters)
     if parameters.emit.optimize == "auto":
         del data["emit"]["optimize"]
+    if parameters.emit.compensation == Compensation():
+        del data["emit"]["compensation"]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 

@@ -8,7 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, cast
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, PrivateAttr, Tag, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PrivateAttr,
+    Tag,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from hystgen.basics.names import MAX_NAME, NAME_PATTERN
@@ -202,6 +212,35 @@ class ModelParameters(_Part):
     """Instances of `hystgen.effects.Effect`; their classes are imported when a file names them."""
 
 
+def _auto(value: Any) -> Any:
+    return None if value == "auto" else value
+
+
+class Compensation(_Part):
+    """How effects are compensated in the C."""
+
+    preview: Annotated[int, Field(ge=0, le=1000)] | None = Field(
+        default=None,
+        description="samples that the reference is ahead: auto, what the model needs, or fewer, and the motion is late",
+    )
+    drive_hold: Literal["straight", "held"] = Field(
+        default="straight", description="held: the converter holds each drive, half a sample later than a straight one"
+    )
+    noise_gain: Positive | None = Field(
+        default=None, description="largest gain from reference to drive over that of plays alone; more is refused"
+    )
+    max_rate: Positive | None = Field(
+        default=None, description="fastest drive that error bounds are stated for, input units per s"
+    )
+    resonance: Literal["inverse", "none"] = Field(default="inverse", description="whether modes are compensated")
+    taps: Literal[3, 5] = Field(default=3, description="references that a mode takes, 5 with an error of fourth order")
+    corner: Annotated[int, Field(ge=0, le=100)] = Field(
+        default=0, description="corners of the reference are rounded by three means over so many samples"
+    )
+
+    _preview = field_validator("preview", mode="before")(_auto)
+
+
 class EmitDefaults(_Part):
     """Defaults of `hystgen emit`."""
 
@@ -215,6 +254,7 @@ class EmitDefaults(_Part):
     )
     drive_lsb: Positive | None = Field(default=None, description="fixed point: input units per code")
     output_lsb: Positive | None = Field(default=None, description="fixed point: output units per code")
+    compensation: Compensation = Field(default=Compensation(), description="how effects are compensated in the C")
 
 
 class Parameters(_Part):

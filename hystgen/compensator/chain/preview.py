@@ -31,8 +31,12 @@ class Taps(NamedTuple):
         return self.first + len(self.weights) - 1
 
 
-def taps(delay: float, modes: Sequence[Resonance], seconds: float) -> Taps:
-    """The weights for a delay in s and modes in series at samples `seconds` apart; the reference alone for none."""
+def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0) -> Taps:
+    """The weights for a delay in s and modes in series at samples `seconds` apart; the reference alone for none.
+
+    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`, which with 5 is undone but
+    for the fourth difference. `corner`: three means over so many samples, centred, round the reference.
+    """
     samples = delay / seconds
     whole = math.floor(samples)
     share = samples - whole
@@ -42,7 +46,23 @@ def taps(delay: float, modes: Sequence[Resonance], seconds: float) -> Taps:
         a1, a2 = denominator(mode, seconds)
         weights = np.convolve(weights, np.array([a2, a1, 1.0]) / (1.0 + a1 + a2))
         first -= 1
+        if number == 5:
+            weights = np.convolve(weights, np.array([-1.0, 8.0, -1.0]) / 6.0)
+            first -= 1
+    if corner > 1:
+        mean = np.full(corner, 1.0 / corner)
+        weights = np.convolve(weights, np.convolve(np.convolve(mean, mean), mean))
+        first -= 3 * (corner - 1) // 2
+        if corner % 2 == 0:  # an odd number of samples has no middle one
+            weights = np.convolve(weights, np.array([0.5, 0.5]))
+            first -= 1
     return Taps(first, weights)
+
+
+def led(needed: Taps, samples: int | None) -> Taps:
+    """The weights for a reference that is taken `samples` ahead, where that is more than needed."""
+    more = (samples or 0) - max(needed.ahead, 0)
+    return needed if more <= 0 else Taps(needed.first, np.append(needed.weights, np.zeros(more)))
 
 
 # ---------------------------------------------------------------- preview.c

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,7 @@ from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturati
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.front.tanh import kernels
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
+from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 from hystgen.plays.slots import Counts, Reals
 
@@ -40,6 +42,8 @@ OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
 and the share that verification corrects with."""
 
 VERIFIED_SHARE = 0.125
+
+STANDARD = Compensation()
 
 SAMPLES_A_SWEEP = 50
 """A drive that takes no fewer samples from one end of its range to the other is what bounds are stated for: at a
@@ -129,6 +133,7 @@ class Compiled:
     seconds: float
     static: StaticModel
     max_rate: float
+    asked: int | None = None
 
     @property
     def largest_step(self) -> float:
@@ -138,8 +143,33 @@ class Compiled:
 
     @property
     def ahead(self) -> int:
-        """NAME_PREVIEW."""
+        """NAME_PREVIEW: what the model needs, or what was asked for."""
+        return self.needed if self.asked is None else self.asked
+
+    @property
+    def needed(self) -> int:
+        """Samples that the reference has to be ahead for the motion to be in time."""
         return max(self.taps.ahead, 0) if self.taps else 0
+
+    @cached_property
+    def noise_gain(self) -> float:
+        """Largest gain, over all frequencies, from the reference to the drive, over that at rest."""
+        z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
+        gain = np.ones_like(z)
+        if self.taps:
+            gain = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
+        for each in self.parts.creeps:
+            one = creep.numbers(each, self.seconds)
+            rate, early, late, _ = one.terms.T[:, :, None]
+            states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
+            gain = gain * one.rest / (one.slope - float(np.sum(late)) + states)
+        for each in self.parts.lags:
+            exact, (rate, second, late, _) = lag.numbers(each, self.seconds)
+            if exact:
+                gain = gain * (1.0 - (1.0 - rate) * z) / (late + second * z)
+            else:
+                gain = gain * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
+        return float(np.max(np.abs(gain)))
 
 
 def _settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
@@ -208,7 +238,7 @@ def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]]
     )
 
 
-def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
+def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation = STANDARD) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
     None of its effects is among the `refusals`. Raises FormatError when a
@@ -235,9 +265,11 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
     rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in creeps]
     lags = [lag.numbers(each, seconds) for each in parts.lags]
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
-    taps = None
-    if parts.modes or parts.delay:
-        taps = preview.taps(parts.delay, parts.modes, seconds)
+    delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
+    modes = parts.modes if how.resonance == "inverse" else []
+    needed = preview.taps(delay, modes, seconds, how.taps, how.corner)
+    led = preview.led(needed, how.preview)
+    taps = led if len(led.weights) > 1 or led.first else None
     rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
     rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
     lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
@@ -265,7 +297,8 @@ def build(chain: Chain, arithmetic: str, seconds: float) -> Compiled:
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),
     )
-    return Compiled(tables, taps, parts, seconds, static, drive_span / (SAMPLES_A_SWEEP * seconds))
+    max_rate = how.max_rate or drive_span / (SAMPLES_A_SWEEP * seconds)
+    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview)
 
 
 def refusals(chain: Chain, operator: str, seconds: float) -> Iterator[tuple[Effect, str]]:
