@@ -23,7 +23,7 @@ from scipy import integrate, linalg, signal
 
 import hystgen
 from hystgen import PI, Cascade, DeadZone, Model, closed_loop
-from hystgen.basics.problems import UnsupportedEffectsError
+from hystgen.basics.problems import EffectsError
 from hystgen.closed_loop import BitReference, CompiledC, Loop, PIController, Response
 from hystgen.compensator.bounds import error_bounds
 from hystgen.emission.calls import emitted_files
@@ -641,7 +641,7 @@ def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPat
             CompiledC(model(NOTE), compiler="clang")
     creeping = model(NOTE + "  effects: [{name: lag, time_constant: 0.01}]\n")
     for make in (CompiledC, BitReference, lambda stage: Loop(([1.0], [1.0]), 1.0, 0.1, stage)):
-        with pytest.raises(UnsupportedEffectsError, match="lag"):
+        with pytest.raises(EffectsError, match="lag"):
             make(creeping)
 
 
