@@ -242,7 +242,7 @@ class _Builder:
         """Puts all plays that never move where their weighted mean is: their part of the output is the same.
 
         Their thresholds, cut to what fits, leave their own start states too little room: they become wide enough for
-        the mean to be admissible beside the play before them.
+        the mean to be admissible beside the play before them, or as wide as the type is, with the mean cut to that.
         """
         pi, k = self.cascade.pi, self.still
         weights = [Fraction(p) for p in pi.weights[k:]]
@@ -250,7 +250,9 @@ class _Builder:
         terms = zip(weights, pi.start[k:], strict=True)
         self.mean = sum((p * Fraction(s) for p, s in terms), Fraction(0)) / total if total else Fraction(pi.start[k])
         state = nearest(self.mean / self.step)
-        wide = max(self.threshold[k], self.threshold[k - 1] + abs(state - states[k - 1]))
+        wide = max(self.threshold[k], min(self.threshold[k - 1] + abs(state - states[k - 1]), TABLE_MAX))
+        room = wide - self.threshold[k - 1]
+        state = min(max(state, states[k - 1] - room), states[k - 1] + room)
         states[k:] = [state] * len(weights)
         self.threshold[k:] = [wide] * len(weights)
 
