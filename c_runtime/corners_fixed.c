@@ -1,5 +1,7 @@
 #include "hystgen_runtime.h"
 
+#define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's output, in sums */
+
 /* Field by field: for a whole structure a compiler may call memcpy. */
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
 {
@@ -32,7 +34,7 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
 static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
                                      const hystgen_segment_t *s, bool by_output)
 {
-    const int64_t output = (int64_t)c->high * ((int64_t)1 << HYSTGEN_LOW_BITS) + (int64_t)c->low;
+    const int64_t output = (int64_t)c->high * HYSTGEN_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     return hystgen_along(here, by_output ? output : c->input) +
            (c->rose == here->rising ? 0 : whole);

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 8e9650b31b5a163a5416e9075638bfb6c1577756cdcbac8cff8142ddd38b4a47, without this line
+ * Text: sha256 90cc6666ce6b202e323d0430a659b6e60bddad6e28bbbd71c076b3837644e693, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -88,6 +88,8 @@ static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int sh
                      ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
 
+#define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's output, in sums */
+
 /* Field by field: for a whole structure a compiler may call memcpy. */
 static void curved_copy_place(curved_place_t *to, const curved_place_t *from)
 {
@@ -120,7 +122,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
                                     const curved_segment_t *s, bool by_output)
 {
-    const int64_t output = (int64_t)c->high * ((int64_t)1 << 16) + (int64_t)c->low;
+    const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     return curved_along(here, by_output ? output : c->input) +
            (c->rose == here->rising ? 0 : whole);
