@@ -117,11 +117,10 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_corner_t *corner, hystgen_real_t input)
 {
-    hystgen_real_t x = hystgen_along(m, input);
-    if (x < hystgen_along(m, m->here.input)) {
+    if (hystgen_along(m, input) < hystgen_along(m, m->here.input)) {
         hystgen_turn_back(t, m, corner);
-        x = -x;
     }
+    const hystgen_real_t x = hystgen_along(m, input);
     const bool rising = m->here.rising;
     const hystgen_corner_t *c = &corner[m->here.depth - 1u];
     if (m->here.depth > 1u && x >= c->pass[rising]) {

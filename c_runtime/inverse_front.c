@@ -58,12 +58,13 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         const hystgen_real_t level = u < HYSTGEN_OUTPUT_MIN   ? HYSTGEN_OUTPUT_MIN
                                      : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX
                                                               : u;
+        self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
+        self->reference = u;
         const hystgen_real_t w = hystgen_plays_step(&hystgen_inverse_curve, &self->plays,
                                                     self->corner, level - HYSTGEN_OFFSET);
         const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->limited);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
-        self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
             /* the plays are not where w is */
@@ -72,7 +73,6 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         } else {
             hystgen_inverse_arrive(self, inside);
         }
-        self->reference = u;
         self->level = level;
         self->repeat = true;
     }

@@ -181,7 +181,7 @@ FAULTS = [
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
     ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
     ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
-    ("corners", ".c", r"(_segment\[8\] = \{\s*\{[^}]*\},\s*\{)\d+", r"\g<1>9223372036854775807", "signed overflow"),
+    ("corners", ".c", r"(#define TWO_BRANCHES_HIGH_STEP \(\(int64_t\)1 << )\d+", r"\g<1>37", "signed overflow"),
     ("corners", ".c", r"(middle = \(low \+ left\)) / 2;", r"\1 / 2 + 1u;", "out of bounds"),
 ]
 

@@ -297,8 +297,9 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
             return 1, 11 if fixed else 7, 2, 0
         return 3, 14, 3, 0
     if fixed:  # the corner, then the play in its block: either is bisected; clamps, the code, what lies ahead
-        return (1, 15, 0, 2) if op == "forward" else (3 + 2 * fast, 19 + 3 * fast, 0, 4)
+        # the output of a corner is put together from its parts, of the top one and of the one behind it
+        return (1, 15, 0, 2) if op == "forward" else (5 + 2 * fast, 19 + 3 * fast, 0, 4)
     # the sign of a move takes a multiplication too; up to eight plays are tried one by one before either search
     if op == "forward" or fast:
-        return 16, 18, 0, 2
-    return 25, 24, 0, 4
+        return 17, 18, 0, 2
+    return 26, 24, 0, 4

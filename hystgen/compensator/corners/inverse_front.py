@@ -138,17 +138,17 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
             level = t.limits[OUTPUT_MIN]
         elif u > t.limits[OUTPUT_MAX]:
             level = t.limits[OUTPUT_MAX]
+        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
+        m.real[REFERENCE] = u
         w = plays_step(t.inverse, m, level - t.limits[OFFSET])
         v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
-        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
         m.counts[BITS] |= DOMAIN if limited else 0
         if inside != v or inside == m.real[DRIVE]:
             m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
             inverse_replace(t, m, inside)
         else:
             inverse_arrive(m, inside)
-        m.real[REFERENCE] = u
         m.real[LEVEL] = level
         m.counts[REPEAT] = 1
     m.counts[STEPPED] = 1

@@ -128,10 +128,9 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
 @jit
 def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
-    x = along(m, to)
-    if x < along(m, m.real[INPUT]):
+    if along(m, to) < along(m, m.real[INPUT]):
         turn_back(t, m)
-        x = -x
+    x = along(m, to)
     rising = m.counts[RISING]
     passed = m.counts[DEPTH] - 1
     if passed > 0 and x >= m.passed[passed, rising]:

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 ca5e151615dcf916b99f52eb1a3b5f9655cd130fb514c55749297ede0715fc4b, without this line
+ * Text: sha256 5208fc09dfc7d249baa0b59dc81ce0bc6ff7bbbdf7fb267cdc29636871c12937, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -22,7 +22,7 @@
  *         such a model
  *     constant tables   2094 bytes
  *     inverse instance  176 bytes of RAM
- *     inverse step, worst case: 11 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
+ *     inverse step, worst case: 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
  *         3 the bits of n)
  * On an 8-bit AVR constants lie in RAM too: at most 2201 bytes of RAM in all, 33 of them for each
  * play

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 26c99048d2fb40d22d81fb79e867f468879b59abb5d51af9b53850b6b2e5b379, without this line
+ * Text: sha256 282440faa558565c0af140adfa2a1fb45d154593a4bbd182de34a197dceb3bd3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -170,11 +170,10 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
                                      plain_corner_t *corner, plain_real_t input)
 {
-    plain_real_t x = plain_along(m, input);
-    if (x < plain_along(m, m->here.input)) {
+    if (plain_along(m, input) < plain_along(m, m->here.input)) {
         plain_turn_back(t, m, corner);
-        x = -x;
     }
+    const plain_real_t x = plain_along(m, input);
     const bool rising = m->here.rising;
     const plain_corner_t *c = &corner[m->here.depth - 1u];
     if (m->here.depth > 1u && x >= c->pass[rising]) {

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 3db51326abdc87caf332e16e082cad6dbe67b74dfff9841eba04eafb9b824be4, without this line
+ * Text: sha256 e3dc06fec2b4648d18648ea4516f793053a380828f93b6e947f816415cf70456, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -15,7 +15,7 @@
  *         such a model
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
- *     inverse step, worst case: 16 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
  * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
  * play
  *

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 a2717cd453cef7776dcbd7cf0f69231ea5a4bc8c3ab7808e70612d6e2563d227, without this line
+ * Text: sha256 927c874cf1cb7beaf202a851ae5e0db541889febe71a628c306e1db2b360d75b, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -16,7 +16,7 @@
  *         such a model
  *     constant tables   832 bytes
  *     inverse instance  220 bytes of RAM
- *     inverse step, worst case: 31 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
+ *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
  *         1 tanh, 2 atanh
  * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in all, 31 of them for each
  * play
@@ -515,11 +515,10 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
                                                    two_branches_corner_t *corner,
                                                    two_branches_real_t input)
 {
-    two_branches_real_t x = two_branches_along(m, input);
-    if (x < two_branches_along(m, m->here.input)) {
+    if (two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
         two_branches_turn_back(t, m, corner);
-        x = -x;
     }
+    const two_branches_real_t x = two_branches_along(m, input);
     const bool rising = m->here.rising;
     const two_branches_corner_t *c = &corner[m->here.depth - 1u];
     if (m->here.depth > 1u && x >= c->pass[rising]) {
@@ -805,13 +804,14 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
     if (!self->repeat || u < self->reference || u > self->reference) {
         const two_branches_real_t level = u < TWO_BRANCHES_OUTPUT_MIN ? TWO_BRANCHES_OUTPUT_MIN
             : u > TWO_BRANCHES_OUTPUT_MAX ? TWO_BRANCHES_OUTPUT_MAX : u;
+        self->bits = level < u || level > u ? TWO_BRANCHES_STATUS_INPUT_CLAMPED : 0u;
+        self->reference = u;
         const two_branches_real_t w = two_branches_plays_step(&two_branches_inverse_curve,
                                                               &self->plays, self->corner,
                                                               level - TWO_BRANCHES_OFFSET);
         const two_branches_real_t v = two_branches_inverse_choose(self, level, w, &self->limited);
         const two_branches_real_t inside = two_branches_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
-        self->bits = level < u || level > u ? TWO_BRANCHES_STATUS_INPUT_CLAMPED : 0u;
         self->bits |= self->limited ? TWO_BRANCHES_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
             /* the plays are not where w is */
@@ -820,7 +820,6 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         } else {
             two_branches_inverse_arrive(self, inside);
         }
-        self->reference = u;
         self->level = level;
         self->repeat = true;
     }
