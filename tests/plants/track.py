@@ -46,7 +46,7 @@ SLOWEST = 60
 """Samples of the fastest half wave of a reference."""
 
 INSIDE = 0.1
-"""Share of the recorded output that a reference stays away from its ends."""
+"""Share of the output over the range of the drive that a reference stays away from its ends."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,8 @@ def reference(rng: np.random.Generator, low: float, high: float) -> Array:
 
 def answer(case: Case, drive: Array, rate: float) -> Array:
     """What the plant answers to a drive, a sample each, from rest at its first value."""
+    held = np.full(LENGTH, drive[0])  # whatever rings at the start has died out behind them
+    drive = np.concatenate([held, drive])
     n = len(drive)
     before = np.geomspace(1e-4, 1.0, 50) * 5.0 * max(case.session.bench.long, n / rate)
     fine = before[-1] + ((np.arange(FINER * n) + 0.5) / FINER + 0.5) / rate
@@ -101,7 +103,7 @@ def answer(case: Case, drive: Array, rate: float) -> Array:
     planned = Planned("reference", True, rate, len(before), n)
     room = np.full(len(t), float(case.session.temperature[0]))
     stage = replace(case.session, t=t, v=v, records=(planned,), history=None, rest=None, temperature=room)
-    return stage.sampled(case.plant.respond(stage), planned)
+    return stage.sampled(case.plant.respond(stage), planned)[LENGTH:]
 
 
 def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
@@ -124,13 +126,14 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         shutil.copy(home / "out" / "params.yaml", home / "whole.yaml")
         outputs = np.concatenate([columns["y"] for columns in case.measured])
         drives = np.concatenate([columns["v"] for columns in case.measured])
-        low, high = float(outputs.min()), float(outputs.max())
+        stand = case.session.bench
+        # a straight line at the ends of the drive: what rings goes farther, where no drive holds it
+        low, high = np.polyval(np.polyfit(drives, outputs, 1), [stand.low, stand.high]).tolist()
         low, high = low + INSIDE * (high - low), high - INSIDE * (high - low)
         u = reference(np.random.default_rng(seed), low, high)
         rows = np.column_stack([np.arange(len(u)) / rate, u])
         np.savetxt(home / "reference.csv", rows, delimiter=",", header="t,u", comments="", fmt="%.12g")
         slope, start = np.polyfit(outputs, drives, 1)
-        stand = case.session.bench
         tried = {"line": np.clip(start + slope * u, stand.low, stand.high)}
         for name in ("plain", "whole"):
             with (home / f"{name}.yaml").open("a") as file:
