@@ -9,7 +9,7 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
-.PHONY: demo test check prove lint fuzz check-bounds blind clean
+.PHONY: demo test check prove lint fuzz check-bounds blind track clean
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -59,6 +59,10 @@ blind: $(VENV)/ready
 	$(BIN)/python -m tests.plants run $(BLIND_DIR)/cases -o $(BLIND_DIR)/results --jobs $(JOBS)
 	$(BIN)/python -m tests.plants score $(BLIND_DIR)/cases $(BLIND_DIR)/labels $(BLIND_DIR)/results \
 	    --json $(BLIND_DIR)/score.json
+
+# Blind plants behind compensators made from their records, four an effect
+track: $(VENV)/ready
+	$(BIN)/python -m tests.plants track --seeds 0:4 --jobs $(JOBS)
 
 clean:
 	rm -rf $(VENV) build dist

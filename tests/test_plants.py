@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from hystgen.parameters.files import load_parameters
 from hystgen.records import read_record
-from tests.plants import base, bench, case, effects, foreign, labels, refit, rivals, run, score, session
+from tests.plants import base, bench, case, effects, foreign, labels, refit, rivals, run, score, session, track
 from tests.plants.__main__ import main
 from tests.plants.effects import Effect, Surroundings, drive_side, output_side, slow
 from tests.plants.plant import Plant
@@ -661,3 +661,11 @@ class TestActivatedFriction:
         coarse, fine = (np.max(np.abs(a - b)) for a, b in pairwise(outs))
         assert coarse < 0.1 * self.WIDTH * self.STRENGTH
         assert fine < 0.65 * coarse
+
+
+@pytest.mark.thorough
+def test_a_diagnosed_plant_follows_a_reference() -> None:
+    """Behind the inverse of its diagnosed model, an eighth at most of what plays alone leave; `make track` runs more."""
+    row = track.track("delay", 1)
+    assert row.named
+    assert row.whole < 0.12 * row.plays < 0.12 * row.line
