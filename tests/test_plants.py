@@ -665,7 +665,7 @@ class TestActivatedFriction:
 
 @pytest.mark.thorough
 def test_a_diagnosed_plant_follows_a_reference() -> None:
-    """Behind the inverse of its diagnosed model, an eighth at most of what plays alone leave; `make track` runs more."""
+    """Behind the inverse of its diagnosed model an eighth is left of what plays alone leave; `make track` runs more."""
     row = track.track("delay", 1)
     assert row.named
     assert row.whole < 0.12 * row.plays < 0.12 * row.line
