@@ -18,7 +18,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from engine_costs import SHIPPED, _program
+from engine_costs import CODE_PLAYS, SHIPPED, _program
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import engines
@@ -33,8 +33,6 @@ from hystgen.verification import comparison, emulator, sources, targets
 MOVED = ("polynomial", "centre")
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 FLOATS = ("float32", "float64")
-PLAYS = 10
-
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
     "weights: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]",
@@ -60,7 +58,7 @@ assert {"any", *EFFECTS} == set(PARTS)
 def model(effect: str) -> Model:
     """Ten plays with one effect, or none."""
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
-    text += f"    thresholds: {[0.45 * k for k in range(PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * PLAYS}\n"
+    text += f"    thresholds: {[0.45 * k for k in range(CODE_PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * CODE_PLAYS}\n"
     text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
     return Model(parse_parameters(text, "bench.yaml"))
 

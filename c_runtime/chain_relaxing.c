@@ -5,7 +5,7 @@
    beyond the threshold, of which it gains a share. Exact while it slides or rests; where contact
    begins or ends inside a step, it does so at the first touch. */
 
-/* What of x lies beyond +-r. */
+/* The part of x beyond +-r. */
 static hystgen_real_t hystgen_stretch(hystgen_real_t x, hystgen_real_t r)
 {
     return x > r ? x - r : x < -r ? x + r : 0;

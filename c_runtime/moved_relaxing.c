@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* What of x lies beyond +-r. */
+/* The part of x beyond +-r. */
 static hystgen_real_t hystgen_beyond(hystgen_real_t x, hystgen_real_t r)
 {
     return x > r ? x - r : x < -r ? x + r : 0;

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from stage import FULL, SAMPLE_TIME, Stage, turns
+from stage import DAMPERS, FULL, SAMPLE_TIME, Stage, turns
 
 import hystgen
 from hystgen.closed_loop import CompiledC
@@ -26,7 +26,8 @@ from hystgen.report import drawing
 
 Array = NDArray[np.float64]
 
-SECONDS = 60.0
+SECONDS = 7.5 * DAMPERS[-1][0]
+"""Of the recording to fit, s: the slowest damper comes to rest several times, as creep has to show to be identified."""
 
 
 def write(path: Path, drives: Array) -> Path:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SAMPLE_TIME = 0.01  # s
+SAMPLE_TIME = 0.01  # s, a fortieth of the fastest damper's time constant, so that its creep shows in many samples
 FINE = 10  # steps of the simulation in one sample
 FULL = 100.0  # V
 NOISE = 0.004  # um rms

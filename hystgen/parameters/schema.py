@@ -235,7 +235,7 @@ class Compensation(_Part):
     resonance: Literal["inverse", "none"] = Field(default="inverse", description="whether modes are compensated")
     taps: Literal[3, 5] = Field(default=3, description="references that a mode takes, 5 with an error of fourth order")
     corner: Annotated[int, Field(ge=0, le=100)] = Field(
-        default=0, description="corners of the reference are rounded by three means over so many samples"
+        default=0, description="corners of the reference are rounded by three moving averages of this number of samples"
     )
 
     _preview = field_validator("preview", mode="before")(_auto)

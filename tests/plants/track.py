@@ -114,12 +114,12 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
     rate = case.session.bench.rates[1 if effect in FAST else 0]
     with tempfile.TemporaryDirectory() as place:
         home = labels.write(case, Path(place), with_rivals=False)
-        told = json.loads((home / "session.json").read_text())
-        words = [*told["fit"], *(word for name in told["holdout"] for word in ("--holdout", name))]
-        if told["history"]:
-            words.append("--history=" + ",".join(f"{x:g}" for x in told["history"]))
-        if told["rest"]:
-            words.append(f"--rest={told['rest']:g}")
+        session = json.loads((home / "session.json").read_text())
+        words = [*session["fit"], *(word for name in session["holdout"] for word in ("--holdout", name))]
+        if session["history"]:
+            words.append("--history=" + ",".join(f"{x:g}" for x in session["history"]))
+        if session["rest"]:
+            words.append(f"--rest={session['rest']:g}")
         _call(home, "identify", *words, "-o", "plain.yaml", "--units", "V,um")
         _call(home, "diagnose", "plain.yaml", *words, "-o", "out")
         found = json.loads((home / "out" / "diagnosis.json").read_text())

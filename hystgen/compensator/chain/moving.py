@@ -154,7 +154,7 @@ def _viscous(seconds: float, tau: float) -> tuple[float, float]:
 
 @jit(inline=True)
 def beyond(x: Any, r: Any) -> Any:
-    """What of x lies beyond +-r."""
+    """The part of x beyond +-r."""
     if x > r:
         return x - r
     if x < -r:

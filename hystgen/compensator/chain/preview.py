@@ -35,7 +35,7 @@ def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int =
     """The weights for a delay in s and modes in series at samples `seconds` apart; the reference alone for none.
 
     A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`, which with 5 is undone but
-    for the fourth difference. `corner`: three means over so many samples, centred, round the reference.
+    for the fourth difference. `corner`: three centred moving averages of this number of samples round the reference.
     """
     samples = delay / seconds
     whole = math.floor(samples)
