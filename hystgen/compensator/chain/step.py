@@ -100,7 +100,8 @@ class ChainState(NamedTuple):
     `flags`: whether any drive has been applied yet."""
 
     plays: State
-    bent: Reals  # (n + 1,), what each play contributes, where an effect moves or bends them
+    lost: Reals  # (n + 1,), what each play has lost below its last bit, where a nonlinear dashpot moves them
+    bent: Reals  # (n + 1,), what each contributes, where an effect moves or bends them
     lag: Reals  # (k, 5)
     creep: CreepState
     ageing: AgeingState
@@ -115,6 +116,7 @@ def new_state(t: ChainTables) -> ChainState:
     dtype = t.threshold.dtype
     return ChainState(
         loop.new_state(t.plays),
+        np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
         np.zeros((len(t.lag.block), 5), dtype),
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
@@ -255,8 +257,8 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
         loop_absorb(t.plays, s.plays, w)
         return loop_output(t.plays, s.plays)
     if s.flags[MOVING]:
-        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
+        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
 
 
 @jit
@@ -265,7 +267,7 @@ def started(t: ChainTables, s: ChainState) -> Any:
     if t.moving.scanned or (t.moving.moves == PLAIN and t.moving.bends == STRAIGHT):
         return loop_output(t.plays, s.plays)
     r, p = t.plays.threshold, t.plays.weight
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.plays.play[0])
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.plays.play[0])
 
 
 @jit
@@ -278,7 +280,7 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
         if s.flags[MOVING]:
             return relaxing_input(t.moving, r, p, s.plays, h)
         return loop_solve(t.plays, s.plays, h)
-    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.flags[MOVING] != 0, h)
+    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.flags[MOVING] != 0, h)
 
 
 # ---------------------------------------------------------------- chain.c
