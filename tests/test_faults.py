@@ -13,7 +13,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -170,7 +170,7 @@ class TestOneWrongSample:
 class TestOneWrongRow:
     """Drive and output wrong together: a lost packet, a row of another moment, exchanged cells, a doubled row."""
 
-    KINDS: dict[str, Callable[[Array, Array, int], tuple[float, float]]] = {
+    KINDS: ClassVar[dict[str, Callable[[Array, Array, int], tuple[float, float]]]] = {
         "zeros": lambda _v, _y, _k: (0.0, 0.0),
         "another's": lambda v, y, k: (v[k - 311], y[k - 311]),
         "exchanged": lambda v, y, k: (y[k], v[k]),

@@ -171,9 +171,9 @@ def mask_outliers(
 
     Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
     that is bridged. Pulses of the drive have no part in the first fit, which is then asked whether they are real: a
-    false one may make the memory known where it is not. The play sum is one of least trimmed squares (Rousseeuw and Van Driessen, Data Mining and Knowledge
-    Discovery 12, 2006): it is fitted again without the samples that it misses most, as many as may be left out, so that
-    none of them draws it near.
+    false one may make the memory known where it is not. The play sum is one of least trimmed squares (Rousseeuw and Van
+    Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the samples that it misses most,
+    as many as may be left out, so that none of them draws it near.
     """
     solution, _ = pi.solve([_without_pulses(_without_runs(item)[0]) for item in to_fit], wanted, floor)
     places = tuple(float(r) for r in solution.thresholds)
@@ -213,7 +213,9 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
     them, and the range of the model ends at them.
     """
     error = _errors(item, solution)
-    suspects = [run for run in faults.far_from_others(error, item.output_range) if faults.returns(item.v, *run)]
+    far = faults.far_from_others(error, item.output_range)
+    isolated = faults.flags_of(far, len(item.v))
+    suspects = [run for run in far if faults.returns(item.v, *run)]
     if robust:
         missed = _most_missed(item, error).tolist()
         ends = [(k, k + 1) for k in (int(np.argmax(item.v)), int(np.argmin(item.v))) if k in missed]
@@ -223,7 +225,8 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
         other = replace(item, v=faults.bridged(item.v, run)).resettled(math.inf)
         less = _errors(other, solution)
         explained = _size(less[run]) < LESS_MISSED * _size(error[run])
-        there = (explained or _neither(error[run], less[run])) and _size(less[~run]) <= _size(error[~run])
+        wrong = bool(isolated[run].any()) and _neither(error[run], less[run])
+        there = (explained or wrong) and _size(less[~run]) <= _size(error[~run])
         at_the_end = len(item.v) - last < faults.LONGEST
         if there or at_the_end or _not_remembered(error[~run], less[~run]):
             item, error = other, less
