@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from hystgen.basics import jit
 from hystgen.compensator import step, step_fixed, step_float
 from hystgen.compensator.chain import step as chain_step
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain import step_fixed as chain_step_fixed
+from hystgen.compensator.chain import step_float as chain_step_float
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
@@ -34,7 +36,7 @@ from hystgen.plays.slots import LOOP
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
     """What the bit reference is made of for the arithmetic and the engine of these tables."""
     if isinstance(t, ChainTables):
-        return chain_step.OPERATIONS
+        return _chain_operations(t.fixed)
     return _operations(t.engine == LOOP, t.fixed, t.has_front)
 
 
@@ -47,6 +49,12 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
     if fixed:
         return run.made_of(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
     return run.made_of(forward_front, inverse_front, *ends) if front else run.made_of(forward, inverse, *ends)
+
+
+@functools.cache
+def _chain_operations(fixed: bool) -> Operations:
+    own = chain_step_fixed if fixed else chain_step_float
+    return chain_step.made_of(own.BLOCKS, own.CODES)
 
 
 def new_state(t: Tables | FixedTables | ChainTables) -> Any:

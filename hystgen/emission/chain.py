@@ -7,11 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.moving import MovingTables
-from hystgen.compensator.chain.tables import ChainTables, Compiled
-from hystgen.emission.text import literal, operand, structure, table
+from hystgen.compensator.chain.layout import (
+    LARGEST_LEVEL,
+    LEAST_CODE,
+    LEVEL_BITS,
+    LEVEL_DROP,
+    MOST_CODE,
+    SHARE_BITS,
+    ChainTables,
+    Compiled,
+)
+from hystgen.emission.text import constant, literal, operand, structure, table
+from hystgen.plays import slots
 
 
 @dataclass(frozen=True)
@@ -35,6 +46,12 @@ STRUCTS = {
 }  # fmt: skip
 """Reals and flags in the memory of a block, by the name of its type."""
 
+FIXED_STRUCTS = {
+    "creep": (2, 0, 0), "creep_state": (1, 0, 0), "lag": (4, 0, 0), "lag_exact": (2, 0, 0), "gain": (1, 2, 0),
+    "ageing": (1, 2, 1),
+}  # fmt: skip
+"""In fixed point: signals, mantissas and flags."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -47,15 +64,24 @@ class Block:
     arrays: tuple[str, ...]
     table: str = ""
     more: str = ""
+    fixed: bool = False
 
     def call(self, verb: str, x: str) -> str:
         """A call of one of its verbs with the argument x."""
-        given = [self.table] * (verb in _TABLE[self.kind]) + [f"&self->{self.name}"] * (verb != "resting")
+        reads = (_FIXED_TABLE if self.fixed else _TABLE)[self.kind]
+        given = [self.table] * (verb in reads) + [f"&self->{self.name}"] * (verb != "resting")
         if self.more and verb in ("rest", "absorb"):
             given.append(f"self->{self.more}")
         return f"hystgen_{self.kind}_{verb}({', '.join([*given, x])})"
 
 
+_FIXED_TABLE = {
+    "creep": ("rest", "resting", "solve", "absorb"),
+    "lag": ("rest", "solve", "absorb"),
+    "lag_exact": ("rest", "solve", "absorb"),
+    "gain": (),
+    "ageing": (),
+}
 _TABLE = {
     "creep": ("rest", "resting", "solve", "absorb"),
     "lag": ("solve", "absorb"),
@@ -70,13 +96,20 @@ def _entries(values: Iterable[float]) -> str:
     return ", ".join(map(literal, values))
 
 
+def _factors(row: Sequence[int], factors: int) -> str:
+    """Entries of a table that begins with factors."""
+    pairs = (f"{{{literal(row[i])}, {row[i + 1]}}}" for i in range(0, 2 * factors, 2))
+    return ", ".join([*pairs, *map(literal, row[2 * factors :])])
+
+
 def drive_side(t: ChainTables, prefix: str) -> list[Block]:
     """The blocks in front of the plays, from the drive on."""
     blocks = []
     for j, (exact, row) in enumerate(zip(t.lag.exact, t.lag.block, strict=True), 1):
         kind, name = "lag_exact" if exact else "lag", f"lag_{j}"
-        text = f"static const {prefix}_{kind}_table_t {prefix}_{name} = {{\n    {_entries(row)},\n}};\n"
-        blocks.append(Block(kind, name, (Field(kind, name),), (text,), f"&hystgen_{name}"))
+        entries = _factors(row, 3) if t.fixed else _entries(row)
+        text = f"static const {prefix}_{kind}_table_t {prefix}_{name} = {{\n    {entries},\n}};\n"
+        blocks.append(Block(kind, name, (Field(kind, name),), (text,), f"&hystgen_{name}", "", t.fixed))
     return blocks
 
 
@@ -86,25 +119,59 @@ def output_side(t: ChainTables, prefix: str) -> list[Block]:
     for j, row in enumerate(t.creep.block, 1):
         terms = t.creep.term[t.creep.first[j - 1] : t.creep.first[j]]
         name, n = f"creep_{j}", len(terms)
-        lines = ",\n".join(f"    {{{_entries(term)}}}" for term in terms)
+        lines = ",\n".join(f"    {{{_factors(term, 3) if t.fixed else _entries(term)}}}" for term in terms)
         own = f"static const {prefix}_creep_term_t {prefix}_{name}_term[{n}] = {{\n{lines},\n}};\n"
-        numbers = f"    {prefix}_{name}_term, {_entries(row)}, {n},"
+        entries = _factors(row, 3) if t.fixed else _entries(row)
+        numbers = f"    {prefix}_{name}_term, {entries}, {n},"
         text = f"static const {prefix}_creep_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
         fields = (Field("creep", name), Field("creep_state", f"{name}_state", "", n))
-        blocks.append(Block("creep", name, fields, (own, text), f"&hystgen_{name}", f"{name}_state"))
+        blocks.append(Block("creep", name, fields, (own, text), f"&hystgen_{name}", f"{name}_state", t.fixed))
     for j in range(1, len(t.ageing.turns) + 1):
         pieces = t.ageing.piece[t.ageing.first[j - 1] : t.ageing.first[j]]
         name, n = f"ageing_{j}", len(pieces)
-        lines = ",\n".join(f"    {{{_entries(piece)}}}" for piece in pieces)
+        lines = ",\n".join(f"    {{{_ageing_piece(piece) if t.fixed else _entries(piece)}}}" for piece in pieces)
         own = f"static const {prefix}_ageing_piece_t {prefix}_{name}_piece[{n}] = {{\n{lines},\n}};\n"
-        numbers = f"    {prefix}_{name}_piece, {_entries(t.ageing.number[j - 1, 2:])}, {n}, {t.ageing.turns[j - 1]},"
-        text = f"static const {prefix}_ageing_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
-        blocks.append(Block("ageing", name, (Field("ageing", name),), (own, text), f"&hystgen_{name}"))
+        number = t.ageing.number[j - 1]
+        ends = f"{literal(number[-1])}, {n}, {t.ageing.turns[j - 1]}, {number[0]}"
+        if not t.fixed:
+            ends = f"{_entries(number[2:])}, {n}, {t.ageing.turns[j - 1]}"
+        text = f"static const {prefix}_ageing_table_t {prefix}_{name} = {{\n    {prefix}_{name}_piece, {ends},\n}};\n"
+        blocks.append(Block("ageing", name, (Field("ageing", name),), (own, text), f"&hystgen_{name}", "", t.fixed))
     for j, row in enumerate(t.gain, 1):
         name = f"gain_{j}"
-        text = f"static const {prefix}_gain_table_t {prefix}_{name} = {{\n    {_entries(row[:7])},\n}};\n"
-        blocks.append(Block("gain", name, (Field("gain", name),), (text,), f"&hystgen_{name}"))
+        entries = _factors(row, 2) if t.fixed else _entries(row[:7])
+        text = f"static const {prefix}_gain_table_t {prefix}_{name} = {{\n    {entries},\n}};\n"
+        blocks.append(Block("gain", name, (Field("gain", name),), (text,), f"&hystgen_{name}", "", t.fixed))
     return blocks
+
+
+def _ageing_piece(row: Sequence[int]) -> str:
+    begin, mantissa, shift, drop, *curve = row
+    return f"{literal(begin)}, {{{literal(mantissa)}, {shift}}}, {drop}, {{{_entries(curve)}}}"
+
+
+def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]:
+    """What saturates in fixed point, as `numbers.stage` has it in floating point."""
+    behind, own = t.behind, f"{name}_behind_{j + 1}"
+    if behind.kind[j] == slots.DEAD_ZONE:
+        lower, upper, *over = behind.piece[j]
+        entries = f"{literal(lower)}, {literal(upper)}, {_factors(over, 2)}"
+        text = f"static const {prefix}_stops_t {own} = {{\n    {entries},\n}};\n"
+        return {"kind": "stops", "arrays": [text], "table": f"&hystgen_behind_{j + 1}", "limited": ""}
+    arrays, ends = [], []
+    for which, direction in ((2 * j, "there"), (2 * j + 1, "back")):
+        here = int(behind.first[which])
+        rows = slice(here, here + int(behind.pieces[which]))
+        arrays += [
+            table("int32_t", f"{own}_{direction}_knot", list(behind.knot[rows])),
+            table("uint8_t", f"{own}_{direction}_scale", list(behind.scale[rows])),
+            table("int32_t", f"{own}_{direction}_coefficient", list(behind.coefficient[rows].ravel())),
+        ]
+        pointers = ", ".join(f"{own}_{direction}_{part}" for part in ("knot", "scale", "coefficient"))
+        counts = (behind.domain[which, 1], behind.pieces[which], behind.coefficient.shape[1] - 1, *behind.scaled[which])
+        ends.append(f"    {{{pointers},\n     {_entries(counts)}}}")
+    arrays.append(f"static const {prefix}_bend_t {own} = {{\n" + ",\n".join(ends) + ",\n};\n")
+    return {"kind": "bend", "arrays": arrays, "table": f"&hystgen_behind_{j + 1}", "limited": ", limited"}
 
 
 MOVES = ("play", "dilated", "relaxing")
@@ -166,7 +233,7 @@ class Glue:
     constants: list[tuple[str, str, str]]
 
 
-def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, str]]) -> Glue:
+def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
     before, after = drive_side(t, prefix), output_side(t, prefix)
@@ -182,7 +249,10 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     }
     arrays = [text for block in (*before, *after) for text in block.arrays]
     if len(t.tap):
-        arrays.append(table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap)))
+        arrays.append(
+            constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_factors(row, 1)}," for row in t.tap])
+            if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
+        )  # fmt: skip
     number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
     words = {
         "OUTPUT_OFFSET": "part of every displacement",
@@ -192,6 +262,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
+    constants += _fixed_constants(t) if t.fixed else []
     if t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
@@ -205,19 +276,34 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     )  # fmt: skip
 
 
+def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
+    """Numbers that functions name in fixed point alone."""
+    low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
+    return [
+        ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
+        ("FINE_MAX", operand(high), ""),
+        ("LEAST_CODE", operand(t.number[LEAST_CODE]), "between which a drive is kept before it is limited"),
+        ("MOST_CODE", operand(t.number[MOST_CODE]), ""),
+        ("LEVEL_BITS", f"{t.number[LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
+        ("LEVEL_DROP", f"{t.number[LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
+        ("LARGEST_LEVEL", operand(t.number[LARGEST_LEVEL]), "sum that is asked of the plays"),
+        ("SHARE_BITS", f"{t.number[SHARE_BITS]}u", "bits of a mantissa below a code"),
+    ]
+
+
 def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse = op == "inverse"
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
-        Field("real", "drive", "what arrived of it in front of the plays"),
-        Field("real", "level", "sum of the plays"),
-        Field("real", "output", "what the output side made of it"),
+        Field("fine", "drive", "what arrived of it in front of the plays"),
+        Field("signal", "level", "sum of the plays"),
+        Field("signal", "output", "what the output side made of it"),
         Field("real", "answer", f"{'drive' if inverse else 'displacement'} returned last"),
-        Field("real", "offset", "set beside that of the model"),
+        Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
-        *([Field("real", "line", "references, the newest one last", taps)] if inverse and taps else []),
+        *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
         Field("flag", "ascending", "direction of the drive's last move"),
         Field("flag", "moving", "a drive was applied"),
         *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),
@@ -246,7 +332,7 @@ def _functions(
     op: str,
     before: Sequence[Block],
     after: Sequence[Block],
-    behind: Sequence[dict[str, str]],
+    behind: Sequence[dict[str, Any]],
     ahead: bool,
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
@@ -257,7 +343,7 @@ def _functions(
         lines = [f"{x} = {block.call(_verb(block, verb), x)};" for block in blocks] or ["(void)self;"]
         if verb == "resting" and not any("self" in line for line in lines):
             lines = ["(void)self;", *lines]
-        head = f"static hystgen_real_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_real_t {x})"
+        head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
         return _function(comment, head, [*lines, f"return {x};"])
 
     yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.")
@@ -269,29 +355,29 @@ def _functions(
         yield through(back[0], "solve", "a", "drive_side", "The drive that leads to a in front of the plays.")
         yield through(back[1], "solve", "y", "output_side", "The sum of the plays that gives y at this sample.")
         yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
-    lines = ["hystgen_real_t x = y;"] if behind else []
+    lines = ["hystgen_signal_t x = y;"] if behind else []
     x = "x" if behind else "y"
     lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
     yield _function(
         "The displacement for an output y of the chain.",
-        f"static hystgen_real_t hystgen_{op}_displaced(const {self_t}, hystgen_real_t y)",
+        f"static hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
         [*lines, f"return {x} + (HYSTGEN_OUTPUT_OFFSET + self->offset);"],
     )
     if inverse:
-        lines = ["hystgen_real_t y = u - (HYSTGEN_OUTPUT_OFFSET + self->offset);"]
+        lines = ["hystgen_signal_t y = u - (HYSTGEN_OUTPUT_OFFSET + self->offset);"]
         lines += [
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
         ]
         unused = [] if any(stage["limited"] for stage in behind) else ["(void)limited;"]
         yield _function(
             "The output of the chain that gives the displacement u; `limited` tells whether none does.",
-            f"static hystgen_real_t hystgen_inverse_undisplaced(const {self_t}, hystgen_real_t u, bool *limited)",
+            f"static hystgen_signal_t hystgen_inverse_undisplaced(const {self_t}, hystgen_signal_t u, bool *limited)",
             [*lines, *unused, "return y;"],
         )
         put = ["hystgen_preview_put(self->line, &self->filled, y);"]
         yield _function(
             "What has to be given now for the newest reference, y once it is undisplaced.",
-            f"static hystgen_real_t hystgen_inverse_ahead({self_t}, hystgen_real_t y)",
+            f"static hystgen_signal_t hystgen_inverse_ahead({self_t}, hystgen_signal_t y)",
             [*put, "return hystgen_preview_target(hystgen_tap, self->line);"] if ahead
             else ["(void)self;", "return y;"],
         )
@@ -314,7 +400,7 @@ def _functions(
     yield _function(
         "The drive moves to v from where it was.",
         f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
-        [f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing]
+        [f"hystgen_ageing_move({each.table}, &self->{each.name}, (hystgen_signal_t)v - self->applied);" for each in ageing]
         or ["(void)self;", "(void)v;"],
     )
     heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]

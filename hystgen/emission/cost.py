@@ -11,9 +11,9 @@ from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.chain import costs
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.emission.chain import STRUCTS, Field
+from hystgen.emission.chain import FIXED_STRUCTS, STRUCTS, Field
 from hystgen.emission.options import Options
 from hystgen.plays import slots
 
@@ -112,6 +112,22 @@ def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
+    factor = layout.struct((4, 4), (1, 1))
+    eight, byte = (8, 8), (1, 1)
+    table = (layout.pointer, layout.pointer)
+    bend = layout.struct(table, table, table, (4, 4), count, byte, byte, byte)
+    own = {
+        "factor_t": factor,
+        "creep_term_t": layout.struct(*3 * [factor], byte),
+        "creep_table_t": layout.struct(table, *3 * [factor], byte, byte, count),
+        "lag_table_t": layout.struct(*3 * [factor], byte, byte),
+        "lag_exact_table_t": layout.struct(*3 * [factor], byte, byte),
+        "gain_table_t": layout.struct(factor, factor, *3 * [eight], byte),
+        "ageing_piece_t": layout.struct(eight, factor, byte, *4 * [(4, 4)]),
+        "ageing_table_t": layout.struct(table, eight, count, byte, byte),
+        "bend_t": layout.struct(bend, bend),
+        "stops_t": layout.struct(eight, eight, factor, factor),
+    }
     structs = {
         "dead_zone_t": layout.struct(*pointers, count),
         "envelope_t": layout.struct(*(7 * [reach])),
@@ -125,17 +141,18 @@ def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1
         "gain_table_t": layout.struct(*7 * [reach]),
         "ageing_piece_t": layout.struct(*6 * [reach]),
         "ageing_table_t": layout.struct((layout.pointer, layout.pointer), *3 * [reach], count, (1, 1)),
+        **(own if fixed else {}),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
     for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
         found += re.findall(r"^    (\w+) \w+(\[\d+\]);", members, flags=re.MULTILINE)
     for kind, sizes in found:
-        own = next((size for ending, (size, _) in structs.items() if kind.endswith(ending)), None)
-        if own is None:
-            own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
-            own = own or (4 if fixed else real)
-        total += own * (math.prod(map(int, re.findall(r"\d+", sizes))) // plays)
+        one = next((size for ending, (size, _) in structs.items() if kind.endswith(ending)), None)
+        if one is None:
+            one = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
+            one = one or (4 if fixed else real)
+        total += one * (math.prod(map(int, re.findall(r"\d+", sizes))) // plays)
     return total
 
 
@@ -181,8 +198,8 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks of a model with effects in one step, of each operator."""
     lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
     gains = len(t.gain) + len(t.ageing.turns)
-    envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
-    stages = len(t.behind.stage_kind) + envelopes
+    kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
+    stages = len(kinds) + kinds.count(slots.TANH) * (t.behind.coefficient.shape[1] - 1 if t.fixed else 1)
     absorbed = 3 * lags + creeps + 5 * states + gains + sum(4 + 2 * int(n) for n in t.ageing.turns)
     return {"forward": absorbed + stages, "inverse": absorbed + 2 * lags + creeps + gains + stages + len(t.tap)}
 
@@ -206,7 +223,7 @@ def _memory(
         if not getattr(options, op):
             continue
         if op in chain:
-            size = layout.struct(*(_field(each, real, layout) for each in chain[op]))[0]
+            size = layout.struct(*(_field(each, arithmetic, layout) for each in chain[op]))[0]
         elif options.engine == "corners":
             size, a_play = _corner_instance(n, op, arithmetic, bool(cascade.stages), layout)
         else:
@@ -219,11 +236,20 @@ def _memory(
     return Memory(_constants(text, arithmetic, layout), sizes, more)
 
 
-def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
+def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, int]:
     """Size and alignment of a field of an instance."""
-    one = {"flag": 1, "status": layout.integer}.get(field.kind, real)
-    reals, flags = STRUCTS.get(field.kind, (0, 0))
-    size, alignment = layout.struct(*reals * [(real, real)], *flags * [(1, 1)]) if reals else (one, one)
+    real, fixed = arithmetic.bytes, arithmetic.fixed
+    signal, fine = (8, 4) if fixed else (real, real)
+    one = {"flag": 1, "status": layout.integer, "signal": signal, "fine": fine, "play": fine}.get(field.kind, real)
+    if field.kind in STRUCTS:
+        reals, flags = STRUCTS[field.kind]
+        sizes = [real] * reals + [1] * flags
+        if fixed:
+            signals, mantissas, flags = FIXED_STRUCTS[field.kind]
+            sizes = [8] * signals + [4] * mantissas + [1] * flags
+        size, alignment = layout.struct(*((each, each) for each in sizes))
+    else:
+        size = alignment = one
     return size * max(field.count, 1), alignment
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import re
 import textwrap
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
@@ -17,7 +19,8 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+from hystgen.compensator.chain.layout import SHARE_BITS, Compiled
 from hystgen.emission import banner, chain, cost, layout, numbers, runtime, selftest
 from hystgen.emission.layout import define
 from hystgen.emission.options import Options
@@ -186,7 +189,8 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
         return None
     assert parameters.sample_time is not None, "emit_options asks for it"
     how = parameters.emit.compensation
-    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how)
+    lsb = (parameters.emit.drive_lsb, parameters.emit.output_lsb)
+    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how, lsb)
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
@@ -198,6 +202,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     corners = options.engine == "corners"
     n = cascade.pi.n
     compiled = compiled_of(parameters, cascade, options)
+    if compiled:
+        about["family"] = dataclasses.replace(about["family"], chain=True)
     values = SimpleNamespace(
         **about,
         **(numbers.chain_fields(parameters, compiled, options, prefix) if compiled
@@ -238,7 +244,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
     values.types = ""
     if glue:
-        types = runtime.chain_types("\n".join(glue.states.values()))
+        types = runtime.chain_types("\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         own = runtime.needed(types, sorted(runtime.used(pieces)))
         tables = [piece for piece in own if piece not in states]
@@ -307,7 +313,7 @@ def _limits(values: SimpleNamespace) -> list[str]:
 
 def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
     """Macros of a model with effects about time."""
-    kind = compiled.tables.threshold.dtype.type
+    kind = np.float64 if compiled.tables.fixed else compiled.tables.threshold.dtype.type
     late = compiled.needed - compiled.ahead
     ahead = "samples that the argument of step is ahead of the motion"
     if late > 0:
@@ -317,7 +323,21 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
+        *_settings(compiled),
     ]
+
+
+def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
+    """In fixed point, what a code is that sets a temperature or a gain."""
+    if not compiled.tables.fixed:
+        return []
+    bits = int(31 - compiled.tables.number[SHARE_BITS])
+    kept = TEMPERATURE_BITS[bits]
+    return [
+        *([("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")] if len(compiled.tables.gain) else []),
+        *([("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")]
+          if len(compiled.tables.ageing.turns) else []),
+    ]  # fmt: skip
 
 
 def _status(values: SimpleNamespace) -> list[str]:

@@ -16,7 +16,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.chain.bounds import chain_bounds
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.layout import LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
@@ -68,6 +68,8 @@ def chain_fields(
     parameters: Parameters, compiled: Compiled, options: Options, prefix: str
 ) -> dict[str, Any]:
     """The same of a model with effects, `glue` with its blocks."""
+    if compiled.tables.fixed:
+        return _fixed_chain_fields(parameters, compiled, options, prefix)
     name, tables = parameters.name, compiled.tables
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     behind = [
@@ -92,6 +94,46 @@ def chain_fields(
         "inverse_rounding_error": operand(float_tables.upward(bounds.rounding, dtype)) if options.inverse else "",
         "glue": glue,
     }
+
+
+def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Options, prefix: str) -> dict[str, Any]:
+    name, tables, codes = parameters.name, compiled.tables, compiled.codes
+    plays = tables.plays
+    assert isinstance(plays, FixedTables) and codes is not None  # noqa: PT018
+    behind = [chain.saturation(tables, j, name, name) for j in range(len(tables.behind.kind))]
+    operators = [op for op in ("forward", "inverse") if getattr(options, op)]
+    glue = chain.glue(compiled, operators, name, behind)
+    curves, counts = _curves(plays, name, prefix, options) if plays.fronts else ([], [])
+    own = _loop_tables(_fixed_loop_pointers(plays, name, options), plays, name, prefix)
+    about = _limits(plays, [*_fixed_constants(plays), *counts, *glue.constants])
+    ends = zip(("drive_min", "drive_max", "output_min", "output_max"), tables.limits, strict=False)
+    return {
+        **about,
+        **{end: operand(value) for end, value in ends},
+        "numbers": tables,
+        "arrays": _fixed_loop_fields(plays, name, prefix, options),
+        "beside": [own, *curves, *glue.arrays, *glue.beside],
+        "stages": [],
+        "fronts": bool(plays.fronts),
+        "envelopes": any(isinstance(stage, TanhEnvelope) for stage in compiled.static.stages)
+        or any(one["kind"] == "bend" for one in behind),
+        "finer": False,
+        "saturates": True,
+        "drive_lsb": _physical(codes.drive_lsb),
+        "output_lsb": _physical(codes.output_lsb),
+        "forward_max_error": _decimal(codes.forward_error),
+        "inverse_max_error": _decimal(codes.inverse_error) if options.inverse else "",
+        "inverse_rounding_error": _decimal(codes.inverse_rounding) if options.inverse else "",
+        "precision": [
+            *_precision(
+                parameters, (codes.drive_lsb, codes.output_lsb), (codes.forward_error, codes.inverse_rounding),
+                " on the same branch" * plays.branches,
+            ),
+            f"Range: every signal behind the plays stays below 2^{codes.largest.bit_length()}, with "
+            f"{tables.number[LEVEL_BITS]} bits below an output code; states of effects below 2^62 (64 bits hold 2^63)",
+        ],
+        "glue": glue,
+    }  # fmt: skip
 
 
 def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
@@ -255,20 +297,10 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
     own = [] if corners else [_loop_tables(_fixed_loop_pointers(numbers, name, options), numbers, name, prefix)]
     curves, counts = _curves(numbers, name, prefix, options) if numbers.fronts else ([], [])
     fine = int(limits[slots.FINE])
-    units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
-    drive, output = (f" {unit}" if unit else "" for unit in units)
-    precision = [
-        f"Precision: a drive code is {float(form.drive_lsb):.6g}{drive}, an output code {float(form.output_lsb):.6g}"
-        f"{output}; against the exact model",
-        f"    forward within {form.forward_error:.4g} output codes = "
-        f"{form.forward_error * float(form.output_lsb):.4g}{output}",
-    ]
-    if form.inverse_rounding is not None:
-        precision.append(
-            f"    inverse within {form.inverse_rounding:.4g} drive codes = "
-            f"{form.inverse_rounding * float(form.drive_lsb):.4g}{drive}"
-            + (" on the same branch" if numbers.branches else "")
-        )
+    precision = _precision(
+        parameters, (form.drive_lsb, form.output_lsb), (form.forward_error, form.inverse_rounding),
+        " on the same branch" if numbers.branches else "",
+    )  # fmt: skip
     precision += [
         f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 bits hold "
         "2^63),",
@@ -291,6 +323,24 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
         "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
         "precision": precision,
     }
+
+
+def _precision(
+    parameters: Parameters, lsb: tuple[Any, Any], errors: tuple[float, float | None], branch: str
+) -> list[str]:
+    """What codes are, and how far answers are from the exact model."""
+    units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
+    drive, output = (f" {unit}" if unit else "" for unit in units)
+    drive_lsb, output_lsb = (float(x) for x in lsb)
+    forward, inverse = errors
+    found = [
+        f"Precision: a drive code is {drive_lsb:.6g}{drive}, an output code {output_lsb:.6g}{output}; against the exact "
+        "model",
+        f"    forward within {forward:.4g} output codes = {forward * output_lsb:.4g}{output}",
+    ]
+    if inverse is not None:
+        found.append(f"    inverse within {inverse:.4g} drive codes = {inverse * drive_lsb:.4g}{drive}{branch}")
+    return found
 
 
 def _fixed_constants(numbers: FixedTables) -> list[tuple[str, str, str]]:

@@ -29,8 +29,24 @@ FLOAT_KERNELS = (
     "loop_solve.c",
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
-CHAIN_BLOCKS = ("creep.c", "lag.c", "lag_exact.c", "ageing.c", "gain.c", "preview.c")
+CHAIN_BLOCKS = ("creep.c", "lag.c", "lag_exact.c", "ageing.c", "gain.c", "preview.c", "preview_float.c")
+FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
+FIXED_CHAIN_BLOCKS = (
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "preview.c",
+    "preview_fixed.c", "bend.c", "stops.c",
+)  # fmt: skip
 """What models with effects have of their own, also beside a shared run time."""
+
+SIGNALS = {
+    "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
+}  # fmt: skip
+"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes."""
+
+FINE = {
+    "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
+    "hystgen_clamp_fine": "hystgen_clamp_drive",
+}  # fmt: skip
+"""What is finer than a drive code there, and what it is elsewhere."""
 
 FIXED_KERNELS = (
     "over_slope.c",
@@ -43,9 +59,11 @@ FIXED_KERNELS = (
 
 @dataclass(frozen=True)
 class Family:
-    """How an arithmetic appears in C: which files of the run time and which types it has."""
+    """How an arithmetic appears in C: which files of the run time and which types it has; `chain`: in a model with
+    effects."""
 
     arithmetic: Arithmetic
+    chain: bool = False
 
     @property
     def bits(self) -> str:
@@ -74,6 +92,18 @@ class Family:
     def types(self) -> dict[str, str]:
         """Types of the run time beside `real_t`."""
         return {"play_t": "int32_t", "reach_t": self.arithmetic.reach, "sum_t": "int64_t"} if self.fixed else {}
+
+    @property
+    def signals(self) -> dict[str, str]:
+        """What code that models with and without effects share names, and what that is here."""
+        if self.chain and self.fixed:
+            return SIGNALS
+        return dict.fromkeys(SIGNALS, "hystgen_real_t") | FINE
+
+    @property
+    def chain_types(self) -> tuple[str, ...]:
+        """The headers with the types of effects."""
+        return FIXED_CHAIN_TYPES if self.fixed else CHAIN_TYPES
 
     @property
     def includes(self) -> tuple[str, ...]:
@@ -165,7 +195,9 @@ class Variant:
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators."""
         files = ["clamp.c"]
-        if self.fixed:
+        if self.fixed and self.chain:
+            files.append("clamp_fine.c")
+        elif self.fixed:
             files.append("code_saturating.c" if self.saturates else "code.c")
         if self.fronts:
             if self.fixed:
@@ -182,8 +214,9 @@ class Variant:
         if self.chain:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
             moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
-            plays = ("chain_plays.c",) if not self.moves else moving if self.bends else ("chain_relaxing.c",)
-            return (start, f"loop_{front}.c", slew, *plays, "chain.c", *more)
+            straight = "chain_plays_fixed.c" if self.fixed else "chain_plays.c"
+            plays = (straight,) if not self.moves else moving if self.bends else ("chain_relaxing.c",)
+            return (start, f"loop_{front}.c", slew, *plays, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",
@@ -284,14 +317,14 @@ def operator_pieces(
     variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({})
 ) -> list[Piece]:
     """The functions of a model's operators, with those that `glue` defines for it; `calls` as for `api`."""
-    blocks = CHAIN_BLOCKS if variant.chain else ()
+    blocks = (FIXED_CHAIN_BLOCKS if variant.fixed else CHAIN_BLOCKS) if variant.chain else ()
     wanted = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
     return needed([*_pieces(blocks), *split_pieces(glue), *_pieces(variant.sources())], wanted)
 
 
-def chain_types(glue: str) -> list[Piece]:
+def chain_types(glue: str, family: Family) -> list[Piece]:
     """The types of blocks and of instances of models with effects, those before these."""
-    return [*_pieces(CHAIN_TYPES), *split_pieces(glue)]
+    return [*_pieces(family.chain_types), *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
@@ -377,6 +410,11 @@ def _own(family: Family) -> frozenset[str]:
 
 def _named(text: str, prefix: str, family: Family, name: str) -> str:
     """The text with the names of a model and of its run time."""
+    for shared, here in family.signals.items():
+        cast = f"({shared})"
+        if here == "hystgen_real_t":
+            text = text.replace(cast, "")
+        text = re.sub(rf"\b{shared}\b", here, text)
     if not family.fixed:  # one type for everything
         text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)

@@ -26,7 +26,7 @@ import numpy as np
 
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hystgen.compensator import engines
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.plays import slots
 
 PARTS = (
@@ -23,7 +23,7 @@ for all plays that a search finds."""
 def parts(t: ChainTables) -> list[str]:
     """The parts that a model has; two blocks of one kind share their code."""
     exact = [bool(each) for each in t.lag.exact]
-    kinds = [int(kind) for kind in t.behind.stage_kind]
+    kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter({
         "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
         "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew,
