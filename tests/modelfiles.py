@@ -94,3 +94,6 @@ CHAINS = {
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
 INVERSE_ALONE = ("straight", "viscous_twin", "late", "everything")
+
+PLAYS_AFFECTED = ("viscous", "relaxing", "dilated", "bumpy", "viscous_twin")
+"""Those of which an effect moves or bends the plays, which fixed point does not have."""

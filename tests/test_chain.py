@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, INVERSE_ALONE, chain
+from modelfiles import CHAINS, INVERSE_ALONE, PLAYS_AFFECTED, chain
 
 import hystgen
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
@@ -34,6 +34,17 @@ def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
 
 
+FIXED = [name for name in CHAINS if name not in PLAYS_AFFECTED]
+EVERY = [(name, arithmetic) for name in CHAINS for arithmetic in ("float32", "float64")] + [
+    (name, arithmetic) for name in FIXED for arithmetic in ("q31", "q15")
+]
+
+
+def noisy(name: str) -> Model:
+    """A model of which fixed point may make any noise."""
+    return with_options(name, noise_gain=1e9)
+
+
 def operator(name: str) -> str:
     return "inverse" if name in INVERSE_ALONE else "both"
 
@@ -53,20 +64,23 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
     return Run(np.arange(n) * T, np.clip(np.float32(u).astype(float), low, high), {"temperature": 20.0 + u})
 
 
-@pytest.mark.parametrize("name", CHAINS)
-@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize(("name", "arithmetic"), EVERY)
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
-    report = hystgen.verify(model(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["everything", "viscous", "aged"])
-def test_cores_give_the_same_bits(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [("everything", "float32"), ("viscous", "float32"), ("aged", "float32"), ("everything", "q31"),
+     ("everything", "q15"), ("worn", "q15"), ("quick", "q15")],
+)  # fmt: skip
+def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]
     known = [core for core in cores if core in hystgen.verification.targets.NAMES]
-    report = hystgen.verify(model(name), operator=operator(name), targets=known, target_length=150)
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), targets=known, target_length=150)
     assert report.ok, report.table()
 
 
@@ -307,12 +321,12 @@ def test_only_what_the_model_has_is_emitted() -> None:
     assert {"travel", "set_travel", "set_gain"} <= calls
 
 
-@pytest.mark.parametrize("name", CHAINS)
-def test_memory_in_the_banner_is_that_of_the_compiler(name: str, tmp_path: Path) -> None:
-    one = model(name)
-    options = emit_options(one, operator=operator(name))
+@pytest.mark.parametrize(("name", "arithmetic"), [pair for pair in EVERY if pair[1] != "float64"])
+def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
+    one = noisy(name)
+    options = emit_options(one, operator(name), arithmetic)
     cost = module.cost_of(one.parameters, one.cascade, options)
-    hystgen.emit(one, tmp_path, operator=operator(name))
+    hystgen.emit(one, tmp_path, operator=operator(name), arithmetic=arithmetic)
     sizes = "".join(f'    printf("%u ", (unsigned)sizeof({name}_{op}_t));\n' for op, _ in cost.memory.instances)
     main = f"int main(void)\n{{\n{sizes}    return 0;\n}}\n"
     (tmp_path / "size.c").write_text(f'#include "{name}.h"\n#include <stdio.h>\n{main}')
@@ -345,12 +359,20 @@ def test_what_has_no_inverse_is_refused_or_left_out_and_named(effect: str, reaso
     assert "part_creep" in emitted_files(one, allow_partial=True)["part.c"], "what there is stays"
 
 
-def test_needs_a_sample_time_and_floating_point(tmp_path: Path) -> None:
+def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
-    with pytest.raises(UnsupportedEffectsError, match="not in q15"):
-        emit_options(model("creeping"), arithmetic="q15")
+    for name in PLAYS_AFFECTED:
+        with pytest.raises(UnsupportedEffectsError, match="no C in q15 for plays that an effect moves or bends"):
+            emit_options(model(name), arithmetic="q15", operator="inverse")
+    assert emit_options(model("viscous"), arithmetic="q31", allow_partial=True).left_out
+    with pytest.raises(UnsupportedEffectsError, match=r"one of the 62010 codes .* moves the drive by 5.3 % of its range"):
+        emit_options(model("straight"), arithmetic="q15")
+    with pytest.raises(FormatError, match="slew_limit: 0.819 drive codes a sample are less than one"):
+        compiled(model("slow", chain("slow", "name: slew_limit, rate: 0.1")), "q15")
+    with pytest.raises(FormatError, match="a lag: its states and constants do not fit q31"):
+        compiled(model("slow", chain("slow", "name: lag, time_constant: 1.0e9")), "q31")
     with pytest.raises(UnsupportedEffectsError, match="only the inverse has it"):
         emit_options(model("late"), operator="both")
     with pytest.raises(FormatError, match="too large for float32"):
