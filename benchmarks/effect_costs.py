@@ -32,7 +32,8 @@ from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("polynomial", "centre")
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FLOATS = ("float32", "float64")
+FLOAT_ALONE = ("dilated", "polynomial", "centre")
+"""Plays that fixed point does not have."""
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
     "weights: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]",
@@ -94,11 +95,12 @@ def main() -> None:
     cores = given.cores.split(",")
     sizes, costs = [], []
     with tempfile.TemporaryDirectory(prefix="hystgen-effects-") as place:
-        for arithmetic in FLOATS:
+        for arithmetic, about in ARITHMETICS.items():
             base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
             least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
-            moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
-            for effect in ("any", *EFFECTS):
+            if not about.fixed:
+                moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
+            for effect in ("any", *(each for each in EFFECTS if not (about.fixed and each in FLOAT_ALONE))):
                 folder = Path(place) / f"{effect}-{arithmetic}"
                 code, counts = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores)
                 before = base if effect == "any" else moved if effect in MOVED else least

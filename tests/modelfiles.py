@@ -95,5 +95,5 @@ CHAINS = {
 
 INVERSE_ALONE = ("straight", "viscous_twin", "late", "everything")
 
-PLAYS_AFFECTED = ("viscous", "relaxing", "dilated", "bumpy", "viscous_twin")
-"""Those of which an effect moves or bends the plays, which fixed point does not have."""
+FLOAT_ALONE = ("viscous", "dilated", "bumpy", "viscous_twin")
+"""Those whose plays are bent, or do not all relax with one time constant, which fixed point does not have."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, INVERSE_ALONE, PLAYS_AFFECTED, chain
+from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
 
 import hystgen
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
@@ -34,7 +34,7 @@ def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
 
 
-FIXED = [name for name in CHAINS if name not in PLAYS_AFFECTED]
+FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
 EVERY = [(name, arithmetic) for name in CHAINS for arithmetic in ("float32", "float64")] + [
     (name, arithmetic) for name in FIXED for arithmetic in ("q31", "q15")
 ]
@@ -363,8 +363,8 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
-    for name in PLAYS_AFFECTED:
-        with pytest.raises(UnsupportedEffectsError, match="no C in q15 for plays that an effect moves or bends"):
+    for name in FLOAT_ALONE:
+        with pytest.raises(UnsupportedEffectsError, match="in fixed point there is no C for plays that"):
             emit_options(model(name), arithmetic="q15", operator="inverse")
     assert emit_options(model("viscous"), arithmetic="q31", allow_partial=True).left_out
     with pytest.raises(UnsupportedEffectsError, match=r"one of the 62010 codes .* moves the drive by 5.3 % of its range"):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, INVERSE_ALONE, PLAYS_AFFECTED, chain
+from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
@@ -31,7 +31,7 @@ from hystgen.plays import slots
 from hystgen.verification import sources
 
 T, N = 1e-3, 1500
-FIXED = [name for name in CHAINS if name not in PLAYS_AFFECTED]
+FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
 BOTH = pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 
 
@@ -76,7 +76,7 @@ def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, R
     return Run(t, u, {"temperature": warm}), Run(t, y, {"temperature": warm / degree})
 
 
-BRANCHED = ("lagging", "aged", "everything")
+BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
 

@@ -87,6 +87,17 @@ def nearest(x: Fraction | float) -> int:
     return whole if x >= 0 else -whole
 
 
+def reciprocal(slope: int) -> tuple[int, int]:
+    """`2^(32 + shift)/slope`, and the shift; of the slope 0 that nothing has, 0."""
+    if slope <= 0:
+        return 0, 1
+    shift = slope.bit_length() + 30
+    found = nearest(Fraction(2**shift, slope))
+    if found > TABLE_MAX:
+        shift, found = shift - 1, nearest(Fraction(2 ** (shift - 1), slope))
+    return found, shift - 32
+
+
 def lsbs(
     cascade: StaticModel,
     arithmetic: str,
@@ -377,18 +388,7 @@ class Builder:
             raise FormatError((("model", "pi", "weights", 0), message + "; use a finer arithmetic"))
         self.slope_errors = [abs(Fraction(k, 2**bits) - s) for k, s in zip(slope, sums, strict=True)]
         self.offset_error = abs(Fraction(self.offset, 2**bits) - offset)
-        self.reciprocal, self.shift = [0], [1]
-        for k in slope[1:]:
-            if k <= 0:
-                self.reciprocal.append(0)
-                self.shift.append(1)
-                continue
-            shift = k.bit_length() + 30
-            r = nearest(Fraction(2**shift, k))
-            if r > TABLE_MAX:
-                shift, r = shift - 1, nearest(Fraction(2 ** (shift - 1), k))
-            self.reciprocal.append(r)
-            self.shift.append(shift - 32)
+        self.reciprocal, self.shift = map(list, zip(*map(reciprocal, slope), strict=True))
 
     # ------------------------------------------------------------ results
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.moving import MovingTables
+from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.compensator.chain.layout import (
     LARGEST_LEVEL,
     LEAST_CODE,
@@ -192,7 +192,7 @@ def plays(t: ChainTables) -> tuple[str, str]:
 def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends."""
     real_t = f"{prefix}_real_t"
-    arrays = []
+    arrays: list[str] = []
     if t.scanned:
         members = [("share", list(t.share)), ("inverse", list(t.inverse))]
         numbers = [("LATE", operand(t.first[1]), "of a stretch, what a play gains at the end of a step"),
@@ -217,6 +217,17 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
     counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search")]
     return arrays, [*constants, *counts]
+
+
+def _relaxing(t: FixedMovingTables, prefix: str) -> list[str]:
+    """Tables of viscous plays in fixed point."""
+    return [
+        *(f"static const {prefix}_factor_t {prefix}_relaxing_{name} = {{{_factors(row, 1)[1:-1]}}};\n"
+          for name, row in (("late", t.late), ("kept", t.kept))),
+        table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
+        table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
+        table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -263,7 +274,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
-    if t.moving.used:
+    if isinstance(t.moving, FixedMovingTables):
+        arrays += _relaxing(t.moving, prefix) if t.moving.used else []
+    elif t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned

@@ -104,7 +104,11 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     glue = chain.glue(compiled, operators, name, behind)
     curves, counts = _curves(plays, name, prefix, options) if plays.fronts else ([], [])
-    own = _loop_tables(_fixed_loop_pointers(plays, name, options), plays, name, prefix)
+    pointers = _fixed_loop_pointers(plays, name, options)
+    own = [_loop_tables(pointers, plays, name, prefix)]
+    if tables.moving.used:
+        others = [f"{name}_relaxing_{part}" for part in ("slope", "reciprocal", "shift")]
+        own.append(_loop_tables([*pointers[:2], *others, *pointers[5:]], plays, name, prefix, "relaxing"))
     about = _limits(plays, [*_fixed_constants(plays), *counts, *glue.constants])
     ends = zip(("drive_min", "drive_max", "output_min", "output_max"), tables.limits, strict=False)
     return {
@@ -112,7 +116,7 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
         **{end: operand(value) for end, value in ends},
         "numbers": tables,
         "arrays": _fixed_loop_fields(plays, name, prefix, options),
-        "beside": [own, *curves, *glue.arrays, *glue.beside],
+        "beside": [*curves, *glue.arrays, *own, *glue.beside],
         "stages": [],
         "fronts": bool(plays.fronts),
         "envelopes": any(isinstance(stage, TanhEnvelope) for stage in compiled.static.stages)
@@ -186,10 +190,12 @@ def _loop_pointers(name: str, options: Options) -> list[str]:
     return [places.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
 
 
-def _loop_tables(pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str) -> str:
+def _loop_tables(
+    pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str, whose: str = "model"
+) -> str:
     """What points to the tables of engine loop."""
     entries = _lines([*pointers, str(len(numbers.threshold) - 1)])
-    return constant(f"{prefix}_tables_t {name}_model_tables", entries.splitlines())
+    return constant(f"{prefix}_tables_t {name}_{whose}_tables", entries.splitlines())
 
 
 def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> list[str]:

@@ -214,8 +214,9 @@ class Variant:
         if self.chain:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
             moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
-            straight = "chain_plays_fixed.c" if self.fixed else "chain_plays.c"
-            plays = (straight,) if not self.moves else moving if self.bends else ("chain_relaxing.c",)
+            ending = "_fixed" * self.fixed
+            plays = (f"chain_plays{ending}.c",) if not self.moves else (f"chain_relaxing{ending}.c",)
+            plays = moving if self.bends else plays
             return (start, f"loop_{front}.c", slew, *plays, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,

@@ -211,11 +211,23 @@ class Bounds:
         finer = bool(self.static.stages) or self.inner.fine > 0
         return here, code * finer
 
+    def _viscous(self) -> float:
+        """What roundings, and contacts inside a step, make of the sum of viscous plays, in output codes."""
+        t = self.tables.moving
+        if not t.used:
+            return 0.0
+        late, kept = (float(row[0]) / 2.0 ** int(row[1]) for row in (t.late, t.kept))
+        low, high = self.inner.hull
+        wrong = 2.0 * float(high - low) * (2.0**-30 * (late + kept))
+        play = (1.0 + wrong) / min(late, 1.0) * float(self.inner.step) + 0.25 * self.largest_step
+        slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * float(high - low)
+        return math.fsum(self.static.pi.weights[1:]) * play / float(self.inner.output_lsb) + slopes
+
     def _plays(self, arriving: float) -> float:
         """Error of the sum of the plays for one of what arrives in front of the memoryless part, in output codes."""
         steep = self.static.front_slopes[1] * self.static.pi.slopes[-1] / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
-        return float(self.inner.sum_error()) + steep * arriving * self._arriving + level
+        return float(self.inner.sum_error()) + self._viscous() + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
         """In output codes."""
@@ -257,7 +269,13 @@ class Bounds:
         solved += steep * (sum(code) + short)
         outer = self.static.pi.slopes[-1]
         residual = (self._asked() + self._plays(0.0)) * float(self.inner.output_lsb) + outer * solved * self._arriving
-        return float(self.inner.gain()) * residual / self._arriving
+        return self._gain() * residual / self._arriving
+
+    def _gain(self) -> float:
+        """Largest change of the drive in front of the memoryless part for one of the plays' sum."""
+        if self.tables.moving.used:  # as in floating point: each play is stretched further than it would be
+            return 2.0 / self.static.pi.weights[0] / self.static.front_slopes[0]
+        return float(self.inner.gain())
 
     def _led(self, error: float) -> float:
         """The error of the drive in signals, for one of what is in front of the plays."""
@@ -296,5 +314,5 @@ class Bounds:
         if not self.static.branches_differ:
             return self.rounding()
         gap = self.static.branch_gap
-        other = float(self.inner.gain()) * self.static.pi.slopes[-1] * gap + gap / self.static.front_slopes[0]
+        other = self._gain() * self.static.pi.slopes[-1] * gap + gap / self.static.front_slopes[0]
         return self._codes(self._arriving_error() + 1.001 * other / self._arriving)

@@ -74,7 +74,7 @@ STEEP = 4.0
 def build(
     chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
 ) -> Compiled:
-    """The model in 'q31' or 'q15' at steps of `seconds`, which has no effect on the plays.
+    """The model in 'q31' or 'q15' at steps of `seconds`, whose effects on plays have no `moving.beyond_fixed`.
 
     Raises FormatError when a given LSB does not fit the type, or a signal or a constant the arithmetic.
     """
@@ -117,7 +117,7 @@ class _Builder:
         tables = ChainTables(
             plays,
             limits,
-            moving.build(static, [], self.seconds, np.float64),
+            self._need(lambda: moving.build_fixed(plays, static, self.parts.plays, self.seconds), "rate_dependence"),
             self._need(self._lags, "a lag"),
             self._need(self._creep_tables, "creep"),
             self._need(lambda: self._ageing(span), "ageing"),

@@ -13,7 +13,7 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import preview
-from hystgen.compensator.chain.moving import MovingTables
+from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.compensator.chain.preview import Taps
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.ageing.compensator import AgeingTables
@@ -65,7 +65,7 @@ class ChainTables(NamedTuple):
 
     plays: Tables | FixedTables
     limits: Reals
-    moving: MovingTables
+    moving: MovingTables | FixedMovingTables
     lag: LagTables
     creep: CreepTables
     ageing: AgeingTables

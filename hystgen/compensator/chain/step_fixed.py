@@ -20,8 +20,9 @@ from hystgen.compensator.chain.layout import (
     TRAVEL_BITS,
     ChainTables,
 )
+from hystgen.compensator.chain.moving import fixed_relaxing_follow
 from hystgen.compensator.chain.preview import Line
-from hystgen.compensator.chain.step import Blocks, ChainState, Codes
+from hystgen.compensator.chain.step import MOVING, Blocks, ChainState, Codes
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects.ageing.fixed import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
 from hystgen.effects.creep.fixed import creep_absorb, creep_rest, creep_resting, creep_solve
@@ -50,7 +51,7 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
     return w, 0
 
 
-# ---------------------------------------------------------------- chain_plays_fixed.c
+# ---------------------------------------------------------------- chain_plays_fixed.c or chain_relaxing_fixed.c
 
 
 @jit
@@ -62,6 +63,9 @@ def started(t: ChainTables, s: ChainState) -> Any:
 @jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
     """The plays follow their input w; their sum."""
+    if t.moving.scanned and s.flags[MOVING]:
+        total = fixed_relaxing_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
+        return nearest(total, t.number[LEVEL_DROP])
     loop_absorb(t.plays, s.plays, w)
     return started(t, s)
 
@@ -74,6 +78,9 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
         inside = t.number[LARGEST_LEVEL]
     elif inside < -t.number[LARGEST_LEVEL]:
         inside = -t.number[LARGEST_LEVEL]
+    if t.moving.scanned and s.flags[MOVING]:
+        s.plays.play[0] = s.plays.play[1]
+        return loop_solve(t.moving.relaxed, s.plays, inside << t.number[LEVEL_DROP])
     return loop_solve(t.plays, s.plays, inside << t.number[LEVEL_DROP])
 
 

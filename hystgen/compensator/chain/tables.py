@@ -44,8 +44,6 @@ def refusals(chain: Chain, operator: str, seconds: float, arithmetic: str) -> It
             yield effect, "a clock that runs alone, and nothing says when it began; set_offset takes it from outside"
         elif effect.name == "thermal" and not effect.columns:
             yield effect, "the drive's own heat, open loop: its temperature drifts with the room's; measure it"
-        elif effect in parts.plays and ARITHMETICS[arithmetic].fixed:
-            yield effect, f"there is no C in {arithmetic} for plays that an effect moves or bends; use float32"
         elif effect.name.startswith(USER):
             yield effect, "an effect of your own, which has no compensator"
         elif effect in parts.ageing[1:]:
@@ -54,4 +52,7 @@ def refusals(chain: Chain, operator: str, seconds: float, arithmetic: str) -> It
             yield from ((effect, reason) for reason in ageing.problems(effect, high - low))
     if operator != "inverse":
         yield from moving.beyond_forward(chain.cascade, parts.plays, seconds)
-    yield from moving.problems(chain.cascade, parts.plays)
+    without = list(moving.problems(chain.cascade, parts.plays))
+    yield from without
+    if ARITHMETICS[arithmetic].fixed and not without:
+        yield from moving.beyond_fixed(chain.cascade, parts.plays, seconds)
