@@ -78,6 +78,10 @@ CHAINS = {
     "worn": chain("worn", "name: ageing, shape: exponentials, losses: [0.02, 0.03], travels: [10, 200]", CREEP),
     "viscous": chain("viscous", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
                      "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]"),
+    "dashpot": chain("dashpot", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2.5"),
+    "soft_dashpot": chain("soft_dashpot", "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, "
+                          "exponent: 0.5", "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
+                          CREEP, front=TANH),
     "relaxing": chain("relaxing", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", front=BRANCHES),
     "dilated": chain("dilated", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
@@ -95,5 +99,6 @@ CHAINS = {
 
 INVERSE_ALONE = ("straight", "viscous_twin", "late", "everything")
 
-FLOAT_ALONE = ("viscous", "dilated", "bumpy", "viscous_twin")
-"""Those whose plays are bent, or do not all relax with one time constant, which fixed point does not have."""
+FLOAT_ALONE = ("viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot")
+"""Those whose plays are bent, have a nonlinear dashpot or do not all relax with one time constant, which fixed point
+does not have."""

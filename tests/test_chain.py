@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
+from scipy.integrate import solve_ivp
 
 import hystgen
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
@@ -20,6 +21,8 @@ from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -85,14 +88,16 @@ def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
 
 
 EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy"), 1e-12) | {
-    "viscous": 2e-4, "relaxing": 2e-4,
+    "viscous": 2e-4, "relaxing": 2e-4, "dashpot": 1e-4, "soft_dashpot": 2e-3,
 }  # fmt: skip
+"""Of the output range. Viscous plays: contacts inside a step. Dashpots: where on its way in a step an input counts as
+standing still, which matters where plays catch up within one."""
 
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: int) -> None:
-    """Of the output range at every sample that no limit acts on; viscous plays but for contacts inside a step."""
+    """At every sample that no limit acts on."""
     one = model(name)
     numbers = compiled(one, "float64")
     run = record(numbers, seed, share=0.6)
@@ -154,6 +159,42 @@ def test_slow_states_neither_stall_nor_drift() -> None:
     h = one.without(one.effects).simulate(v) - one.cascade.output_offset
     moved = 0.1 * float(h[-1] - h[0]) * state
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 0.02 * abs(moved) + 2 * float(np.spacing(np.float32(y[-1])))
+
+
+def test_a_play_with_a_dashpot_creeps_on_to_where_it_would_go_without_rounding() -> None:
+    """In single precision its last moves are 1e-4 of its last bit: the drive stands still for 1e6 samples."""
+    one = model("dashpot")
+    n = 1_000_000
+    calls = np.full(n, slots.OP_STEP, dtype=np.uint8)
+    v = np.full(n, 3.0)
+    v[:100] = np.linspace(-3.0, 3.0, 100)
+    y, _ = reference.answers(compiled(one, "float32").tables, False, calls, v)
+    t = np.append(np.arange(100) * T, (n - 1) * T)
+    wanted = one.simulate(np.append(v[:100], 3.0), t=t)
+    crept = float(wanted[-1] - wanted[-2])
+    assert crept > 0.1
+    assert abs(float(y[-1]) - float(wanted[-1])) <= 1e-3 * crept
+    assert abs(float(y[-1]) - float(y[n // 2])) > 10.0 * float(np.spacing(y[-1]))
+
+
+@pytest.mark.parametrize("exponent", [0.1, 0.25, 0.5, 0.95, 1.05, 2.0, 4.0, 10.0])
+@pytest.mark.parametrize("tau", [1e-4, 3e-3, 0.2])
+def test_what_a_dashpot_yields_in_a_step(exponent: float, tau: float) -> None:
+    """Against an integrator that does not know the solution; few pieces, which meet and rise."""
+    scale, top = 3.0, 30.0
+    effect = RelaxingPlays(name="rate_dependence", shape="relaxation", time_constant=tau, exponent=exponent)
+    rows = dashpot.pieces(effect, scale, T, top)
+    assert len(rows) <= 64
+    assert np.all(np.diff(rows[:, dashpot.BEGIN]) > 0.0)
+
+    def law(_: float, e: Any) -> Any:
+        return -scale / tau * (np.maximum(e, 0.0) / scale) ** exponent
+
+    for x in np.geomspace(1e-3, top, 23):
+        left = solve_ivp(law, (0.0, T), [x], method="LSODA", rtol=1e-10, atol=1e-12 * scale).y[0, -1]
+        begin, *c = rows[np.searchsorted(rows[:, dashpot.BEGIN], x, side="right") - 1]
+        yields = np.polynomial.polynomial.polyval(x - begin, c)
+        assert yields == pytest.approx(x - max(left, 0.0), rel=1.1 * dashpot.YIELD_ERROR, abs=1e-9)
 
 
 def run_calls(one: Model, calls: list[tuple[int, float]], arithmetic: str = "float64") -> tuple[Any, Any]:
@@ -338,7 +379,6 @@ def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str
 REFUSED = {
     "name: drift, rate: 0.1": "a clock that runs alone",
     "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001": "own heat",
-    "name: rate_dependence, shape: relaxation, time_constant: 0.01, exponent: 2": "exponent other than 1",
     "name: noncongruent, coefficients: [[9], [9], [9], [9], [9], [9]]": "there is no inverse",
 }
 

@@ -174,7 +174,7 @@ def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]
     return {"kind": "bend", "arrays": arrays, "table": f"&hystgen_behind_{j + 1}", "limited": ", limited"}
 
 
-MOVES = ("play", "dilated", "relaxing")
+MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
 """Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
 
@@ -202,6 +202,10 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         arrays.append(table(real_t, f"{prefix}_wider", list(t.first)))
     if t.moves == moving.RELAXING:
         arrays += [table(real_t, f"{prefix}_late", list(t.first)), table(real_t, f"{prefix}_kept", list(t.second))]
+    if t.moves == moving.DASHPOT:
+        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.yields)
+        n, terms = t.yields.shape
+        arrays.append(f"static const {real_t} {prefix}_yields[{n}][{terms}] = {{\n{rows},\n}};\n")
     if t.bends == moving.POLYNOMIAL:
         n, terms = t.curve.shape
         rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.curve)
@@ -213,9 +217,11 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
         ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
         ("LARGEST_INPUT", moving.LARGEST_INPUT, ""), ("HALF", moving.HALF, ""),
+        ("SEEN", moving.SEEN, "share of a step's way at which the input counts as standing still"),
     )  # fmt: skip
     constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
-    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search")]
+    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search"),
+              ("YIELDS", f"{len(t.yields)}u", "pieces of what a dashpot yields")]  # fmt: skip
     return arrays, [*constants, *counts]
 
 
@@ -281,7 +287,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
     blocks, n = [*before, *after], len(t.threshold) - 1
-    fields = {op: instance(op, blocks, len(t.tap), n, searched) for op in operators}
+    kept = n * (t.moving.moves == moving.DASHPOT)
+    fields = {op: instance(op, blocks, len(t.tap), n, kept, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
@@ -304,7 +311,11 @@ def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
     ]
 
 
-def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, moving: bool) -> list[Field]:
+_PLAYS = "play 0 is the input of the plays"
+_KEPT = "; behind them what each has lost"
+
+
+def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse = op == "inverse"
     return [
@@ -323,7 +334,7 @@ def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, moving: bo
         *([Field("flag", "filled", "there are references"), Field("status", "bits", "of the last step")] if inverse
           else []),
         Field("status", "status"),
-        Field("play", "play", "play 0 is the input of the plays", plays + 1),
+        Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept),
         *([Field("real", "bent", "what each contributes", plays + 1)] if moving else []),
     ]  # fmt: skip
 

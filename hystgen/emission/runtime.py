@@ -213,7 +213,8 @@ class Variant:
         start = "loop_start_list.c" if self.start_list else "loop_start.c"
         if self.chain:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
-            moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
+            kept = () if self.moves == "dashpot" else ("moved_kept.c",)
+            moving = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
             ending = "_fixed" * self.fixed
             plays = (f"chain_plays{ending}.c",) if not self.moves else (f"chain_relaxing{ending}.c",)
             plays = moving if self.bends else plays

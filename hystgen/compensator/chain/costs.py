@@ -14,7 +14,7 @@ from hystgen.plays import slots
 
 PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "gain", "preview", "slew", "tanh", "dead_zone", "relaxing", "dilated",
-    "polynomial", "centre",
+    "dashpot", "polynomial", "centre",
 )  # fmt: skip
 """What is counted: `any` once for a model with effects, the others for each kind of block that there is; `dilated`
 for all plays that a search finds."""
@@ -29,6 +29,7 @@ def parts(t: ChainTables) -> list[str]:
         "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
+        "dashpot": t.moving.moves == moving.DASHPOT,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
     return ["any", *(part for part in PARTS[1:] if found[part])]

@@ -117,10 +117,11 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
     most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
     reals([most], "intermediate results")
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
+    max_rate = how.max_rate or drive_span / (SAMPLES_A_SWEEP * seconds)
     tables = ChainTables(
         plays,
         plays.limits,
-        moving.build(static, parts.plays, seconds, dtype),
+        moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
         LagTables(
             np.array([int(exact) for exact, _ in lags], dtype=np.int64),
             reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
@@ -137,5 +138,4 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),
     )
-    max_rate = how.max_rate or drive_span / (SAMPLES_A_SWEEP * seconds)
     return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview)

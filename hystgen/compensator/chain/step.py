@@ -74,7 +74,8 @@ class ChainState(NamedTuple):
     `flags`: whether any drive has been applied yet."""
 
     plays: State
-    bent: Reals  # (n + 1,), what each play contributes, where an effect moves or bends them
+    lost: Reals  # (n + 1,), what each play has lost below its last bit, where a nonlinear dashpot moves them
+    bent: Reals  # (n + 1,), what each contributes, where an effect moves or bends them
     lag: Reals  # (k, 5)
     creep: CreepState
     ageing: AgeingState
@@ -89,6 +90,7 @@ def new_state(t: ChainTables) -> ChainState:
     dtype = t.threshold.dtype
     return ChainState(
         loop.new_state(t.plays),
+        np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
         np.zeros((len(t.lag.block), 5), dtype),
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),

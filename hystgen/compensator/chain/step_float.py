@@ -41,8 +41,8 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
         loop_absorb(t.plays, s.plays, w)
         return loop_output(t.plays, s.plays)
     if s.flags[MOVING]:
-        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
+        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
 
 
 @jit
@@ -51,7 +51,7 @@ def started(t: ChainTables, s: ChainState) -> Any:
     if t.moving.scanned or (t.moving.moves == PLAIN and t.moving.bends == STRAIGHT):
         return loop_output(t.plays, s.plays)
     r, p = t.plays.threshold, t.plays.weight
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.plays.play[0])
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.plays.play[0])
 
 
 @jit
@@ -64,7 +64,7 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
         if s.flags[MOVING]:
             return relaxing_input(t.moving, r, p, s.plays, h)
         return loop_solve(t.plays, s.plays, h)
-    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.flags[MOVING] != 0, h)
+    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.flags[MOVING] != 0, h)
 
 
 # ---------------------------------------------------------------- chain_float.c
