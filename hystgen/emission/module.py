@@ -333,11 +333,10 @@ def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
         return []
     bits = int(31 - compiled.tables.number[SHARE_BITS])
     kept = TEMPERATURE_BITS[bits]
-    return [
-        *([("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")] if len(compiled.tables.gain) else []),
-        *([("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")]
-          if len(compiled.tables.ageing.turns) else []),
-    ]  # fmt: skip
+    degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
+    gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
+    t = compiled.tables
+    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
 
 
 def _status(values: SimpleNamespace) -> list[str]:

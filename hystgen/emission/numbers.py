@@ -340,8 +340,8 @@ def _precision(
     drive_lsb, output_lsb = (float(x) for x in lsb)
     forward, inverse = errors
     found = [
-        f"Precision: a drive code is {drive_lsb:.6g}{drive}, an output code {output_lsb:.6g}{output}; against the exact "
-        "model",
+        f"Precision: a drive code is {drive_lsb:.6g}{drive}, an output code {output_lsb:.6g}{output}; "
+        "against the exact model",
         f"    forward within {forward:.4g} output codes = {forward * output_lsb:.4g}{output}",
     ]
     if inverse is not None:

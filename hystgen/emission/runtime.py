@@ -215,8 +215,8 @@ class Variant:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
             moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
             ending = "_fixed" * self.fixed
-            plays = (f"chain_plays{ending}.c",) if not self.moves else (f"chain_relaxing{ending}.c",)
-            plays = moving if self.bends else plays
+            alone = "relaxing" if self.moves else "plays"
+            plays = moving if self.bends else (f"chain_{alone}{ending}.c",)
             return (start, f"loop_{front}.c", slew, *plays, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,

@@ -74,8 +74,9 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `bends`: there and back of each tanh; `slowed`: share of its rates that a slew limit loses in whole codes; `reached`:
-    whether all that is asked in front of the plays can be led to; `largest_step`: as in `Compiled`.
+    `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
+    whole codes; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
+    `Compiled`.
     """
 
     static: StaticModel
@@ -89,7 +90,7 @@ class Bounds:
     lags: list[tuple[bool, tuple[float, float, float, float]]]
     taps: list[float]
     bends: list[Bend]
-    ends: tuple[float, float]  # of the output
+    ends: tuple[float, float]
     slowed: float
     reached: bool
     largest_step: float
