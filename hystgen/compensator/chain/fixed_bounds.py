@@ -303,15 +303,19 @@ class Bounds:
             return 0
         return math.floor(2.0 * self._arriving_error())
 
+    @property
+    def limited(self) -> bool:
+        """Whether a limit of the drive in front of a lag leaves the inverse with no bound but the range."""
+        return bool(self.lags) and (not self.reached or bool(self.parts.slew))
+
     def rounding(self) -> float:
-        """Of the inverse, in drive codes, on the same branch and while no limit acts in front of a lag."""
+        """Of the inverse, in drive codes, on the same branch, and while no drive is limited where it is `limited`."""
         return self._codes(self._arriving_error())
 
     def inverse(self) -> float:
         """The same with what another branch and limits make."""
-        whole = float(self.inner.drive[1] - self.inner.drive[0])
-        if self.lags and (not self.reached or self.parts.slew):
-            return whole
+        if self.limited:
+            return float(self.inner.drive[1] - self.inner.drive[0])
         if not self.static.branches_differ:
             return self.rounding()
         gap = self.static.branch_gap
