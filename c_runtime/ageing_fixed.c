@@ -68,7 +68,7 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
         self->gain = hystgen_ageing_gain(t, self->high);
         for (i = 0; i < t->turns; ++i) {
             const int64_t product = (self->gain * inverse + half) >> HYSTGEN_GAIN_BITS;
-            const int64_t more = (int64_t)2 * HYSTGEN_GAIN_ONE - product;
+            const int64_t more = 2 * HYSTGEN_GAIN_ONE - product;
             inverse = (inverse * more + half) >> HYSTGEN_GAIN_BITS;
         }
         self->inverse = (int32_t)inverse;

@@ -10,8 +10,7 @@ static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limi
     if (inside != argument) {
         *limited = true;
     }
-    return hystgen_curve(c->knot, c->scale, c->coefficient, c->pieces, c->degree,
-                         (int32_t)inside) *
+    return hystgen_curve(c->knot, c->scale, c->coefficient, c->pieces, c->degree, (int32_t)inside) *
            ((int64_t)1 << c->lift);
 }
 

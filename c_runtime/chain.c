@@ -15,8 +15,8 @@
             true   every block has seen the sample before
    A step leaves its answer pending. The next step or settle takes it, or what was committed.
 
-   Between the blocks a signal has a type of its own; what codes are as signals says chain_float.c or
-   chain_fixed.c. */
+   Between the blocks a signal has a type of its own; what codes are as signals says chain_float.c
+   or chain_fixed.c. */
 
 /* An offset that is set, kept to what the displacement spans. */
 static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d)

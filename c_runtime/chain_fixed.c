@@ -1,6 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: signals in fixed point, which have bits below those of codes. */
+/* Operators of a model with effects: signals in fixed point, which have bits below those of codes.
+ */
 
 /* Every code is a number. */
 static inline bool hystgen_finite(hystgen_signal_t x)

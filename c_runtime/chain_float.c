@@ -1,6 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: signals in floating point, which are numbers of the same type. */
+/* Operators of a model with effects: signals in floating point, which are numbers of the same type.
+ */
 
 static bool hystgen_finite(hystgen_signal_t x)
 {

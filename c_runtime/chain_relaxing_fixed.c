@@ -1,8 +1,9 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: viscous plays with one time constant, in fixed point. A play is
-   kept as where it would come to rest (`play`); see chain_relaxing.c. A stretch gains less than half
-   a step of the plays' input where a play is within the time constant's samples of rest: it stays. */
+/* Operators of a model with effects: viscous plays with one time constant, in fixed point. A play
+   is kept as where it would come to rest (`play`); see chain_relaxing.c. A stretch gains less than
+   half a step of the plays' input where a play is within the time constant's samples of rest: it
+   stays. */
 
 /* A share of the part of x beyond +-r. */
 static int64_t hystgen_stretched(int64_t x, int32_t r, const hystgen_factor_t *share)

@@ -4,16 +4,16 @@
 
 /* Fraction bits of a gain, 1, and the limits of one that is set. */
 #define HYSTGEN_GAIN_BITS 29u
-#define HYSTGEN_GAIN_ONE ((int32_t)1 << HYSTGEN_GAIN_BITS)
+#define HYSTGEN_GAIN_ONE ((int64_t)1 << HYSTGEN_GAIN_BITS)
 #define HYSTGEN_GAIN_LEAST (HYSTGEN_GAIN_ONE / 2)
 #define HYSTGEN_GAIN_LARGEST (HYSTGEN_GAIN_ONE * 2)
 
 /* A gain within its limits. */
 static int32_t hystgen_gain_inside(int64_t gain)
 {
-    return gain < HYSTGEN_GAIN_LEAST     ? HYSTGEN_GAIN_LEAST
-           : gain > HYSTGEN_GAIN_LARGEST ? HYSTGEN_GAIN_LARGEST
-                                         : (int32_t)gain;
+    return (int32_t)(gain < HYSTGEN_GAIN_LEAST     ? HYSTGEN_GAIN_LEAST
+                     : gain > HYSTGEN_GAIN_LARGEST ? HYSTGEN_GAIN_LARGEST
+                                                   : gain);
 }
 
 /* 1 over a gain within its limits. */
@@ -31,8 +31,8 @@ static int64_t hystgen_gain_times(int64_t x, int32_t gain)
 
 static void hystgen_gain_init(hystgen_gain_t *self)
 {
-    self->gain = HYSTGEN_GAIN_ONE;
-    self->inverse = HYSTGEN_GAIN_ONE;
+    self->gain = (int32_t)HYSTGEN_GAIN_ONE;
+    self->inverse = (int32_t)HYSTGEN_GAIN_ONE;
     self->offset = 0;
 }
 

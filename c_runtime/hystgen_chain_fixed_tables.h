@@ -8,7 +8,8 @@ typedef struct {
     uint8_t shift;
 } hystgen_factor_t;
 
-/* A state of creep: what it will give at the next sample goes to weight times the input by its rate.
+/* A state of creep: what it will give at the next sample goes to weight times the input by its
+ * rate.
  */
 typedef struct {
     hystgen_factor_t rate;
@@ -61,7 +62,8 @@ typedef struct {
 /* A piece of the gain over travel, cubic in the share of its length. */
 typedef struct {
     int64_t begin;
-    hystgen_factor_t share; /* of the travel from there on, less the bits that the product leaves out */
+    hystgen_factor_t
+        share; /* of the travel from there on, less the bits that the product leaves out */
     uint8_t drop;
     int32_t c[4];
 } hystgen_ageing_piece_t;

@@ -123,8 +123,8 @@ class Model:
             low, high = (int(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
             if gain > MOST_A_CODE * (high - low):
                 raise UnsupportedEffectsError(
-                    f"with a noise gain of {gain:.4g} one of the {high - low} codes of a reference in {arithmetic} moves "
-                    f"the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
+                    f"with a noise gain of {gain:.4g} one of the {high - low} codes of a reference in {arithmetic} "
+                    f"moves the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
                     f"{ARITHMETICS[arithmetic].finer}, or allow it with emit.compensation.noise_gain"
                 )
             return

@@ -188,7 +188,7 @@ def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_pa
 
 @BOTH
 @pytest.mark.parametrize("name", ["everything", "worn", "quick", "warm"])
-def test_products_get_the_numbers_that_they_are_for(name: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every factor of a product stays below 2^51, and every sum below 2^63, in Python's own whole numbers."""
     one = model(CHAINS[name])
     numbers = one.tables(arithmetic, "loop")

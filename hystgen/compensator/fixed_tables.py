@@ -233,15 +233,15 @@ class Builder:
         high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
         self.span = high - low
         reach = max(abs(low), abs(high)) + 2 * min(self.span, Fraction(pi.thresholds[-1]))
-        finer = ARITHMETICS[self.arithmetic].finer_plays
+        below = ARITHMETICS[self.arithmetic].finer_plays
         if c.stages:
             self.fine = 0
-            if finer and self.led:
+            if below and self.led:
                 self.fine = max(0, self.play_bits - max(map(abs, self.drive)).bit_length())
             self.step = Fraction(2) ** (math.ceil(math.log2(reach)) - self.play_bits)
         else:
             self.fine = 0
-            if finer:
+            if below:
                 self.fine = max(0, math.floor(math.log2((1 << self.play_bits) / (reach / self.drive_lsb))))
             self.step = self.drive_lsb / 2**self.fine
 

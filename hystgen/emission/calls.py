@@ -57,7 +57,9 @@ def emit_options(
 
 def emitted_model(model: Model, options: Options) -> Model:
     """The model that the C is of: without what `options` leave out."""
-    return model.without([effect for effect, _ in model.refusals(options.operator, options.arithmetic)]) if options.left_out else model
+    if not options.left_out:
+        return model
+    return model.without([effect for effect, _ in model.refusals(options.operator, options.arithmetic)])
 
 
 @arguments.taking(emit_options, "emit")

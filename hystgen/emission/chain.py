@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.compensator.chain.layout import (
     LARGEST_LEVEL,
     LEAST_CODE,
@@ -21,8 +20,10 @@ from hystgen.compensator.chain.layout import (
     ChainTables,
     Compiled,
 )
+from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.emission.text import constant, literal, operand, structure, table
 from hystgen.plays import slots
+from hystgen.plays.slots import Reals
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def _entries(values: Iterable[float]) -> str:
     return ", ".join(map(literal, values))
 
 
-def _factors(row: Sequence[int], factors: int) -> str:
+def _factors(row: Reals, factors: int) -> str:
     """Entries of a table that begins with factors."""
     pairs = (f"{{{literal(row[i])}, {row[i + 1]}}}" for i in range(0, 2 * factors, 2))
     return ", ".join([*pairs, *map(literal, row[2 * factors :])])
@@ -145,7 +146,7 @@ def output_side(t: ChainTables, prefix: str) -> list[Block]:
     return blocks
 
 
-def _ageing_piece(row: Sequence[int]) -> str:
+def _ageing_piece(row: Reals) -> str:
     begin, mantissa, shift, drop, *curve = row
     return f"{literal(begin)}, {{{literal(mantissa)}, {shift}}}, {drop}, {{{_entries(curve)}}}"
 
@@ -412,6 +413,7 @@ def _functions(
         )  # fmt: skip
     gains = [block for block in after if block.kind == "gain"]
     ageing = [block for block in after if block.kind == "ageing"]
+    way = "(hystgen_signal_t)v - self->applied"
     yield _function(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
@@ -424,7 +426,7 @@ def _functions(
     yield _function(
         "The drive moves to v from where it was.",
         f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
-        [f"hystgen_ageing_move({each.table}, &self->{each.name}, (hystgen_signal_t)v - self->applied);" for each in ageing]
+        [f"hystgen_ageing_move({each.table}, &self->{each.name}, {way});" for each in ageing]
         or ["(void)self;", "(void)v;"],
     )
     heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]

@@ -302,11 +302,11 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    apart = values.variant.slew and values.inverse_rounding_error != values.inverse_max_error
+    limited = "no drive is limited" if values.limited else "no slew limit acts" if values.variant.slew else ""
+    apart = limited and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
-        words = "the same while " + " and ".join(
-            ["both take the same branch"] * values.branches + ["no slew limit acts"] * values.variant.slew
-        )
+        branch = "both take the same branch" if values.branches else ""
+        words = f"the same while {' and '.join(filter(None, [branch, limited]))}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 
@@ -333,11 +333,10 @@ def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
         return []
     bits = int(31 - compiled.tables.number[SHARE_BITS])
     kept = TEMPERATURE_BITS[bits]
-    return [
-        *([("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")] if len(compiled.tables.gain) else []),
-        *([("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")]
-          if len(compiled.tables.ageing.turns) else []),
-    ]  # fmt: skip
+    degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
+    gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
+    t = compiled.tables
+    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
 
 
 def _status(values: SimpleNamespace) -> list[str]:

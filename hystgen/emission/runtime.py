@@ -216,8 +216,8 @@ class Variant:
             kept = () if self.moves == "dashpot" else ("moved_kept.c",)
             moving = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
             ending = "_fixed" * self.fixed
-            plays = (f"chain_plays{ending}.c",) if not self.moves else (f"chain_relaxing{ending}.c",)
-            plays = moving if self.bends else plays
+            alone = "relaxing" if self.moves else "plays"
+            plays = moving if self.bends else (f"chain_{alone}{ending}.c",)
             return (start, f"loop_{front}.c", slew, *plays, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,

@@ -74,8 +74,9 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `bends`: there and back of each tanh; `slowed`: share of its rates that a slew limit loses in whole codes; `reached`:
-    whether all that is asked in front of the plays can be led to; `largest_step`: as in `Compiled`.
+    `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
+    whole codes; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
+    `Compiled`.
     """
 
     static: StaticModel
@@ -89,7 +90,7 @@ class Bounds:
     lags: list[tuple[bool, tuple[float, float, float, float]]]
     taps: list[float]
     bends: list[Bend]
-    ends: tuple[float, float]  # of the output
+    ends: tuple[float, float]
     slowed: float
     reached: bool
     largest_step: float
@@ -302,15 +303,19 @@ class Bounds:
             return 0
         return math.floor(2.0 * self._arriving_error())
 
+    @property
+    def limited(self) -> bool:
+        """Whether a limit of the drive in front of a lag leaves the inverse with no bound but the range."""
+        return bool(self.lags) and (not self.reached or bool(self.parts.slew))
+
     def rounding(self) -> float:
-        """Of the inverse, in drive codes, on the same branch and while no limit acts in front of a lag."""
+        """Of the inverse, in drive codes, on the same branch, and while no drive is limited where it is `limited`."""
         return self._codes(self._arriving_error())
 
     def inverse(self) -> float:
         """The same with what another branch and limits make."""
-        whole = float(self.inner.drive[1] - self.inner.drive[0])
-        if self.lags and (not self.reached or self.parts.slew):
-            return whole
+        if self.limited:
+            return float(self.inner.drive[1] - self.inner.drive[0])
         if not self.static.branches_differ:
             return self.rounding()
         gap = self.static.branch_gap

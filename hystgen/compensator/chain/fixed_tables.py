@@ -139,7 +139,7 @@ class _Builder:
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
-            math.ceil(self.sizes.largest * 2**self.bits),
+            bounds.limited, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
         max_rate = self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)
         return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)
@@ -191,7 +191,8 @@ class _Builder:
             elif isinstance(effect, HardSaturation):
                 back = min(back, self._code(effect.level) + 1.0)
             elif isinstance(effect, Stops):
-                back = back / effect.give if effect.give else max(map(abs, map(self._code, (effect.lower, effect.upper))))
+                stop = max(abs(effect.lower), abs(effect.upper))
+                back = back / effect.give if effect.give else self._code(stop)
             undone.append(back)
         target = back * (math.fsum(map(abs, self.taps.weights.tolist())) if self.taps else 1.0) + 1.0
         asked = target
@@ -288,13 +289,14 @@ class _Builder:
 
     def _creep_tables(self) -> Any:
         scale = 2.0**self.bits
-        return creep_fixed.tables([(one, size * scale) for one, size in zip(self.creeps, self.sizes.creeps, strict=True)])
+        sizes = [size * scale for size in self.sizes.creeps]
+        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)))
 
     def _ageing(self, span: float) -> Any:
         rows = [
-            (ageing.pieces(each), ageing.turns(each, span, 2.0**-ageing_fixed.GAIN_BITS)) for each in self.parts.ageing
+            (ageing.pieces(each), ageing.turns(each, span, 2.0**-thermal_fixed.GAIN_BITS)) for each in self.parts.ageing
         ]
-        bits = ageing_fixed.GAIN_BITS - (self.about.code_bits - 2)
+        bits = thermal_fixed.GAIN_BITS - (self.about.code_bits - 2)
         return ageing_fixed.tables(rows, float(self.drive_lsb), bits)
 
     def _gains(self) -> Any:

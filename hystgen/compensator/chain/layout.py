@@ -1,4 +1,4 @@
-"""What a model with effects is compiled to: constants in one arithmetic, and what they are worth in double precision."""
+"""What a model with effects is compiled to: constants in one arithmetic, and what they mean."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import preview
-from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.compensator.chain.preview import Taps
-from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.creep import compensator as creep
@@ -63,9 +61,9 @@ class ChainTables(NamedTuple):
     fixed point with those of a drive that may have bits below a code, both without an offset; `behind`: saturation.
     """
 
-    plays: Tables | FixedTables
+    plays: Any  # `Tables` or `FixedTables`
     limits: Reals
-    moving: MovingTables | FixedMovingTables
+    moving: Any  # `MovingTables` or `FixedMovingTables`
     lag: LagTables
     creep: CreepTables
     ageing: AgeingTables
@@ -78,12 +76,13 @@ class ChainTables(NamedTuple):
     @property
     def fixed(self) -> bool:
         """Whether it is fixed point."""
-        return self.plays.fixed
+        return bool(self.plays.fixed)
 
     @property
     def threshold(self) -> Reals:
         """As in `Tables`."""
-        return self.plays.threshold
+        threshold: Reals = self.plays.threshold
+        return threshold
 
 
 @dataclass(frozen=True)
@@ -119,8 +118,8 @@ class Parts:
 class Codes:
     """What fixed point makes of a model with effects: physical units a code, bounds in codes, and ranges.
 
-    `forward_error` in output codes, `inverse_error` and the part of it on the same branch while no drive is limited,
-    `inverse_rounding`, in drive codes; `largest`: bound of every signal.
+    `forward_error` in output codes, `inverse_error` and the part of it on the same branch, `inverse_rounding`, in drive
+    codes; `limited`: whether that holds only while no drive is limited; `largest`: bound of every signal.
     """
 
     drive_lsb: Fraction
@@ -128,6 +127,7 @@ class Codes:
     forward_error: float
     inverse_error: float
     inverse_rounding: float
+    limited: bool
     largest: int
 
 

@@ -172,11 +172,14 @@ def build(
     return MovingTables(moves, bends, first, second, curve, number, halves, int(scanned), share, inverse, yields)
 
 
-def build_fixed(plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float) -> FixedMovingTables:
+def build_fixed(
+    plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float
+) -> FixedMovingTables:
     """The same in fixed point, for effects without `beyond_fixed`. Raises OverflowError."""
     own = build(static, effects, seconds, np.ptp(static.input_range), np.float64)
     if not own.scanned:
-        return FixedMovingTables(PLAIN, STRAIGHT, 0, *np.zeros((2, 2), np.int64), plays)
+        none = np.zeros(2, dtype=np.int64)
+        return FixedMovingTables(PLAIN, STRAIGHT, 0, none, none, plays)
     late = float(own.first[1])
     weight = plays.weight
     sums = [0, int(weight[0])]
@@ -188,8 +191,8 @@ def build_fixed(plays: FixedTables, static: StaticModel, effects: Sequence[Effec
         reciprocal=np.array([pair[0] for pair in pairs], dtype=np.int64),
         shift=np.array([pair[1] for pair in pairs], dtype=np.int64),
     )
-    factors = (np.array(factor(x), dtype=np.int64) for x in (late, float(own.second[1])))
-    return FixedMovingTables(RELAXING, STRAIGHT, 1, *factors, relaxed)
+    gained, kept = (np.array(factor(x), dtype=np.int64) for x in (late, float(own.second[1])))
+    return FixedMovingTables(RELAXING, STRAIGHT, 1, gained, kept, relaxed)
 
 
 def beyond_fixed(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:

@@ -226,7 +226,8 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
         """What the output side has to give for the displacement u, and whether nothing does."""
-        return unsaturated(t.behind, u - (t.number[OFFSET] + s.real[SET]))
+        y, limited = unsaturated(t.behind, u - (t.number[OFFSET] + s.real[SET]))
+        return y, limited
 
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
@@ -446,8 +447,8 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
 
     @jit
     def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read and
-        cleared."""
+        """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read
+        and cleared."""
         for i in range(len(op)):
             answers[i] = t.limits[ZERO]
             if op[i] == OP_INIT:

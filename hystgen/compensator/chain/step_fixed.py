@@ -47,7 +47,7 @@ def front_forward(t: FixedTables, a: Any, ascending: int) -> Any:
 def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
     """What has to arrive for an input of the plays, and whether an envelope limits that."""
     if t.fronts:
-        return curve.front_inverse(t, w, ascending)  # type: ignore[no-any-return]
+        return curve.front_inverse(t, w, ascending)
     return w, 0
 
 

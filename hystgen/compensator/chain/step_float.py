@@ -79,7 +79,7 @@ def saturated(t: Stages, x: Any) -> Any:
 @jit(inline=True)
 def unsaturated(t: Stages, y: Any) -> tuple[Any, int]:
     """What gives y behind what saturates, and whether nothing does."""
-    return front_inverse(t, y, 1)  # type: ignore[no-any-return]
+    return front_inverse(t, y, 1)
 
 
 @jit(inline=True)

@@ -29,7 +29,7 @@ EXACT_BITS = 8
 
 
 class Sizes:
-    """Largest sizes of a lag's signals, of its input and of the output that is asked of it; `answer`: of its inverse."""
+    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse."""
 
     def __init__(self, exact: bool, rate: float, late: float, given: float, asked: float) -> None:
         self.given, self.asked = given, asked
