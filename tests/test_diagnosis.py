@@ -822,7 +822,7 @@ class TestOwnEffects:
         for each in records:
             table = np.column_stack([each.t, each.v, each.y])
             np.savetxt(tmp_path / f"{each.name}.csv", table, delimiter=",", header="t,v,y", comments="")
-        own = Path(__file__).parents[1] / "examples" / "my_effect.py"
+        own = Path(__file__).parent / "neighbour.py"
         files = [tmp_path / f"{each.name}.csv" for each in records]
         words = [*files[:3], "--holdout", files[3], "--holdout", files[4], "--history", "0", "--effects", own]
         code, _, err = run("diagnose", _model(tmp_path), *words, "-o", tmp_path / "out")

@@ -19,6 +19,7 @@ from hystgen.basics.problems import EffectsError, NotInvertibleError, Unsupporte
 from hystgen.chain.blocks import Block
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
+from hystgen.effects import own
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.base import Array, Effect, Place, Run
 from hystgen.effects.creep import compensator as creep
@@ -143,7 +144,7 @@ def refusal(effect: Effect) -> str:
         return "drift (a clock that runs alone; nothing says when it began)"
     if effect.name == "thermal" and not effect.columns:
         return "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's)"
-    if effect.name not in TAKEN_IN:
+    if effect.name not in TAKEN_IN and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
     return ""
 
@@ -166,7 +167,11 @@ class Compensator:
         self.static, self.effects = static, effects
         plays = [effect for effect in effects if effect.place is Place.PLAYS]
         lags = [block for effect in self._called("lag") if (block := lag.block(effect))]
-        self.blocks: list[Block] = [*lags, Actuator(static, plays), *map(creep.block, creeping)]
+        drives, outputs = (
+            [own.Instance(each) for each in effects if each.block and (each.place is Place.DRIVE) == ahead]
+            for ahead in (True, False)
+        )
+        self.blocks: list[Block] = [*lags, *drives, Actuator(static, plays), *map(creep.block, creeping), *outputs]
         self.slew = self._called("slew_limit")
         self.modes = self._called("resonance")
         self.delay = math.fsum(effect.time for effect in self._called("delay"))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hystgen.basics import jit
 from hystgen.compensator import step, step_fixed, step_float
 from hystgen.compensator.chain import step as chain_step
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.tables import ChainTables, OwnChainTables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
@@ -34,7 +34,8 @@ from hystgen.plays.slots import LOOP
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
     """What the bit reference is made of for the arithmetic and the engine of these tables."""
     if isinstance(t, ChainTables):
-        return chain_step.OPERATIONS
+        drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
+        return chain_step.operations(drives, outputs)
     return _operations(t.engine == LOOP, t.fixed, t.has_front)
 
 

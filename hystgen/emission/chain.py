@@ -5,23 +5,29 @@ What a block does stands in `c_runtime/`; here are only its places.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import textwrap
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from hystgen.compensator.chain import moving
+from hystgen.compensator.chain import blocks, moving
 from hystgen.compensator.chain.moving import MovingTables
 from hystgen.compensator.chain.tables import ChainTables, Compiled
-from hystgen.emission.text import literal, operand, structure, table
+from hystgen.effects.kinds import Constants, Kind
+from hystgen.emission.text import WIDTH, literal, operand, structure, table
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of an instance: `kind` is real, flag, status or one of `STRUCTS`; more than one where it is an array."""
+    """A field of an instance: `kind` is real, flag, status, or of a block and then made of `reals` numbers and `flags`;
+    with a `count` it is an array."""
 
     kind: str
     name: str
     comment: str = ""
     count: int = 0
+    reals: int = 0
+    flags: int = 0
 
     def text(self) -> str:
         """Its declaration."""
@@ -30,81 +36,70 @@ class Field:
         return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
 
 
-STRUCTS = {
-    "creep": (2, 0), "creep_state": (2, 0), "lag": (5, 0), "lag_exact": (2, 0), "gain": (3, 0), "ageing": (4, 1),
-}  # fmt: skip
-"""Reals and flags in the memory of a block, by the name of its type."""
-
-
 @dataclass(frozen=True)
 class Block:
-    """One block of a chain: its kind, which names its functions and types, the fields of its memory, and the text of
-    its table."""
+    """One block of a chain: its numbers, and its name among those of the model."""
 
-    kind: str
+    constants: Constants
     name: str
-    fields: tuple[Field, ...]
-    arrays: tuple[str, ...]
-    table: str = ""
-    more: str = ""
+
+    @property
+    def kind(self) -> Kind:
+        """Which names its functions and types."""
+        return self.constants.kind
+
+    @property
+    def table(self) -> str:
+        """How functions name its table."""
+        return f"&hystgen_{self.name}"
+
+    @property
+    def fields(self) -> list[Field]:
+        """Its memory."""
+        kind, rows = self.kind, self.kind.rows
+        found = [Field(kind.name, self.name, reals=len(kind.state), flags=len(kind.flags))]
+        if rows and rows.state:
+            count, reals = len(self.constants.rows), len(rows.state)
+            found.append(Field(f"{kind.name}_state", f"{self.name}_state", count=count, reals=reals))
+        return found
 
     def call(self, verb: str, x: str) -> str:
         """A call of one of its verbs with the argument x."""
-        given = [self.table] * (verb in _TABLE[self.kind]) + [f"&self->{self.name}"] * (verb != "resting")
-        if self.more and verb in ("rest", "absorb"):
-            given.append(f"self->{self.more}")
-        return f"hystgen_{self.kind}_{verb}({', '.join([*given, x])})"
+        own = self.kind.verb(verb)
+        given = [self.table] * (own in self.kind.reading) + [f"&self->{self.name}"] * (own != "resting")
+        if own in ("rest", "absorb"):
+            given += [f"self->{field.name}" for field in self.fields[1:]]
+        return f"hystgen_{self.kind.name}_{own}({', '.join([*given, x])})"
+
+    def arrays(self, prefix: str) -> list[str]:
+        """Its table, behind that of its rows where it has any."""
+        kind, constants, own = self.kind, self.constants, f"{prefix}_{self.name}"
+        numbers = [*map(literal, constants.table), *map(str, constants.counts)]
+        if not kind.rows:
+            return [_table(f"{prefix}_{kind.name}_table_t {own}", numbers)]
+        rows, n = f"{own}_{kind.rows.name}", len(constants.rows)
+        lines = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in constants.rows)
+        return [
+            f"static const {prefix}_{kind.name}_{kind.rows.name}_t {rows}[{n}] = {{\n{lines},\n}};\n",
+            _table(f"{prefix}_{kind.name}_table_t {own}", [rows, *numbers]),
+        ]
 
 
-_TABLE = {
-    "creep": ("rest", "resting", "solve", "absorb"),
-    "lag": ("solve", "absorb"),
-    "lag_exact": ("solve", "absorb"),
-    "gain": (),
-    "ageing": (),
-}
-"""Verbs of a block that read its table."""
+def _table(declared: str, entries: Sequence[str]) -> str:
+    lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
 
-def _entries(values: Iterable[float]) -> str:
-    return ", ".join(map(literal, values))
-
-
-def drive_side(t: ChainTables, prefix: str) -> list[Block]:
-    """The blocks in front of the plays, from the drive on."""
-    blocks = []
-    for j, (exact, row) in enumerate(zip(t.lag.exact, t.lag.block, strict=True), 1):
-        kind, name = "lag_exact" if exact else "lag", f"lag_{j}"
-        text = f"static const {prefix}_{kind}_table_t {prefix}_{name} = {{\n    {_entries(row)},\n}};\n"
-        blocks.append(Block(kind, name, (Field(kind, name),), (text,), f"&hystgen_{name}"))
-    return blocks
-
-
-def output_side(t: ChainTables, prefix: str) -> list[Block]:
-    """The blocks behind the plays, from these on."""
-    blocks = []
-    for j, row in enumerate(t.creep.block, 1):
-        terms = t.creep.term[t.creep.first[j - 1] : t.creep.first[j]]
-        name, n = f"creep_{j}", len(terms)
-        lines = ",\n".join(f"    {{{_entries(term)}}}" for term in terms)
-        own = f"static const {prefix}_creep_term_t {prefix}_{name}_term[{n}] = {{\n{lines},\n}};\n"
-        numbers = f"    {prefix}_{name}_term, {_entries(row)}, {n},"
-        text = f"static const {prefix}_creep_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
-        fields = (Field("creep", name), Field("creep_state", f"{name}_state", "", n))
-        blocks.append(Block("creep", name, fields, (own, text), f"&hystgen_{name}", f"{name}_state"))
-    for j in range(1, len(t.ageing.turns) + 1):
-        pieces = t.ageing.piece[t.ageing.first[j - 1] : t.ageing.first[j]]
-        name, n = f"ageing_{j}", len(pieces)
-        lines = ",\n".join(f"    {{{_entries(piece)}}}" for piece in pieces)
-        own = f"static const {prefix}_ageing_piece_t {prefix}_{name}_piece[{n}] = {{\n{lines},\n}};\n"
-        numbers = f"    {prefix}_{name}_piece, {_entries(t.ageing.number[j - 1, 2:])}, {n}, {t.ageing.turns[j - 1]},"
-        text = f"static const {prefix}_ageing_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
-        blocks.append(Block("ageing", name, (Field("ageing", name),), (own, text), f"&hystgen_{name}"))
-    for j, row in enumerate(t.gain, 1):
-        name = f"gain_{j}"
-        text = f"static const {prefix}_gain_table_t {prefix}_{name} = {{\n    {_entries(row[:7])},\n}};\n"
-        blocks.append(Block("gain", name, (Field("gain", name),), (text,), f"&hystgen_{name}"))
-    return blocks
+def sides(t: ChainTables) -> tuple[list[Block], list[Block]]:
+    """The blocks in front of the plays, from the drive on, and those behind them."""
+    found: list[list[Block]] = []
+    for side in blocks.sides(t):
+        counts: Counter[str] = Counter()
+        found.append([])
+        for constants in side:
+            counts[constants.kind.name] += 1
+            found[-1].append(Block(constants, f"{constants.kind.name}_{counts[constants.kind.name]}"))
+    return found[0], found[1]
 
 
 MOVES = ("play", "dilated", "relaxing")
@@ -137,7 +132,7 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         arrays += [table(real_t, f"{prefix}_late", list(t.first)), table(real_t, f"{prefix}_kept", list(t.second))]
     if t.bends == moving.POLYNOMIAL:
         n, terms = t.curve.shape
-        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.curve)
+        rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in t.curve)
         arrays.append(f"static const {real_t} {prefix}_curve[{n}][{terms}] = {{\n{rows},\n}};\n")
     words = (
         ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
@@ -169,7 +164,7 @@ class Glue:
 def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, str]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
-    before, after = drive_side(t, prefix), output_side(t, prefix)
+    before, after = sides(t)
     functions = [
         line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0)
     ]
@@ -180,7 +175,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "forward": every,
         "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
-    arrays = [text for block in (*before, *after) for text in block.arrays]
+    arrays = [text for block in (*before, *after) for text in block.arrays(prefix)]
     if len(t.tap):
         arrays.append(table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap)))
     number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
@@ -196,8 +191,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
-    blocks, n = [*before, *after], len(t.threshold) - 1
-    fields = {op: instance(op, blocks, len(t.tap), n, searched) for op in operators}
+    both, n = [*before, *after], len(t.threshold) - 1
+    fields = {op: instance(op, both, len(t.tap), n, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
@@ -254,7 +249,7 @@ def _functions(
     self_t = f"hystgen_{op}_t *self"
 
     def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
-        lines = [f"{x} = {block.call(_verb(block, verb), x)};" for block in blocks] or ["(void)self;"]
+        lines = [f"{x} = {block.call(verb, x)};" for block in blocks] or ["(void)self;"]
         if verb == "resting" and not any("self" in line for line in lines):
             lines = ["(void)self;", *lines]
         head = f"static hystgen_real_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_real_t {x})"
@@ -300,8 +295,8 @@ def _functions(
             f"static void hystgen_inverse_repeat({self_t})",
             ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else ["(void)self;"],
         )  # fmt: skip
-    gains = [block for block in after if block.kind == "gain"]
-    ageing = [block for block in after if block.kind == "ageing"]
+    gains = [block for block in after if block.kind.name == "gain"]
+    ageing = [block for block in after if block.kind.name == "ageing"]
     yield _function(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
@@ -324,8 +319,3 @@ def _functions(
         ["bool limited = false;", *(f"limited = {heat} || limited;" for heat in heats), "return limited;"]
         if heats else ["(void)self;", "(void)temperature;", "return false;"],
     )  # fmt: skip
-
-
-def _verb(block: Block, verb: str) -> str:
-    """What a block without memory calls it."""
-    return {"rest": "absorb", "resting": "solve"}.get(verb, verb) if block.kind in ("gain", "ageing") else verb

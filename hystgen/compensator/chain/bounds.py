@@ -11,7 +11,7 @@ Inverse. The reference less its offsets, through what saturates (slope at the en
 input, and from there through all states to later ones: `e <= R eta + R g e`, `g = sum c_i (1 - b1_i)` the states' share
 of the input before, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. The plays as in `hystgen.compensator.bounds`. A
 lag's lead multiplies by `(2 - rate)/rate`, what it is led to by `(1 + 2 theta)/(1 - theta)`: the target before counts
-too, also where it was shifted by a limit.
+too, also where it was shifted by a limit. A block of the user's own as in `hystgen.compensator.chain.own`.
 
 States that move by less than their last bit are kept in two parts; their roundings are shares of their steps, so that
 they add up to a few units of the state however slow it is, and the second part's own to `u^2/rate` of it.
@@ -52,6 +52,7 @@ def _sizes(compiled: Compiled) -> _Sizes:
     drive = max(abs(end) for end in static.input_range)
     plays = largest_sum(dataclasses.replace(static, output_offset=0.0))
     output = plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
+    output *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
     ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
     return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + 2.0 * max(ends))
 
@@ -133,14 +134,24 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
         late = _late(compiled) * sizes.output
         inverse += gain * late
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
+    moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
+    size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
+    roundings = []
+    for each in compiled.own[t.own.ahead :]:
+        roundings.append(each.rounding(size, u))
+        size *= each.forward.largest
+    for each, (_, back) in zip(reversed(compiled.own[t.own.ahead :]), reversed(roundings), strict=True):
+        inverse = each.passed(inverse) + back
     size = sizes.plays
     for j in range(len(t.creep.block)):
         rounding, back_gain = _creep(compiled, j, size, u)
         forward = forward * float(t.creep.block[j, creep.REST]) + rounding
         inverse = back_gain * (inverse + rounding)
         size *= float(t.creep.block[j, creep.REST])
+    for each, (there_own, _) in zip(compiled.own[t.own.ahead :], roundings, strict=True):
+        forward = forward * each.forward.largest + there_own
     forward = gain * (forward + 3.0 * u * sizes.output * gains) + TABLE_ERROR * sizes.output * (late > 0.0) + there
     return forward + 3.0 * u * sizes.displacement, inverse
 
@@ -148,6 +159,8 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
 def _lags(compiled: Compiled, error: float, u: float) -> float:
     """The error of the drive, for one of what is in front of the plays."""
     drive = _sizes(compiled).drive
+    for each in reversed(compiled.own[: compiled.tables.own.ahead]):
+        error = each.passed(error) + each.rounding(drive, u)[1]
     for exact, row in zip(compiled.tables.lag.exact, compiled.tables.lag.block.astype(float), strict=True):
         rate = float(row[lag.RATE])
         if exact:
@@ -180,5 +193,6 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     if compiled.tables.slew and len(compiled.tables.lag.exact):
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
+    rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])
     most = (1.0 / LEAST_GAIN) ** (len(compiled.tables.gain) + len(compiled.tables.ageing.turns)) * rest
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

@@ -6,6 +6,7 @@ backwards; the plays between them are those of engine loop.
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from hystgen.compensator.chain.moving import (
     relaxing_input,
 )
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat, preview_target
+from hystgen.compensator.chain.sides import sides_of
 from hystgen.compensator.chain.tables import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
 from hystgen.compensator.step import (
     Operations,
@@ -34,21 +36,13 @@ from hystgen.compensator.step_float import finite
 from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
 from hystgen.effects.ageing.compensator import (
     AgeingState,
-    ageing_absorb,
     ageing_move,
     ageing_set,
     ageing_set_travel,
-    ageing_solve,
 )
-from hystgen.effects.creep.compensator import (
-    CreepState,
-    creep_absorb,
-    creep_rest,
-    creep_resting,
-    creep_solve,
-)
-from hystgen.effects.lag.compensator import lag_absorb, lag_rest, lag_solve
-from hystgen.effects.thermal.compensator import gain_absorb, gain_heat, gain_reset, gain_solve
+from hystgen.effects.creep.compensator import CreepState
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.thermal.compensator import gain_heat, gain_reset
 from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays import loop
 from hystgen.plays.loop import (
@@ -105,6 +99,7 @@ class ChainState(NamedTuple):
     creep: CreepState
     ageing: AgeingState
     gain: Reals  # (k, 3)
+    own: Reals  # (m,)
     line: Line
     real: Reals
     flags: Counts
@@ -120,6 +115,7 @@ def new_state(t: ChainTables) -> ChainState:
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
+        np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(3, dtype),
         np.zeros(1, np.int64),
@@ -129,85 +125,6 @@ def new_state(t: ChainTables) -> ChainState:
 plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
 # ---------------------------------------------------------------- the glue of a model's blocks
-
-
-@jit
-def drive_side_rest(t: ChainTables, s: ChainState, v: Any) -> Any:
-    """Everything in front of the plays settles at drive v; what arrives there."""
-    x = v
-    for j in range(len(t.lag.exact)):
-        x = lag_rest(t.lag, s.lag, j, x)
-    return x
-
-
-@jit
-def drive_side_absorb(t: ChainTables, s: ChainState, v: Any) -> Any:
-    """The drive is v at this sample; what arrives in front of the plays."""
-    x = v
-    for j in range(len(t.lag.exact)):
-        x = lag_absorb(t.lag, s.lag, j, x)
-    return x
-
-
-@jit
-def drive_side_solve(t: ChainTables, s: ChainState, y: Any) -> Any:
-    """The drive that leads to y in front of the plays."""
-    x = y
-    for j in range(len(t.lag.exact) - 1, -1, -1):
-        x = lag_solve(t.lag, s.lag, j, x)
-    return x
-
-
-@jit
-def output_side_rest(t: ChainTables, s: ChainState, h: Any) -> Any:
-    """Everything behind the plays settles at their sum h; the output."""
-    x = h
-    for j in range(len(t.creep.block)):
-        x = creep_rest(t.creep, s.creep, j, x)
-    for j in range(len(t.ageing.turns)):
-        x = ageing_absorb(s.ageing, j, x)
-    for j in range(len(t.gain)):
-        x = gain_absorb(s.gain, j, x)
-    return x
-
-
-@jit
-def output_side_absorb(t: ChainTables, s: ChainState, h: Any) -> Any:
-    """The sum of the plays is h at this sample; the output."""
-    x = h
-    for j in range(len(t.creep.block)):
-        x = creep_absorb(t.creep, s.creep, j, x)
-    for j in range(len(t.ageing.turns)):
-        x = ageing_absorb(s.ageing, j, x)
-    for j in range(len(t.gain)):
-        x = gain_absorb(s.gain, j, x)
-    return x
-
-
-@jit
-def output_side_resting(t: ChainTables, s: ChainState, y: Any) -> Any:
-    """The sum of the plays that gives the output y once everything has settled."""
-    x = y
-    for j in range(len(t.gain) - 1, -1, -1):
-        x = gain_solve(s.gain, j, x)
-    for j in range(len(t.ageing.turns) - 1, -1, -1):
-        x = ageing_solve(s.ageing, j, x)
-    for j in range(len(t.creep.block) - 1, -1, -1):
-        x = creep_resting(t.creep, s.creep, j, x)
-    return x
-
-
-@jit
-def output_side_solve(t: ChainTables, s: ChainState, y: Any) -> Any:
-    """The sum of the plays that gives the output y at this sample."""
-    x = y
-    for j in range(len(t.gain) - 1, -1, -1):
-        x = gain_solve(s.gain, j, x)
-    for j in range(len(t.ageing.turns) - 1, -1, -1):
-        x = ageing_solve(s.ageing, j, x)
-    for j in range(len(t.creep.block) - 1, -1, -1):
-        x = creep_solve(t.creep, s.creep, j, x)
-    return x
 
 
 @jit(inline=True)
@@ -285,63 +202,6 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
 
 
 @jit
-def begin(t: ChainTables, s: ChainState) -> None:
-    """What init and reset have in common once the plays are set: everything rests at the start memory."""
-    s.line.filled[0] = 0
-    s.flags[MOVING] = 0
-    s.real[APPLIED] = drive_side_rest(t, s, s.plays.real[DRIVE])
-    s.real[OUTPUT] = output_side_rest(t, s, started(t, s))
-
-
-@jit
-def init(t: ChainTables, s: ChainState, inverse: int) -> None:
-    """Start memory of the parameter file, and its settings."""
-    settings_reset(t, s)
-    plays_init(t.plays, s.plays, inverse)
-    begin(t, s)
-    if not inverse:
-        s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
-
-
-@jit
-def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
-    """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
-    plays_reset(t.plays, s.plays, inverse)
-    begin(t, s)
-    if not inverse:
-        s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
-
-
-@jit
-def absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-    """The actuator has seen drive v; the first one finds everything at rest."""
-    moving = s.flags[MOVING] != 0
-    if moving:
-        travelled(t, s, v)
-    a = drive_side_absorb(t, s, v) if moving else drive_side_rest(t, s, v)
-    h = follow(t, s, arrive(t.plays, s.plays, a))
-    s.plays.real[LEVEL] = h
-    s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
-    s.real[APPLIED] = v
-    s.flags[MOVING] = 1
-
-
-@jit
-def settle(t: ChainTables, s: ChainState, v: Any) -> None:
-    """Everything is at rest at drive v, where the plays move like with any other."""
-    if not finite(t.plays, v):
-        s.plays.counts[STATUS] |= HELD
-        return
-    inside = clamp_drive(t.plays, v) + t.plays.limits[ZERO]
-    if inside != v:
-        s.plays.counts[STATUS] |= INPUT_CLAMPED
-    if s.flags[MOVING]:
-        travelled(t, s, inside)
-    s.flags[MOVING] = 0
-    absorb(t, s, inside)
-
-
-@jit
 def slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
     """The drive nearest to v that can be reached in one step."""
     if not t.slew or not s.flags[MOVING]:
@@ -351,31 +211,6 @@ def slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
     if v < s.real[APPLIED] - t.number[FALLING]:
         return s.real[APPLIED] - t.number[FALLING]
     return v
-
-
-@jit
-def forward_step(t: ChainTables, s: ChainState, v: Any) -> Any:
-    """One sample of the forward operator."""
-    if not finite(t.plays, v):
-        s.plays.counts[STATUS] |= HELD
-        return s.plays.real[ANSWER]
-    inside = clamp_drive(t.plays, v)
-    if inside != v:
-        s.plays.counts[STATUS] |= INPUT_CLAMPED
-    reached = slewed(t, s, inside)
-    if reached != inside:
-        s.plays.counts[STATUS] |= SLEW_LIMITED
-    absorb(t, s, reached)
-    s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
-    return s.plays.real[ANSWER]
-
-
-@jit
-def inverse_take(t: ChainTables, s: ChainState) -> None:
-    """What is pending is what the actuator has seen."""
-    if s.plays.counts[HAS_PENDING]:
-        absorb(t, s, s.plays.real[PENDING])
-        s.plays.counts[HAS_PENDING] = 0
 
 
 @jit
@@ -401,30 +236,6 @@ def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
     else:
         s.plays.counts[STATUS] |= HELD
         preview_repeat(s.line)
-
-
-@jit
-def inverse_step(t: ChainTables, s: ChainState, u: Any) -> Any:
-    """One sample of the inverse operator."""
-    inverse_take(t, s)
-    if not finite(t.plays, u):
-        s.plays.counts[STATUS] |= HELD
-        preview_repeat(s.line)
-        return inverse_answer(s.plays, s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED])
-    y = inverse_put(t, s, u)
-    moving = s.flags[MOVING] != 0
-    h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
-    s.plays.counts[BITS] = 0
-    a = inverse_drive(t.plays, s.plays, h, inverse_input(t, s, h))
-    v = drive_side_solve(t, s, a) if moving else a
-    reached = slewed(t, s, v)
-    if reached != v:
-        s.plays.counts[BITS] |= SLEW_LIMITED
-    inside = clamp_drive(t.plays, reached)
-    if inside != reached:
-        s.plays.counts[BITS] |= OUTPUT_CLAMPED
-    s.plays.counts[STATUS] |= s.plays.counts[BITS]
-    return inverse_answer(s.plays, inside)
 
 
 @jit
@@ -493,52 +304,156 @@ def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
         s.plays.counts[STATUS] |= LIMITED_SETTING
 
 
-@jit
-def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-    """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read and
-    cleared."""
-    for i in range(len(op)):
-        answers[i] = t.plays.limits[ZERO]
-        if op[i] == OP_INIT:
-            init(t, s, inverse)
-        elif op[i] == OP_COMMIT:
-            inverse_commit(t, s, x[i])
-        elif op[i] == OP_PUSH:
-            inverse_push(t, s, x[i])
-        elif op[i] == OP_SETTLE:
-            inverse_take(t, s)
-            settle(t, s, x[i])
-        elif op[i] == OP_OFFSET:
-            set_offset(t, s, x[i])
-        elif op[i] == OP_TEMPERATURE:
-            set_temperature(t, s, x[i])
-        elif op[i] == OP_GAIN:
-            set_gain(t, s, x[i])
-        elif op[i] == OP_TRAVEL:
-            set_travel(t, s, x[i])
-        elif op[i] == OP_TRAVELLED:
-            answers[i] = s.ageing.block[0, AGEING_HIGH]
-        elif op[i] == OP_CORRECT:
-            correct(t, s, x[i], t.number[SHARE])
-        elif op[i] == OP_EXPECTED:
-            answers[i] = expected(t, s)
-        else:
-            if op[i] == OP_RESET:
-                reset(t, s, inverse)
-            if inverse:
-                inverse_step(t, s, x[i])
+@functools.cache
+def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()) -> Operations:
+    """The operations of models with effects, among them these of the user's own, in front of the plays and behind."""
+    side = sides_of(drives, outputs)
+    drive_side_rest, drive_side_absorb, drive_side_solve = side.drive_rest, side.drive_absorb, side.drive_solve
+    output_side_rest, output_side_absorb = side.output_rest, side.output_absorb
+    output_side_resting, output_side_solve = side.output_resting, side.output_solve
+
+    @jit
+    def begin(t: ChainTables, s: ChainState) -> None:
+        """What init and reset have in common once the plays are set: everything rests at the start memory."""
+        s.line.filled[0] = 0
+        s.flags[MOVING] = 0
+        s.real[APPLIED] = drive_side_rest(t, s, s.plays.real[DRIVE])
+        s.real[OUTPUT] = output_side_rest(t, s, started(t, s))
+
+    @jit
+    def init(t: ChainTables, s: ChainState, inverse: int) -> None:
+        """Start memory of the parameter file, and its settings."""
+        settings_reset(t, s)
+        plays_init(t.plays, s.plays, inverse)
+        begin(t, s)
+        if not inverse:
+            s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
+
+    @jit
+    def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
+        """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
+        plays_reset(t.plays, s.plays, inverse)
+        begin(t, s)
+        if not inverse:
+            s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
+
+    @jit
+    def absorb(t: ChainTables, s: ChainState, v: Any) -> None:
+        """The actuator has seen drive v; the first one finds everything at rest."""
+        moving = s.flags[MOVING] != 0
+        if moving:
+            travelled(t, s, v)
+        a = drive_side_absorb(t, s, v) if moving else drive_side_rest(t, s, v)
+        h = follow(t, s, arrive(t.plays, s.plays, a))
+        s.plays.real[LEVEL] = h
+        s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
+        s.real[APPLIED] = v
+        s.flags[MOVING] = 1
+
+    @jit
+    def settle(t: ChainTables, s: ChainState, v: Any) -> None:
+        """Everything is at rest at drive v, where the plays move like with any other."""
+        if not finite(t.plays, v):
+            s.plays.counts[STATUS] |= HELD
+            return
+        inside = clamp_drive(t.plays, v) + t.plays.limits[ZERO]
+        if inside != v:
+            s.plays.counts[STATUS] |= INPUT_CLAMPED
+        if s.flags[MOVING]:
+            travelled(t, s, inside)
+        s.flags[MOVING] = 0
+        absorb(t, s, inside)
+
+    @jit
+    def forward_step(t: ChainTables, s: ChainState, v: Any) -> Any:
+        """One sample of the forward operator."""
+        if not finite(t.plays, v):
+            s.plays.counts[STATUS] |= HELD
+            return s.plays.real[ANSWER]
+        inside = clamp_drive(t.plays, v)
+        if inside != v:
+            s.plays.counts[STATUS] |= INPUT_CLAMPED
+        reached = slewed(t, s, inside)
+        if reached != inside:
+            s.plays.counts[STATUS] |= SLEW_LIMITED
+        absorb(t, s, reached)
+        s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
+        return s.plays.real[ANSWER]
+
+    @jit
+    def inverse_take(t: ChainTables, s: ChainState) -> None:
+        """What is pending is what the actuator has seen."""
+        if s.plays.counts[HAS_PENDING]:
+            absorb(t, s, s.plays.real[PENDING])
+            s.plays.counts[HAS_PENDING] = 0
+
+    @jit
+    def inverse_step(t: ChainTables, s: ChainState, u: Any) -> Any:
+        """One sample of the inverse operator."""
+        inverse_take(t, s)
+        if not finite(t.plays, u):
+            s.plays.counts[STATUS] |= HELD
+            preview_repeat(s.line)
+            return inverse_answer(s.plays, s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED])
+        y = inverse_put(t, s, u)
+        moving = s.flags[MOVING] != 0
+        h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
+        s.plays.counts[BITS] = 0
+        a = inverse_drive(t.plays, s.plays, h, inverse_input(t, s, h))
+        v = drive_side_solve(t, s, a) if moving else a
+        reached = slewed(t, s, v)
+        if reached != v:
+            s.plays.counts[BITS] |= SLEW_LIMITED
+        inside = clamp_drive(t.plays, reached)
+        if inside != reached:
+            s.plays.counts[BITS] |= OUTPUT_CLAMPED
+        s.plays.counts[STATUS] |= s.plays.counts[BITS]
+        return inverse_answer(s.plays, inside)
+
+    @jit
+    def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
+        """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read
+        and cleared."""
+        for i in range(len(op)):
+            answers[i] = t.plays.limits[ZERO]
+            if op[i] == OP_INIT:
+                init(t, s, inverse)
+            elif op[i] == OP_COMMIT:
+                inverse_commit(t, s, x[i])
+            elif op[i] == OP_PUSH:
+                inverse_push(t, s, x[i])
+            elif op[i] == OP_SETTLE:
+                inverse_take(t, s)
+                settle(t, s, x[i])
+            elif op[i] == OP_OFFSET:
+                set_offset(t, s, x[i])
+            elif op[i] == OP_TEMPERATURE:
+                set_temperature(t, s, x[i])
+            elif op[i] == OP_GAIN:
+                set_gain(t, s, x[i])
+            elif op[i] == OP_TRAVEL:
+                set_travel(t, s, x[i])
+            elif op[i] == OP_TRAVELLED:
+                answers[i] = s.ageing.block[0, AGEING_HIGH]
+            elif op[i] == OP_CORRECT:
+                correct(t, s, x[i], t.number[SHARE])
+            elif op[i] == OP_EXPECTED:
+                answers[i] = expected(t, s)
             else:
-                forward_step(t, s, x[i])
-        if op[i] == OP_STEP:
-            answers[i] = s.plays.real[ANSWER]
-        status[i] = s.plays.counts[STATUS]
-        s.plays.counts[STATUS] = 0
+                if op[i] == OP_RESET:
+                    reset(t, s, inverse)
+                if inverse:
+                    inverse_step(t, s, x[i])
+                else:
+                    forward_step(t, s, x[i])
+            if op[i] == OP_STEP:
+                answers[i] = s.plays.real[ANSWER]
+            status[i] = s.plays.counts[STATUS]
+            s.plays.counts[STATUS] = 0
 
+    @jit
+    def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
+        """Let the actuator be at drive v before the next sample."""
+        absorb(t, s, v)
 
-@jit
-def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
-    """Let the actuator be at drive v before the next sample."""
-    absorb(t, s, v)
-
-
-OPERATIONS = Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
+    return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)

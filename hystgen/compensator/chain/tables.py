@@ -16,8 +16,9 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import moving, preview
+from hystgen.compensator.chain import moving, own, preview
 from hystgen.compensator.chain.moving import MovingTables
+from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.compensator.chain.preview import Taps
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.compensator.layout import Tables
@@ -27,6 +28,7 @@ from hystgen.effects.ageing.model import SHAPES as AGEING
 from hystgen.effects.base import USER, Effect, Place
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
@@ -73,6 +75,7 @@ class ChainTables(NamedTuple):
     creep: CreepTables
     ageing: AgeingTables
     gain: Reals  # (k, 8)
+    own: OwnTables
     behind: Stages
     tap: Reals  # (L,), none without a preview
     number: Reals
@@ -94,6 +97,18 @@ class ChainTables(NamedTuple):
         return self.plays.threshold
 
 
+class OwnChainTables(ChainTables):
+    """The same of a model with effects of the user's own; their classes are those of `own`, in its order."""
+
+    own_effects: tuple[type[Effect], ...]
+
+    @property
+    def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
+        """What they are made of, in front of the plays and behind."""
+        blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
+        return blocks[: self.own.ahead], blocks[self.own.ahead :]
+
+
 @dataclass(frozen=True)
 class Parts:
     """The effects of a model by what the chain makes of them, those in order that the chain meets one by one."""
@@ -107,6 +122,8 @@ class Parts:
     slew: list[Any]
     plays: list[Effect]
     delay: float
+    own_drives: list[Effect]
+    own_outputs: list[Effect]
 
     @classmethod
     def of(cls, effects: Sequence[Effect]) -> Parts:
@@ -120,6 +137,8 @@ class Parts:
             called("thermal"), called("resonance"), called("saturation"), called("slew_limit"),
             [effect for effect in effects if effect.place is Place.PLAYS],
             math.fsum(each.time for each in called("delay")),
+            [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
+            [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
         )  # fmt: skip
 
 
@@ -152,6 +171,11 @@ class Compiled:
         return max(self.taps.ahead, 0) if self.taps else 0
 
     @cached_property
+    def own(self) -> list[Linear]:
+        """Blocks of the user's own, in the order of `tables.own`."""
+        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+
+    @cached_property
     def noise_gain(self) -> float:
         """Largest gain, over all frequencies, from the reference to the drive, over that at rest."""
         z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
@@ -169,6 +193,8 @@ class Compiled:
                 gain = gain * (1.0 - (1.0 - rate) * z) / (late + second * z)
             else:
                 gain = gain * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
+        for block in self.own:
+            gain = gain * block.backward.response(z) * block.rest
         return float(np.max(np.abs(gain)))
 
 
@@ -189,6 +215,9 @@ def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[flo
     low, high = (_settled(static, parts.plays, end) for end in static.play_range)
     for each in parts.creeps:
         rest = creep.numbers(each, seconds).rest
+        low, high = low * rest, high * rest
+    for each in parts.own_outputs:
+        rest = own.linear(each, seconds).rest
         low, high = low * rest, high * rest
     for effect in parts.saturations:
         low, high = (float(end) for end in effect.mapped(np.array([low, high]), None))
@@ -275,6 +304,8 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation = STA
     lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
     steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
     weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
+    drives, outputs = ([own.linear(each, seconds) for each in side] for side in (parts.own_drives, parts.own_outputs))
+    lead *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
     most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
     reals([most], "intermediate results")
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
@@ -292,13 +323,22 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation = STA
         ),
         _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
         reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
+        own.build(drives, outputs, reals),
         _behind(parts, dtype),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),
     )
+    if drives or outputs:
+        tables = OwnChainTables(*tables)
+        tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
     max_rate = how.max_rate or drive_span / (SAMPLES_A_SWEEP * seconds)
     return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview)
+
+
+def _behind_slew(chain: Chain) -> int:
+    """Number of effects up to the slew limit, 0 without one."""
+    return max((i for i, effect in enumerate(chain.effects) if effect.name == "slew_limit"), default=-1) + 1
 
 
 def refusals(chain: Chain, operator: str, seconds: float) -> Iterator[tuple[Effect, str]]:
@@ -312,6 +352,10 @@ def refusals(chain: Chain, operator: str, seconds: float) -> Iterator[tuple[Effe
             yield effect, "a clock that runs alone, and nothing says when it began; set_offset takes it from outside"
         elif effect.name == "thermal" and not effect.columns:
             yield effect, "the drive's own heat, open loop: its temperature drifts with the room's; measure it"
+        elif effect.block:
+            yield from ((effect, reason) for reason in own.problems(effect, seconds))
+            if effect.place is Place.DRIVE and effect in chain.effects[: _behind_slew(chain)]:
+                yield effect, "in front of the slew limit; give it an order: ClassVar[int] above that of slew_limit, 1"
         elif effect.name.startswith(USER):
             yield effect, "an effect of your own, which has no compensator"
         elif effect in parts.ageing[1:]:

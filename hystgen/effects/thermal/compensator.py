@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 from hystgen.basics.jit import jit
+from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.thermal.model import LoggedThermal
 from hystgen.plays.slots import Reals, zero
 
@@ -16,6 +18,20 @@ LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 
 PER_DEGREE, OFFSET_PER_DEGREE, REFERENCE, COLDEST, HOTTEST, LEAST, LARGEST, ONE = range(8)
 GAIN, INVERSE, OFFSET = 0, 1, 2
+
+
+KIND = Kind(
+    "gain",
+    ("per_degree", "offset_per_degree", "reference", "coldest", "hottest", "least", "largest"),
+    ("gain", "inverse", "offset"),
+    reading=(), own=("solve", "absorb"),
+)  # fmt: skip
+
+
+def constants(t: Reals) -> Iterator[Constants]:
+    """The numbers of each gain, of tables (k, 8)."""
+    for row in t:
+        yield Constants(KIND, row[:ONE], (1, 1))
 
 
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
