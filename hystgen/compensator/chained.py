@@ -24,6 +24,7 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.base import Array, Effect, Place, Run
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag.model import Lag
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.resonance.compensator import led
 from hystgen.effects.saturation.compensator import unsaturated
@@ -149,6 +150,15 @@ def refusal(effect: Effect) -> str:
     return ""
 
 
+def filter_block(effect: Effect) -> Block | None:
+    """The block of an effect that filters what passes, in front of the plays or behind them; none of any other."""
+    if isinstance(effect, creep.EFFECTS):
+        return creep.block(effect)
+    if isinstance(effect, Lag):
+        return lag.block(effect)
+    return own.Instance(effect) if effect.block else None
+
+
 class Compensator:
     """Drives for a reference; a sensor's own nonlinearity is left out, the reference being true displacement.
 
@@ -166,12 +176,11 @@ class Compensator:
             raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
         self.static, self.effects = static, effects
         plays = [effect for effect in effects if effect.place is Place.PLAYS]
-        lags = [block for effect in self._called("lag") if (block := lag.block(effect))]
         drives, outputs = (
-            [own.Instance(each) for each in effects if each.block and (each.place is Place.DRIVE) == ahead]
-            for ahead in (True, False)
+            [block for effect in effects if effect.place is place and (block := filter_block(effect))]
+            for place in (Place.DRIVE, Place.LINEAR)
         )
-        self.blocks: list[Block] = [*lags, *drives, Actuator(static, plays), *map(creep.block, creeping), *outputs]
+        self.blocks: list[Block] = [*drives, Actuator(static, plays), *outputs]
         self.slew = self._called("slew_limit")
         self.modes = self._called("resonance")
         self.delay = math.fsum(effect.time for effect in self._called("delay"))

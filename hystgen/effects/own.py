@@ -144,9 +144,11 @@ def problem(effect: type[Effect]) -> str:
     return ""
 
 
-def faults(block: OwnBlock) -> list[str]:
-    """What would keep the functions of a block from being the bit reference of its C, `FILE:LINE: what; what to do`."""
-    return [fault for verb, function in block.verbs() for fault in _of_function(verb, function)]
+@functools.cache
+def check(block: OwnBlock) -> None:
+    """Raise EffectsError where a block's functions cannot be the bit reference of its C, `FILE:LINE: what; do` each."""
+    if faults := [fault for verb, function in block.verbs() for fault in _of_function(verb, function)]:
+        raise EffectsError("\n".join(faults))
 
 
 ALLOWED = (

@@ -16,7 +16,7 @@ from hystgen.effects import own
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import VERBS, Kind
 from hystgen.emission.layout import WIDTH
-from hystgen.emission.runtime import Piece, split_pieces
+from hystgen.emission.runtime import Piece
 
 MOST_BYTES = 1 << 16
 
@@ -42,9 +42,6 @@ def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
 def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
     """Types and functions of the C file of an effect. Raises EffectsError, a line a problem: `FILE:LINE: what; do`."""
     file, kind = own.source(effect), own.kind(effect)
-    assert effect.block is not None
-    if wrong := own.faults(effect.block):
-        raise EffectsError("\n".join(wrong))
     try:
         data = file.read_bytes()
     except OSError as error:
@@ -53,9 +50,10 @@ def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
         raise EffectsError(f"{file}: has {len(data)} bytes, more than {MOST_BYTES}; give the block alone")
     text = data.decode("utf-8", "replace").replace("\r\n", "\n")
     problems = list(_of_lines(text))
+    found: list[Piece] = []
     if not problems:
-        found = split_pieces(text)
-        problems = list(_of_pieces(text, found, kind))
+        found = list(_split(text, problems))
+        problems += _of_pieces(text, found, kind)
     if problems:
         raise EffectsError("\n".join(f"{file}:{line}: {what}" for line, what in sorted(set(problems))))
     return [each for each in found if "typedef" in each.text], [each for each in found if "typedef" not in each.text]
@@ -99,40 +97,70 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
                 yield number, f"{word}, a name of the compiler's; choose another one"
 
 
+_TYPE = re.compile(r"typedef struct \{([^{}]*)\} (hystgen_\w+);")
+_FUNCTION = re.compile(r"static [\w *]*?\b(hystgen_\w+)\(([^(){}]*)\) \{")
+_NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
+
+
+def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
+    """The types and functions of a file, each with the comment right above it; whatever else there is, is a problem."""
+    code = _code(text).replace(INCLUDE, " " * len(INCLUDE))
+    end = 0
+    while start := re.search(r"\S", code[end:]):
+        begin, behind = end + start.start(), end
+        end = _end(code, begin)
+        whole = " ".join(code[begin:end].split())
+        found = _TYPE.fullmatch(whole) or _FUNCTION.match(whole)
+        if not found:
+            line = text.count("\n", 0, begin) + 1
+            what = f"{printable(whole)!r} belongs to no type and no static function; a block has these"
+            problems.append((line, what))
+            continue
+        name = found[2] if whole.startswith("typedef") else found[1]
+        above = text[behind:begin].rpartition("\n\n")[2]
+        comment = above if above.strip().startswith("/*") else ""
+        yield Piece(name, f"{comment.lstrip()}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name})
+
+
+def _end(code: str, begin: int) -> int:
+    """Where a type or function ends: at the brace that closes a function, else at a semicolon."""
+    depth = 0
+    for at in range(begin, len(code)):
+        depth += {"{": 1, "}": -1}.get(code[at], 0)
+        closed = code[at] == "}" and depth == 0 and not code.startswith("typedef", begin)
+        if depth < 0 or closed or (code[at] == ";" and depth == 0):
+            return at + 1
+    return len(code)
+
+
 def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
     """What a block has besides its types and functions, and what it lacks."""
-    own_name = f"hystgen_{kind.name}"
-    wanted = dict(_declared(kind))
+    own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
     names = [piece.name for piece in found]
-    functions = {name for name in names if name.startswith(f"{own_name}_")}
+    functions = {piece.name for piece in found if "typedef" not in piece.text}
     for name, declared in wanted.items():
         if name not in names:
             yield 1, f"has no {name}; write {declared}"
-    rest = _code(text).replace(INCLUDE, " " * len(INCLUDE))
     at = 0
     for piece in found:
         at = text.index(piece.text.rstrip("\n"), at)
-        line = text.count("\n", 0, at + len(piece.text) - len(piece.text.lstrip())) + 1
-        line += _code(piece.text)[: len(_code(piece.text)) - len(_code(piece.text).lstrip())].count("\n")
-        rest = rest[:at] + re.sub(r"[^\n]", " ", piece.text) + rest[at + len(piece.text) :]
-        at += len(piece.text)
-        code = " ".join(_code(piece.text).split())
-        head = code.partition("{")[0].strip() if "typedef" not in code else code
+        code = _code(piece.text)
+        line = text.count("\n", 0, at + len(code) - len(code.lstrip())) + 1
+        whole = " ".join(code.split())
+        head = whole if whole.startswith("typedef") else whole.partition(" {")[0]
         if names.count(piece.name) > 1:
-            yield line, f"{piece.name} a second time"
-        elif piece.name in wanted:
-            if _bare(head) != _bare(wanted[piece.name]):
-                yield line, f"{piece.name} is declared otherwise; write {wanted[piece.name]}"
-        elif not (piece.name in functions and re.match(r"static [\w ]*\(", head.replace("*", " "))):
-            yield line, f"{piece.name} is no static function {own_name}_..; a block has its types and such functions"
-        for used in piece.uses - functions - wanted.keys() - {"hystgen_real_t"}:
-            yield line, f"{piece.name} uses {used}, which it does not define; a block has what stands in its file"
-        for called in re.findall(r"(\w+) ?\(", _code(piece.text).partition("{")[2]):
-            if called not in CALLED and called not in functions:
-                yield line, f"{piece.name} calls {called}, which is not in the file; a block calls its own functions"
-    if left := re.search(r"\S.*", rest):
-        line = rest.count("\n", 0, left.start()) + 1
-        yield line, f"{printable(left[0].strip())!r} belongs to no type and no function; a block has nothing else"
+            yield line, f"{piece.name} is there {names.count(piece.name)} times; one is enough"
+        elif piece.name in wanted and _bare(head) != _bare(wanted[piece.name]):
+            yield line, f"{piece.name} is declared otherwise; write {wanted[piece.name]}"
+        elif not piece.name.startswith(f"{own_name}_") or (piece.name not in wanted and piece.name not in functions):
+            yield line, f"{piece.name} is none of the block's types, and no function {own_name}_..; leave it out"
+        for number, each in enumerate(code.split("\n")):
+            place = text.count("\n", 0, at) + 1 + number
+            for used in set(_NAME.findall(each)) - functions - wanted.keys() - {"hystgen_real_t"}:
+                yield place, f"{used} is not in the file; a block has what stands in its file"
+            for called in re.findall(r"(\w+) ?\(", each):
+                if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
+                    yield place, f"{called} is called, and is not in the file; a block calls its own functions"
 
 
 def _bare(declared: str) -> str:
