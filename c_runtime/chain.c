@@ -5,8 +5,8 @@
    actuator's and nothing else. Which blocks there are, the model's own functions say:
 
    drive_side    lag: in front of the memoryless part and the plays
-   output_side   creep, ageing, gain: behind the plays
-   displaced     saturation and offsets, behind everything
+   output_side   creep, ageing, heat, gain: behind the plays
+   displaced     saturation, offsets and drift, behind everything
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
@@ -184,9 +184,11 @@ void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
     }
     self->offset = inside;
+    hystgen_forward_clock_start(self);
 }
 
-void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
+/* The offset from the next step on, within its limits. */
+static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_real_t d)
 {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -197,6 +199,14 @@ void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
     }
     self->offset = inside;
+}
+
+void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
+{
+    hystgen_inverse_put_offset(self, d);
+    if (hystgen_finite(d)) {
+        hystgen_inverse_clock_start(self);
+    }
 }
 
 void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature)
@@ -310,5 +320,5 @@ hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self)
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured, hystgen_real_t share)
 {
     const hystgen_real_t more = share * (measured - hystgen_inverse_expected(self));
-    hystgen_inverse_set_offset(self, self->offset + more);
+    hystgen_inverse_put_offset(self, self->offset + more);
 }

@@ -128,7 +128,8 @@ class Model:
             return []
         from hystgen.compensator.chain import tables as chain_tables
 
-        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time))
+        how = self.parameters.emit.compensation
+        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, how))
 
     def without(self, effects: Sequence[Effect]) -> Model:
         """The model with these of its effects left out."""
@@ -225,6 +226,10 @@ class Model:
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any times"
             )
+        if any(effect.name == "drift" for effect in self.effects) and abs(float(record.t[0])) > EVEN * seconds:
+            raise EffectsError(
+                f"drift is counted from the first sample, and t begins at {float(record.t[0]):g} s; give t from 0 on"
+            )
         how = self.parameters.emit.compensation
         return run.answers(tables.build(self.chain, arithmetic, seconds, how), record, inverse)
 
@@ -271,7 +276,7 @@ class Model:
         """The inverse in double precision of a model with effects; raises as `inverse`."""
         from hystgen.compensator.chained import Compensator
 
-        return Compensator(self.chain)
+        return Compensator(self.chain, self.parameters.emit.compensation.compensate)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -16,6 +17,9 @@ from hystgen.parameters.files import parameters_sha256
 
 if TYPE_CHECKING:
     from hystgen.emission.stale import Difference
+
+ASYMMETRY_OR_SENSOR = ("asymmetry", "sensor_nonlinearity")
+"""A stage that was named, and the sensor that it may be instead."""
 
 Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
 
@@ -70,10 +74,23 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     check_names(models)
     made: dict[str, str] = {}
     for model in models:
+        if remark := doubtful_front(model):
+            warnings.warn(f"{model.name}: {remark}", stacklevel=3)
         chosen = emit_options(model, **options)
         emitted = emitted_model(model, chosen)
         made |= module.files(emitted.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
     return made
+
+
+def doubtful_front(model: Model) -> str:
+    """What may be wrong with a memoryless part that a diagnosis has named; nothing where there is none."""
+    if ASYMMETRY_OR_SENSOR not in model.parameters.not_separable or not model.cascade.stages:
+        return ""
+    return (
+        "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a sensor that is "
+        "curved; if it is the sensor's, the inverse bends the true motion. Record wide and nested loops, or the "
+        "displacement with another sensor, and diagnose again"
+    )
 
 
 def check_names(models: Sequence[Model]) -> None:

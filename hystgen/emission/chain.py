@@ -13,8 +13,10 @@ from dataclasses import dataclass
 from hystgen.compensator.chain import blocks, moving
 from hystgen.compensator.chain.moving import MovingTables
 from hystgen.compensator.chain.tables import ChainTables, Compiled
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.emission.text import WIDTH, literal, operand, structure, table
+from hystgen.plays import slots
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,16 @@ BENDS = ("none", "polynomial", "centre")
 
 SCANNED = "scanned"
 
+SETTINGS = {
+    "push": slots.OP_PUSH,
+    "settle": slots.OP_SETTLE,
+    "set_offset": slots.OP_OFFSET,
+    "set_temperature": slots.OP_TEMPERATURE,
+    "set_gain": slots.OP_GAIN,
+    "set_travel": slots.OP_TRAVEL,
+}
+"""Calls of models with effects that take a number and return none."""
+
 
 def plays(t: ChainTables) -> tuple[str, str]:
     """How plays move and are bent; empty where engine loop has them."""
@@ -165,8 +177,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
     before, after = sides(t)
+    clocks = [Block(constants, "clock") for constants in drift.constants(t.clock)]
     functions = [
-        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0)
+        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, clocks)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -175,7 +188,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "forward": every,
         "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
-    arrays = [text for block in (*before, *after) for text in block.arrays(prefix)]
+    arrays = [text for block in (*before, *after, *clocks) for text in block.arrays(prefix)]
     if len(t.tap):
         arrays.append(table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap)))
     number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
@@ -186,12 +199,13 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_FALLING": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
+    constants += [("LEAD", operand(row[drift.MOST_AHEAD]), "samples that references come ahead") for row in t.clock]
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     if t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
-    both, n = [*before, *after], len(t.threshold) - 1
+    both, n = [*before, *after, *clocks], len(t.threshold) - 1
     fields = {op: instance(op, both, len(t.tap), n, searched) for op in operators}
     return Glue(
         fields,
@@ -243,6 +257,7 @@ def _functions(
     after: Sequence[Block],
     behind: Sequence[dict[str, str]],
     ahead: bool,
+    clocks: Sequence[Block],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
     inverse = op == "inverse"
@@ -267,13 +282,20 @@ def _functions(
     lines = ["hystgen_real_t x = y;"] if behind else []
     x = "x" if behind else "y"
     lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
+    offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset"
+
+    def drifts(lead: str) -> str:
+        return "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
+
     yield _function(
         "The displacement for an output y of the chain.",
         f"static hystgen_real_t hystgen_{op}_displaced(const {self_t}, hystgen_real_t y)",
-        [*lines, f"return {x} + (HYSTGEN_OUTPUT_OFFSET + self->offset);"],
+        [*lines, f"return {x} + ({offsets}{drifts('0')});"],
     )
     if inverse:
-        lines = ["hystgen_real_t y = u - (HYSTGEN_OUTPUT_OFFSET + self->offset);"]
+        lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
+        lines = [f"const hystgen_real_t lead = {lead};"] * len(clocks)
+        lines.append(f"hystgen_real_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
         lines += [
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
         ]
@@ -283,7 +305,12 @@ def _functions(
             f"static hystgen_real_t hystgen_inverse_undisplaced(const {self_t}, hystgen_real_t u, bool *limited)",
             [*lines, *unused, "return y;"],
         )
-        put = ["hystgen_preview_put(self->line, &self->filled, y);"]
+        put = [
+            line for each in clocks
+            for line in (f"const hystgen_real_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
+                         f"self->{each.name}.lead = lead > HYSTGEN_LEAD ? HYSTGEN_LEAD : lead;")
+        ]  # fmt: skip
+        put.append("hystgen_preview_put(self->line, &self->filled, y);")
         yield _function(
             "What has to be given now for the newest reference, y once it is undisplaced.",
             f"static hystgen_real_t hystgen_inverse_ahead({self_t}, hystgen_real_t y)",
@@ -297,20 +324,34 @@ def _functions(
         )  # fmt: skip
     gains = [block for block in after if block.kind.name == "gain"]
     ageing = [block for block in after if block.kind.name == "ageing"]
+    heat = [block for block in after if block.kind.name == "heat"]
     yield _function(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
         [
             "self->offset = 0;",
+            *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
+            *(f"self->{each.name}.lead = 0;" for each in clocks),
+            *(f"hystgen_heat_init(&self->{each.name});" for each in heat),
             *(f"hystgen_gain_init(&self->{block.name});" for block in gains),
             *(f"(void)hystgen_ageing_set_travel({each.table}, &self->{each.name}, 0);" for each in ageing),
         ],
     )
     yield _function(
-        "The drive moves to v from where it was.",
+        "The drive moves to v from where it was, in one sample.",
         f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
-        [f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing]
-        or ["(void)self;", "(void)v;"],
+        [
+            *(f"hystgen_clock_tick({each.table}, &self->{each.name});" for each in clocks),
+            *(f"hystgen_heat_move({each.table}, &self->{each.name}, self->applied, v);" for each in heat),
+            *(f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing),
+            *(["(void)self;"] if not (clocks or heat or ageing) else []),
+            *(["(void)v;"] if not (heat or ageing) else []),
+        ],
+    )
+    yield _function(
+        "Drift begins anew, at the drive absorbed last.",
+        f"static void hystgen_{op}_clock_start({self_t})",
+        [f"hystgen_clock_start(&self->{each.name});" for each in clocks] or ["(void)self;"],
     )
     heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
     yield _function(

@@ -169,9 +169,7 @@ def estimate(
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    kinds: list[Kind] = []
-    if isinstance(numbers, ChainTables):
-        kinds = [each.kind for side in blocks.sides(numbers) for each in side]
+    kinds = [each.kind for each in blocks.every(numbers)] if isinstance(numbers, ChainTables) else []
     memory, avr = (_memory(cascade, options, text, plays, layout, fields, kinds) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
@@ -192,7 +190,7 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks of a model with effects in one step, of each operator."""
     envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
     stages = len(t.behind.stage_kind) + envelopes
-    absorbed, solved = (sum(each.products[way] for side in blocks.sides(t) for each in side) for way in (0, 1))
+    absorbed, solved = (sum(each.products[way] for each in blocks.every(t)) for way in (0, 1))
     return {"forward": absorbed + stages, "inverse": absorbed + solved + stages + len(t.tap)}
 
 

@@ -79,7 +79,7 @@ def files(
         )
     if shared:
         made.update(runtime_files(options.arithmetic))
-    operators = selftest.operators(values.numbers, options)
+    operators = selftest.operators(values.numbers, options, values.calls)
     costs = _selftest_cost(options, values.cost, sum(len(each["samples"]) for each in operators))
     for ending, about, details in (
         (".h", f"checks {name} on the target", costs),
@@ -233,7 +233,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
     values.functions = front + "\n" + glue.functions if glue else front
-    calls = glue.calls if glue else {}
+    values.calls = calls = glue.calls if glue else {}
     own_types, own_functions = own.pieces(compiled.tables) if compiled else ([], [])
     pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls, own_functions)
     kernels = runtime.needed(

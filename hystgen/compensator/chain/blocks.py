@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
+
 from hystgen.compensator.chain import own
 from hystgen.compensator.chain.tables import ChainTables, OwnChainTables
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.thermal import compensator as thermal
 
-KINDS = (creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.KIND)
+KINDS = (creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, drift.KIND)
 """Those of the catalogue, each with a file of its name in `c_runtime/`."""
 
 
@@ -18,5 +21,10 @@ def sides(t: ChainTables) -> tuple[list[Constants], list[Constants]]:
     """The blocks in front of the plays, from the drive on, and those behind them."""
     given = own.constants(t.own, t.own_effects) if isinstance(t, OwnChainTables) else []
     ahead, behind = given[: t.own.ahead], given[t.own.ahead :]
-    gains = [*ageing.constants(t.ageing), *thermal.constants(t.gain)]
+    gains = [*ageing.constants(t.ageing), *thermal.heat_constants(t.heat), *thermal.constants(t.gain)]
     return [*lag.constants(t.lag), *ahead], [*creep.constants(t.creep), *behind, *gains]
+
+
+def every(t: ChainTables) -> list[Constants]:
+    """These, and the clock of a drift."""
+    return [*itertools.chain(*sides(t)), *drift.constants(t.clock)]

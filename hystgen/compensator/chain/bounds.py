@@ -32,6 +32,7 @@ from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.saturation.model import TanhSaturation
+from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LEAST_GAIN
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
@@ -54,7 +55,8 @@ def _sizes(compiled: Compiled) -> _Sizes:
     output = plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
     output *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
     ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
-    return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + 2.0 * max(ends))
+    settings = 2.0 * max(ends) * (1 + 3 * len(t.clock))  # a drift has six roundings of its own
+    return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
 
 def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
@@ -96,6 +98,16 @@ def _late(compiled: Compiled) -> float:
     return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
 
 
+def _warmed(compiled: Compiled) -> float:
+    """Change of the output by the heat of one sample at the fastest rate."""
+    ends, output = compiled.static.input_range, _sizes(compiled).output
+    return math.fsum(
+        thermal.most_at_once(each, ends, compiled.largest_step, compiled.seconds)
+        * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
+        for each in compiled.parts.heat
+    )
+
+
 def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
     """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it."""
     u = float(np.finfo(kind).eps) / 2
@@ -122,8 +134,8 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
     u = float(np.finfo(kind).eps) / 2
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
-    gains = len(t.gain) + len(t.ageing.turns)
-    gain = (1.0 / LEAST_GAIN) ** gains
+    gains = len(t.gain) + len(t.ageing.turns) + 9 * len(t.heat.turns)  # own heat: the temperature's roundings too
+    gain = (1.0 / LEAST_GAIN) ** (len(t.gain) + len(t.ageing.turns) + len(t.heat.turns))
     taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
     inverse = 4.0 * u * sizes.displacement * slope + back
     if compiled.taps:
@@ -133,6 +145,8 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
     if t.ageing.turns.size and kind != "float64":  # the gain of the travel one sample before, and its table
         late = _late(compiled) * sizes.output
         inverse += gain * late
+    if t.heat.turns.size and kind != "float64":  # the heat of one sample
+        inverse += gain * _warmed(compiled) * (1.0 / LEAST_GAIN)
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
@@ -194,5 +208,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
     rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])
-    most = (1.0 / LEAST_GAIN) ** (len(compiled.tables.gain) + len(compiled.tables.ageing.turns)) * rest
+    most = (1.0 / LEAST_GAIN) ** (
+        len(compiled.tables.gain) + len(compiled.tables.ageing.turns) + len(compiled.tables.heat.turns)
+    ) * rest
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

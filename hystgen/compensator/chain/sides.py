@@ -16,7 +16,7 @@ from hystgen.effects.ageing.compensator import ageing_absorb, ageing_solve
 from hystgen.effects.creep.compensator import creep_absorb, creep_rest, creep_resting, creep_solve
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.lag.compensator import lag_absorb, lag_rest, lag_solve
-from hystgen.effects.thermal.compensator import gain_absorb, gain_solve
+from hystgen.effects.thermal.compensator import gain_absorb, gain_solve, heat_absorb, heat_solve
 from hystgen.plays.slots import Reals
 
 
@@ -117,6 +117,8 @@ def sides_of(drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
         x = own_output_rest(t.own, s.own, x)
         for j in range(len(t.ageing.turns)):
             x = ageing_absorb(s.ageing, j, x)
+        for j in range(len(t.heat.turns)):
+            x = heat_absorb(s.heat, j, x)
         for j in range(len(t.gain)):
             x = gain_absorb(s.gain, j, x)
         return x
@@ -130,6 +132,8 @@ def sides_of(drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
         x = own_output_absorb(t.own, s.own, x)
         for j in range(len(t.ageing.turns)):
             x = ageing_absorb(s.ageing, j, x)
+        for j in range(len(t.heat.turns)):
+            x = heat_absorb(s.heat, j, x)
         for j in range(len(t.gain)):
             x = gain_absorb(s.gain, j, x)
         return x
@@ -140,6 +144,8 @@ def sides_of(drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
         x = y
         for j in range(len(t.gain) - 1, -1, -1):
             x = gain_solve(s.gain, j, x)
+        for j in range(len(t.heat.turns) - 1, -1, -1):
+            x = heat_solve(s.heat, j, x)
         for j in range(len(t.ageing.turns) - 1, -1, -1):
             x = ageing_solve(s.ageing, j, x)
         x = own_output_resting(t.own, s.own, x)
@@ -153,6 +159,8 @@ def sides_of(drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
         x = y
         for j in range(len(t.gain) - 1, -1, -1):
             x = gain_solve(s.gain, j, x)
+        for j in range(len(t.heat.turns) - 1, -1, -1):
+            x = heat_solve(s.heat, j, x)
         for j in range(len(t.ageing.turns) - 1, -1, -1):
             x = ageing_solve(s.ageing, j, x)
         x = own_output_solve(t.own, s.own, x)

@@ -41,8 +41,9 @@ from hystgen.effects.ageing.compensator import (
     ageing_set_travel,
 )
 from hystgen.effects.creep.compensator import CreepState
+from hystgen.effects.drift.compensator import LEAD, MOST_AHEAD, ONE, clock_drift, clock_start, clock_tick
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.thermal.compensator import gain_heat, gain_reset
+from hystgen.effects.thermal.compensator import gain_heat, gain_reset, heat_move, heat_reset
 from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays import loop
 from hystgen.plays.loop import (
@@ -99,6 +100,8 @@ class ChainState(NamedTuple):
     creep: CreepState
     ageing: AgeingState
     gain: Reals  # (k, 3)
+    heat: Reals  # (k, 5)
+    clock: Reals  # (k, 3)
     own: Reals  # (m,)
     line: Line
     real: Reals
@@ -115,6 +118,8 @@ def new_state(t: ChainTables) -> ChainState:
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
+        np.zeros((len(t.heat.turns), 5), dtype),
+        np.zeros((len(t.clock), 3), dtype),
         np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(3, dtype),
@@ -130,19 +135,40 @@ plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_i
 @jit(inline=True)
 def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
     """What leaves the actuator: the output side's answer through what saturates, and its offsets."""
-    return front_forward(t.behind, y, 1) + (t.number[OFFSET] + s.real[SET])
+    offset = t.number[OFFSET] + s.real[SET]
+    for j in range(len(t.clock)):
+        offset = offset + clock_drift(t.clock, s.clock, j, t.plays.limits[ZERO])
+    return front_forward(t.behind, y, 1) + offset
 
 
 @jit(inline=True)
 def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
     """What the output side has to give for the displacement u, and whether nothing does."""
-    return front_inverse(t.behind, u - (t.number[OFFSET] + s.real[SET]), 1)
+    offset = t.number[OFFSET] + s.real[SET]
+    for j in range(len(t.clock)):
+        lead = s.clock[j, LEAD] if s.line.filled[0] else t.plays.limits[ZERO]
+        offset = offset + clock_drift(t.clock, s.clock, j, lead + t.clock[j, ONE] if s.flags[MOVING] else lead)
+    return front_inverse(t.behind, u - offset, 1)
+
+
+@jit
+def led(t: ChainTables, s: ChainState) -> None:
+    """A reference has come: the next one is a sample more ahead, up to the preview."""
+    for j in range(len(t.clock)):
+        lead = t.clock[j, ONE]
+        if s.line.filled[0]:
+            lead = lead + s.clock[j, LEAD]
+        s.clock[j, LEAD] = t.clock[j, MOST_AHEAD] if lead > t.clock[j, MOST_AHEAD] else lead
 
 
 @jit
 def settings_reset(t: ChainTables, s: ChainState) -> None:
     """Offset and gains as in the parameter file."""
     s.real[SET] = t.plays.limits[ZERO]
+    for j in range(len(t.clock)):
+        clock_start(s.clock, j)
+    for j in range(len(t.heat.turns)):
+        heat_reset(t.heat, s.heat, j)
     for j in range(len(t.gain)):
         gain_reset(t.gain, s.gain, j)
     for j in range(len(t.ageing.turns)):
@@ -151,7 +177,11 @@ def settings_reset(t: ChainTables, s: ChainState) -> None:
 
 @jit
 def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
-    """The drive moves to v from where it was."""
+    """The drive moves to v from where it was, in one sample."""
+    for j in range(len(t.clock)):
+        clock_tick(t.clock, s.clock, j)
+    for j in range(len(t.heat.turns)):
+        heat_move(t.heat, s.heat, j, s.real[APPLIED], v)
     for j in range(len(t.ageing.turns)):
         ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
 
@@ -224,6 +254,7 @@ def inverse_put(t: ChainTables, s: ChainState, u: Any) -> Any:
         s.plays.counts[STATUS] |= DOMAIN
     if len(t.tap) == 0:
         return wanted
+    led(t, s)
     preview_put(s.line, wanted)
     return preview_target(t.tap, s.line)
 
@@ -254,8 +285,8 @@ def expected(t: ChainTables, s: ChainState) -> Any:
 
 
 @jit
-def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
-    """An offset of the displacement, from the next step on."""
+def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+    """An offset of the displacement, from the next step on, within its limits."""
     if not finite(t.plays, d):
         s.plays.counts[STATUS] |= HELD
         return
@@ -270,9 +301,18 @@ def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
 
 
 @jit
+def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+    """An offset of the displacement, from the next step on; drift begins anew."""
+    put_offset(t, s, d)
+    if finite(t.plays, d):
+        for j in range(len(t.clock)):
+            clock_start(s.clock, j)
+
+
+@jit
 def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
     """Trim the offset by a share of what a sensor sees beyond the expected displacement."""
-    set_offset(t, s, s.real[SET] + share * (measured - expected(t, s)))
+    put_offset(t, s, s.real[SET] + share * (measured - expected(t, s)))
 
 
 @jit

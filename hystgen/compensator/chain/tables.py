@@ -28,11 +28,14 @@ from hystgen.effects.ageing.model import SHAPES as AGEING
 from hystgen.effects.base import USER, Effect, Place
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.effects.thermal.model import SelfHeating
 from hystgen.front.tanh import kernels
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import Compensation
@@ -75,6 +78,8 @@ class ChainTables(NamedTuple):
     creep: CreepTables
     ageing: AgeingTables
     gain: Reals  # (k, 8)
+    heat: HeatTables
+    clock: Reals  # (k, 8)
     own: OwnTables
     behind: Stages
     tap: Reals  # (L,), none without a preview
@@ -117,6 +122,8 @@ class Parts:
     creeps: list[Any]
     ageing: list[Any]
     thermal: list[Any]
+    heat: list[Any]
+    drift: list[Any]
     modes: list[Any]
     saturations: list[Any]
     slew: list[Any]
@@ -132,9 +139,11 @@ class Parts:
         def called(name: str) -> list[Any]:
             return [effect for effect in effects if effect.name == name]
 
+        thermal_effects = called("thermal")
         return cls(
             [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
-            called("thermal"), called("resonance"), called("saturation"), called("slew_limit"),
+            [each for each in thermal_effects if each.columns], [each for each in thermal_effects if not each.columns],
+            called("drift"), called("resonance"), called("saturation"), called("slew_limit"),
             [effect for effect in effects if effect.place is Place.PLAYS],
             math.fsum(each.time for each in called("delay")),
             [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
@@ -267,6 +276,21 @@ def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]]
     )
 
 
+def _heat(
+    parts: Parts,
+    ends: tuple[float, float],
+    span: float,
+    seconds: float,
+    reals: Callable[[Any, str], NDArray[Any]],
+    roundoff: float,
+) -> HeatTables:
+    """Gains over the temperature of own heat."""
+    return HeatTables(
+        reals([thermal.heat_numbers(each, span, seconds) for each in parts.heat], "temperatures").reshape(-1, 7),
+        np.array([thermal.heat_turns(each, ends, seconds, roundoff) for each in parts.heat], dtype=np.int64),
+    )
+
+
 def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation = STANDARD) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
@@ -299,6 +323,7 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation = STA
     needed = preview.taps(delay, modes, seconds, how.taps, how.corner)
     led = preview.led(needed, how.preview)
     taps = led if len(led.weights) > 1 or led.first else None
+    ahead = how.preview if how.preview is not None else max(taps.ahead, 0) if taps else 0
     rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
     rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
     lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
@@ -323,6 +348,8 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation = STA
         ),
         _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
         reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
+        _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
+        reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
         own.build(drives, outputs, reals),
         _behind(parts, dtype),
         reals(taps.weights if taps else [], "weights of the preview"),
@@ -341,17 +368,29 @@ def _behind_slew(chain: Chain) -> int:
     return max((i for i, effect in enumerate(chain.effects) if effect.name == "slew_limit"), default=-1) + 1
 
 
-def refusals(chain: Chain, operator: str, seconds: float) -> Iterator[tuple[Effect, str]]:
+def refusals(
+    chain: Chain, operator: str, seconds: float, how: Compensation = STANDARD
+) -> Iterator[tuple[Effect, str]]:
     """The effects that an operator cannot have in the C, each with its reason."""
     low, high = chain.cascade.input_range
     parts = Parts.of(chain.effects)
     for effect in chain.effects:
         if operator != "inverse" and effect.name in ("delay", "resonance"):
             yield effect, "only the inverse has it; emit the inverse alone"
-        elif effect.name == "drift":
-            yield effect, "a clock that runs alone, and nothing says when it began; set_offset takes it from outside"
+        elif effect.name == "drift" and "drift" not in how.compensate:
+            yield effect, (
+                "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
+                "emit.compensation.compensate: [drift] lets the module count from there"
+            )
+        elif isinstance(effect, SelfHeating) and "self_heating" in how.compensate:
+            yield from ((effect, reason) for reason in thermal.heat_problems(effect, (low, high), seconds))
+        elif isinstance(effect, SelfHeating):
+            yield effect, (
+                "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
+                "followed by emit.compensation.compensate: [self_heating]"
+            )
         elif effect.name == "thermal" and not effect.columns:
-            yield effect, "the drive's own heat, open loop: its temperature drifts with the room's; measure it"
+            yield effect, "the heat of loops, open loop: its temperature drifts with the room's; measure it"
         elif effect.block:
             yield from ((effect, reason) for reason in own.problems(effect, seconds))
             if effect.place is Place.DRIVE and effect in chain.effects[: _behind_slew(chain)]:
