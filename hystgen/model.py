@@ -332,7 +332,7 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
 
 def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
     if isinstance(sources, str | os.PathLike) or not isinstance(sources, Iterable):
-        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect.py']")
+        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect']")
     found: list[type[Effect]] = []
     for source in sources:
         from hystgen.effects.user import load_user_effects  # no effect, no import: `hystgen emit` has to start fast

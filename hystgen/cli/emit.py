@@ -46,6 +46,8 @@ def emit(
     """Write the C files of models.
 
     Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
+
+    With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
     from hystgen.emission import calls, files
 
