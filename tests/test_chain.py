@@ -395,6 +395,7 @@ def test_a_front_that_may_be_the_sensor_s_is_emitted_with_a_warning(
         assert code == 0, err
         assert (f"warning: {name}: the memoryless part was diagnosed as asymmetry" in err) == wanted
         assert ("nested loops" in err) == wanted
+        assert ("the inverse bends the true motion" in err) == wanted
         assert f"{name}.c" in out
     parameters = parse_parameters(CHAINS["creeping"] + DOUBTFUL, "f")
     assert parse_parameters(dump_parameters(parameters), "f") == parameters

@@ -18,9 +18,6 @@ from hystgen.parameters.files import parameters_sha256
 if TYPE_CHECKING:
     from hystgen.emission.stale import Difference
 
-ASYMMETRY_OR_SENSOR = ("asymmetry", "sensor_nonlinearity")
-"""A stage that was named, and the sensor that it may be instead."""
-
 Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
 
 
@@ -74,23 +71,29 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     check_names(models)
     made: dict[str, str] = {}
     for model in models:
-        if remark := doubtful_front(model):
-            warnings.warn(f"{model.name}: {remark}", stacklevel=3)
+        for doubt in doubts(model):
+            warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
         chosen = emit_options(model, **options)
         emitted = emitted_model(model, chosen)
         made |= module.files(emitted.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
     return made
 
 
-def doubtful_front(model: Model) -> str:
-    """What may be wrong with a memoryless part that a diagnosis has named; nothing where there is none."""
-    if ASYMMETRY_OR_SENSOR not in model.parameters.not_separable or not model.cascade.stages:
-        return ""
-    return (
-        "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a sensor that is "
-        "curved; if it is the sensor's, the inverse bends the true motion. Record wide and nested loops, or the "
-        "displacement with another sensor, and diagnose again"
-    )
+def doubts(model: Model) -> list[str]:
+    """What may be wrong with the inverse of a model whose diagnosis could not tell the stage from its sensor."""
+    named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
+    found = []
+    if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
+        found.append(
+            "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a curved sensor; "
+            f"if it is the sensor's, the inverse bends the true motion. {advice}, and diagnose again"
+        )
+    if ("sensor_nonlinearity", "asymmetry") in named and any(e.name == "sensor_nonlinearity" for e in model.effects):
+        found.append(
+            "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
+            f"if it is the stage's, the inverse leaves it as it is. {advice}, and diagnose again"
+        )
+    return found
 
 
 def check_names(models: Sequence[Model]) -> None:
