@@ -40,7 +40,9 @@ EFFECTS = {
     "lag": "name: lag, time_constant: 0.01",
     "lag_exact": "name: lag, time_constant: 2.0e-4",
     "ageing": "name: ageing, loss: 0.02, travel: 50",
+    "heat": "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001",
     "gain": "name: thermal, gain_per_degree: 0.001",
+    "clock": "name: drift, rate: 1.0e-3",
     "preview": "name: resonance, frequency: 30, damping: 0.05",
     "slew": "name: slew_limit, rate: 1.0e+5",
     "tanh": "name: saturation, level: 1000",
@@ -62,6 +64,7 @@ def model(effect: str) -> Model:
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
     text += f"    thresholds: {[0.45 * k for k in range(CODE_PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * CODE_PLAYS}\n"
     text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
+    text += "emit: {compensation: {compensate: [drift, self_heating]}}\n"
     return Model(parse_parameters(text, "bench.yaml"))
 
 

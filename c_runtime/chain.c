@@ -5,8 +5,8 @@
    actuator's and nothing else. Which blocks there are, the model's own functions say:
 
    drive_side    lag: in front of the memoryless part and the plays
-   output_side   creep, ageing, gain: behind the plays
-   displaced     saturation and offsets, behind everything
+   output_side   creep, ageing, heat, gain: behind the plays
+   displaced     saturation, offsets and drift, behind everything
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
@@ -177,8 +177,8 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
     hystgen_inverse_absorb(self, inside);
 }
 
-/* An offset of the displacement from the next step on. */
-static void hystgen_forward_shift(hystgen_forward_t *self, hystgen_signal_t d)
+/* The offset from the next step on, within its limits. */
+static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d)
 {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -193,11 +193,15 @@ static void hystgen_forward_shift(hystgen_forward_t *self, hystgen_signal_t d)
 
 void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
 {
-    hystgen_forward_shift(self, hystgen_entered_level(d));
+    const hystgen_signal_t level = hystgen_entered_level(d);
+    hystgen_forward_put_offset(self, level);
+    if (hystgen_finite(level)) {
+        hystgen_forward_clock_start(self);
+    }
 }
 
-/* An offset of the displacement from the next step on. */
-static void hystgen_inverse_shift(hystgen_inverse_t *self, hystgen_signal_t d)
+/* The offset from the next step on, within its limits. */
+static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d)
 {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -212,7 +216,11 @@ static void hystgen_inverse_shift(hystgen_inverse_t *self, hystgen_signal_t d)
 
 void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
 {
-    hystgen_inverse_shift(self, hystgen_entered_level(d));
+    const hystgen_signal_t level = hystgen_entered_level(d);
+    hystgen_inverse_put_offset(self, level);
+    if (hystgen_finite(level)) {
+        hystgen_inverse_clock_start(self);
+    }
 }
 
 void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature)
@@ -331,5 +339,5 @@ void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured, h
 {
     const hystgen_signal_t more =
         hystgen_entered_level(measured) - hystgen_inverse_displaced(self, self->output);
-    hystgen_inverse_shift(self, self->offset + hystgen_shared(share, more));
+    hystgen_inverse_put_offset(self, self->offset + hystgen_shared(share, more));
 }

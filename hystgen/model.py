@@ -140,7 +140,8 @@ class Model:
             return []
         from hystgen.compensator.chain import tables as chain_tables
 
-        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, arithmetic))
+        how = self.parameters.emit.compensation
+        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, arithmetic, how))
 
     def without(self, effects: Sequence[Effect]) -> Model:
         """The model with these of its effects left out."""
@@ -237,6 +238,10 @@ class Model:
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any times"
             )
+        if any(effect.name == "drift" for effect in self.effects) and abs(float(record.t[0])) > EVEN * seconds:
+            raise EffectsError(
+                f"drift is counted from the first sample, and t begins at {float(record.t[0]):g} s; give t from 0 on"
+            )
         how = self.parameters.emit.compensation
         return run.answers(tables.build(self.chain, arithmetic, seconds, how, self._lsb), record, inverse)
 
@@ -283,7 +288,7 @@ class Model:
         """The inverse in double precision of a model with effects; raises as `inverse`."""
         from hystgen.compensator.chained import Compensator
 
-        return Compensator(self.chain)
+        return Compensator(self.chain, self.parameters.emit.compensation.compensate)
 
 
 @dataclass(frozen=True)
@@ -339,7 +344,7 @@ def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] 
 
 def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> list[type[Effect]]:
     if isinstance(sources, str | os.PathLike) or not isinstance(sources, Iterable):
-        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect.py']")
+        raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect']")
     found: list[type[Effect]] = []
     for source in sources:
         from hystgen.effects.user import load_user_effects  # no effect, no import: `hystgen emit` has to start fast

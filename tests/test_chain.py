@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 import re
 import subprocess
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
+from modelfiles import CHAINS, CREEP, FILES, FLOAT_ALONE, INVERSE_ALONE, chain
 from scipy.integrate import solve_ivp
 
 import hystgen
+from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, preview, tables
@@ -21,12 +24,13 @@ from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
-from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.files import canonical_json, dump_parameters, parameters_sha256, parse_parameters
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
@@ -87,7 +91,7 @@ def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     assert report.ok, report.table()
 
 
-EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy"), 1e-12) | {
+EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy", "drifting"), 1e-12) | {
     "viscous": 2e-4, "relaxing": 2e-4, "dashpot": 1e-4, "soft_dashpot": 2e-3,
 }  # fmt: skip
 """Of the output range. Viscous plays: contacts inside a step. Dashpots: where on its way in a step an input counts as
@@ -113,6 +117,82 @@ def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: in
     assert np.max(np.abs(y - run.v)[free]) <= EXACT[name] * span
 
 
+def test_drift_is_compensated_ahead_of_time() -> None:
+    """References are ahead of a motion by whole samples, in which the drift goes on."""
+    text = chain("ahead", "name: drift, rate: -0.08", "name: delay, time: 3.0e-3", CREEP, compensate="drift")
+    one = model("ahead", text)
+    numbers = compiled(one, "float64")
+    t = np.arange(N) * T
+    u = 0.5 + 1.5 * t
+    v = answers(numbers, Run(t, u, {}), True)
+    known = N - numbers.ahead
+    assert np.max(np.abs(one.simulate(v, t=t) - u)[numbers.ahead : known]) < 1e-12
+    assert np.ptp(one.effects[0].added(Run(t, u))) > 0.1, "what it is worth"
+
+
+def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None:
+    one = model("drifting")
+    numbers = compiled(one, "float64")
+    calls: list[tuple[int, float]] = [(slots.OP_STEP, 1.0)] * 2001
+    drifted = 0.05 * 2.0 + 0.005 * 2.0**2
+    answer, status = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_EXPECTED, 0.0)])
+    fresh, _ = run_calls(one, [(slots.OP_SETTLE, 1.0), (slots.OP_EXPECTED, 0.0)])
+    counted = 2.001
+    assert float(answer[-1] - fresh[-1]) == pytest.approx(0.05 * counted + 0.005 * counted**2, abs=1e-12)
+    assert not np.any(status)
+    anew, _ = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_OFFSET, 0.25), (slots.OP_EXPECTED, 0.0)])
+    assert float(anew[-1] - fresh[-1]) == pytest.approx(0.25, abs=1e-12), "the clock begins anew"
+    held, _ = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_OFFSET, math.nan), (slots.OP_EXPECTED, 0.0)])
+    assert float(held[-1]) == float(answer[-1]), "no number changes nothing"
+    trimmed, _ = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_CORRECT, float(answer[-1])),
+                                 (slots.OP_EXPECTED, 0.0)])  # fmt: skip
+    assert float(trimmed[-1]) == float(answer[-1]), "a sensor that sees what is expected changes nothing"
+    assert drifted > 0.1
+    span = float(numbers.tables.number[tables.FARTHEST])
+    far = chain("far", "name: drift, rate: 1.0e+4", compensate="drift")
+    late, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0)] * 50 + [(slots.OP_EXPECTED, 0.0)])
+    none, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0), (slots.OP_EXPECTED, 0.0)])
+    assert abs(float(late[-1])) <= abs(float(none[-1])) + 3.0 * span, "drift stays within what can be set"
+
+
+def test_a_clock_counts_beyond_the_digits_of_a_float() -> None:
+    one = compiled(model("drifting"), "float32").tables
+    state = np.zeros((1, 3), np.float32)
+    with jit.plain():
+        for start in (0.0, 2.0**24 - 2.0):
+            state[0] = 0.0, start, 0.0
+            for _ in range(5):
+                drift.clock_tick(one.clock, state, 0)
+            assert float(state[0, drift.HIGH]) * 2.0**24 + float(state[0, drift.LOW]) == start + 5.0
+        seconds = (2.0**24 + 3.0) * T
+        limited = min(0.05 * seconds + 0.005 * seconds**2, float(one.clock[0, drift.FARTHEST]))
+        assert float(drift.clock_drift(one.clock, state, 0, np.float32(0.0))) == pytest.approx(limited, rel=1e-6)
+
+
+def test_own_heat_leaves_the_gain_of_one_sample() -> None:
+    """The forward operator has it exactly; the inverse takes the gain before the last move."""
+    one = model("heated")
+    numbers = compiled(one, "float64")
+    run = record(numbers, 5, share=0.6)
+    v = answers(numbers, run, True)
+    left = np.abs(one.simulate(v, t=run.t) - run.v)
+    heat = one.effects[0]
+    rises = heat.above(Run(run.t, v))  # type: ignore[attr-defined]
+    most = np.max(np.abs(np.diff(rises)))
+    loss = 1.0 - math.exp(-T / 0.5)
+    sample = 0.05 * loss * np.max(np.abs(np.diff(v * np.abs(v)))) / (4.0 * T)
+    assert sample >= most
+    size = float(np.max(np.abs(one.without([heat]).simulate(v) - 0.5)))
+    assert 0.0 < np.max(left) <= (0.02 * size + 0.1) * sample * 1.001
+    assert np.max(rises) > 0.5, "it has warmed"
+    plain = one.without([heat]).inverse().simulate(run.v)
+    assert np.max(np.abs(one.simulate(plain, t=run.t) - run.v)) > 20.0 * np.max(left), "what it is worth"
+    forward = answers(numbers, Run(run.t, v, {}), False)
+    assert np.max(np.abs(forward - one.simulate(v, t=run.t))) < 1e-12
+    exact = one.inverse().simulate(run.v, t=run.t)
+    assert np.max(np.abs(one.simulate(exact, t=run.t) - run.v)) < 1e-12, "in double precision the drive is sought"
+
+
 def test_ageing_leaves_the_gain_of_one_sample() -> None:
     one = model("worn")
     numbers = compiled(one, "float64")
@@ -134,7 +214,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
     run = record(numbers, seed)
     ends = tuple(float(end) for end in numbers.tables.limits[:2])
     v = answers(numbers, run, True).astype(float)
-    wanted = Compensator(one.chain).drives(run, ends)  # type: ignore[arg-type]
+    wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(run, ends)  # type: ignore[arg-type]
     known = N - numbers.ahead
     assert np.max(np.abs(v - wanted)[:known]) <= bound.inverse
     if operator(name) == "both":
@@ -287,7 +367,7 @@ def test_preview_reads_ahead_what_is_late() -> None:
 
 def with_options(name: str, **options: Any) -> Model:
     one = model(name).parameters
-    how = Compensation(**options)
+    how = one.emit.compensation.model_copy(update=Compensation(**options).model_dump(exclude_unset=True))
     return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
 
 
@@ -349,6 +429,49 @@ def test_preview_hold_corner_and_rate_are_options() -> None:
     ramp = preview.taps(0.0, [], T, corner=4)
     middle = math.fsum((ramp.first + k) * w for k, w in enumerate(ramp.weights))
     assert middle == pytest.approx(0.0, abs=1e-12), "rounding corners moves nothing in time"
+
+
+DOUBTFUL = 'not_separable: [[asymmetry, sensor_nonlinearity], [creep, drift]]\n'
+
+
+def test_a_front_that_may_be_the_sensor_s_is_emitted_with_a_warning(
+    tmp_path: Path, run: Callable[..., tuple[int, str, str]]
+) -> None:
+    for name, text, wanted in (
+        ("logarithmic", CHAINS["logarithmic"] + DOUBTFUL, True),
+        ("logarithmic", CHAINS["logarithmic"], False),
+        ("logarithmic", CHAINS["logarithmic"] + DOUBTFUL.replace("asymmetry", "saturation"), False),
+        ("creeping", CHAINS["creeping"] + DOUBTFUL, False),
+        ("curved", FILES["curved"] + DOUBTFUL, True),
+    ):
+        path = tmp_path / "one.yaml"
+        path.write_text(text)
+        code, out, err = run("emit", path, "-o", tmp_path / "out")
+        assert code == 0, err
+        assert (f"warning: {name}: the memoryless part was diagnosed as asymmetry" in err) == wanted
+        assert ("nested loops" in err) == wanted
+        assert ("the inverse bends the true motion" in err) == wanted
+        assert f"{name}.c" in out
+    parameters = parse_parameters(CHAINS["creeping"] + DOUBTFUL, "f")
+    assert parse_parameters(dump_parameters(parameters), "f") == parameters
+    plain = parse_parameters(CHAINS["creeping"], "f")
+    assert parameters_sha256(parameters) != parameters_sha256(plain)
+    assert "not_separable" not in canonical_json(plain)
+
+
+@pytest.mark.parametrize("name", ["aged", "warm", "late", "drifting", "everything"])
+def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
+    """Each of them, and one that is beyond its limits."""
+    one = model(name)
+    text = emitted_files(one, operator=operator(name))
+    calls = set(re.findall(rf"{name}_inverse_(push|settle|set_\w+)\(", text[f"{name}.h"]))
+    tested = dict(re.findall(rf"kind == '(\w)'\) {{\n +{name}_inverse_(\w+)\(", text[f"{name}_selftest.c"]))
+    assert set(tested.values()) == calls | {"reset", "commit"}
+    samples = text[f"{name}_selftest.c"].partition("_selftest_inverse[")[2].partition("};")[0]
+    counts = Counter(re.findall(r"{'(\w)'", samples))
+    assert all(counts[letter] >= 1 for letter in tested)
+    limited = re.findall(r"{'(\w)', [^}]*, (\d+)u}", samples)
+    assert any(int(status) & slots.LIMITED_SETTING for letter, status in limited if letter in tested)
 
 
 def test_only_what_the_model_has_is_emitted() -> None:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
-from hystgen.compensator.chain import costs
+from hystgen.compensator.chain import blocks, costs
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.emission.chain import FIXED_STRUCTS, STRUCTS, Field
+from hystgen.effects.kinds import Kind, Rows
+from hystgen.emission.chain import Field
 from hystgen.emission.options import Options
 from hystgen.plays import slots
 
@@ -104,29 +105,41 @@ def _corner_structs(arithmetic: Arithmetic, layout: Layout) -> dict[str, tuple[i
     }
 
 
-def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1) -> int:
+_LETTERS = {"w": (8, 8), "i": (4, 4), "c": (16, 4), "b": (1, 1)}
+"""Sizes and alignments of the numbers of a block in fixed point, by the letters of `Kind`."""
+
+
+def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout) -> dict[str, tuple[int, int]]:
+    """Sizes and alignments of the tables of a chain's blocks."""
+    sizes = {**_LETTERS, "f": layout.struct((4, 4), (1, 1))}
+
+    def made_of(numbers: Kind | Rows) -> list[tuple[int, int]]:
+        return [sizes[letter] for letter in numbers.letters] or len(numbers.table) * [real]
+
+    found = {}
+    for kind in kinds:
+        members = [(layout.pointer, layout.pointer)] * bool(kind.rows) + made_of(kind)
+        counts = [(2, 2) if i == 0 else (1, 1) for i, _ in enumerate(kind.counts)]
+        found[f"_{kind.name}_table_t"] = layout.struct(*members, *counts)
+        if kind.rows:
+            found[f"_{kind.name}_{kind.rows.name}_t"] = layout.struct(*made_of(kind.rows))
+    return found
+
+
+def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterable[Kind], plays: int = 1) -> int:
     """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
-    of `plays` the bytes of one."""
+    of `plays` the bytes of one. `kinds`: of the blocks of a chain."""
     fixed = arithmetic.fixed
     real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
-    factor = layout.struct((4, 4), (1, 1))
-    eight, byte = (8, 8), (1, 1)
-    table = (layout.pointer, layout.pointer)
-    bend = layout.struct(table, table, table, (4, 4), count, byte, byte, byte)
-    own = {
+    factor, table = layout.struct((4, 4), (1, 1)), (layout.pointer, layout.pointer)
+    bend = layout.struct(table, table, table, (4, 4), count, *3 * [(1, 1)])
+    behind = {
         "factor_t": factor,
-        "creep_term_t": layout.struct(*3 * [factor], byte),
-        "creep_table_t": layout.struct(table, *3 * [factor], byte, byte, count),
-        "lag_table_t": layout.struct(*3 * [factor], byte, byte),
-        "lag_exact_table_t": layout.struct(*3 * [factor], byte, byte),
-        "gain_table_t": layout.struct(factor, factor, *3 * [eight], byte),
-        "ageing_piece_t": layout.struct(eight, factor, byte, *4 * [(4, 4)]),
-        "ageing_table_t": layout.struct(table, eight, count, byte, byte),
         "bend_t": layout.struct(bend, bend),
-        "stops_t": layout.struct(eight, eight, factor, factor),
+        "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
     }
     structs = {
         "dead_zone_t": layout.struct(*pointers, count),
@@ -134,25 +147,20 @@ def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
         "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
         **_corner_structs(arithmetic, layout),
-        "creep_term_t": layout.struct(*4 * [reach]),
-        "creep_table_t": layout.struct((layout.pointer, layout.pointer), *4 * [reach], count),
-        "lag_table_t": layout.struct(*4 * [reach]),
-        "lag_exact_table_t": layout.struct(*4 * [reach]),
-        "gain_table_t": layout.struct(*7 * [reach]),
-        "ageing_piece_t": layout.struct(*6 * [reach]),
-        "ageing_table_t": layout.struct((layout.pointer, layout.pointer), *3 * [reach], count, (1, 1)),
-        **(own if fixed else {}),
+        **_block_structs(kinds, reach, layout),
+        **(behind if fixed else {}),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
     for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
         found += re.findall(r"^    (\w+) \w+(\[\d+\]);", members, flags=re.MULTILINE)
     for kind, sizes in found:
-        one = next((size for ending, (size, _) in structs.items() if kind.endswith(ending)), None)
-        if one is None:
-            one = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
-            one = one or (4 if fixed else real)
-        total += one * (math.prod(map(int, re.findall(r"\d+", sizes))) // plays)
+        endings = sorted(structs, key=len, reverse=True)  # a name may end in another one
+        own = next((structs[ending][0] for ending in endings if kind.endswith(ending)), None)
+        if own is None:
+            own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
+            own = own or (4 if fixed else real)
+        total += own * (math.prod(map(int, re.findall(r"\d+", sizes))) // plays)
     return total
 
 
@@ -178,7 +186,8 @@ def estimate(
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    memory, avr = (_memory(cascade, options, text, plays, layout, fields) for layout in (CORE_32, AVR))
+    kinds = [each.kind for each in blocks.every(numbers)] if isinstance(numbers, ChainTables) else []
+    memory, avr = (_memory(cascade, options, text, plays, layout, fields, kinds) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
         more = costs.code_bytes(numbers, options.arithmetic)
@@ -196,12 +205,10 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks of a model with effects in one step, of each operator."""
-    lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
-    gains = len(t.gain) + len(t.ageing.turns)
     kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
     stages = len(kinds) + kinds.count(slots.TANH) * (t.behind.coefficient.shape[1] - 1 if t.fixed else 1)
-    absorbed = 3 * lags + creeps + 5 * states + gains + sum(4 + 2 * int(n) for n in t.ageing.turns)
-    return {"forward": absorbed + stages, "inverse": absorbed + 2 * lags + creeps + gains + stages + len(t.tap)}
+    absorbed, solved = (sum(each.products[way] for each in blocks.every(t)) for way in (0, 1))
+    return {"forward": absorbed + stages, "inverse": absorbed + solved + stages + len(t.tap)}
 
 
 def _memory(
@@ -211,6 +218,7 @@ def _memory(
     plays: str,
     layout: Layout,
     chain: Mapping[str, Sequence[Field]],
+    kinds: Sequence[Kind],
 ) -> Memory:
     n = cascade.pi.n
     arithmetic = ARITHMETICS[options.arithmetic]
@@ -232,24 +240,18 @@ def _memory(
                 fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
             size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
         sizes.append((op, size))
-    more = _constants(plays, arithmetic, layout, n + 1) + a_play * len(sizes)
-    return Memory(_constants(text, arithmetic, layout), sizes, more)
+    more = _constants(plays, arithmetic, layout, kinds, n + 1) + a_play * len(sizes)
+    return Memory(_constants(text, arithmetic, layout, kinds), sizes, more)
 
 
 def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, int]:
     """Size and alignment of a field of an instance."""
-    real, fixed = arithmetic.bytes, arithmetic.fixed
-    signal, fine = (8, 4) if fixed else (real, real)
-    one = {"flag": 1, "status": layout.integer, "signal": signal, "fine": fine, "play": fine}.get(field.kind, real)
-    if field.kind in STRUCTS:
-        reals, flags = STRUCTS[field.kind]
-        sizes = [real] * reals + [1] * flags
-        if fixed:
-            signals, mantissas, flags = FIXED_STRUCTS[field.kind]
-            sizes = [8] * signals + [4] * mantissas + [1] * flags
-        size, alignment = layout.struct(*((each, each) for each in sizes))
-    else:
-        size = alignment = one
+    real = (arithmetic.bytes, arithmetic.bytes)
+    signal, fine = ((8, 8), (4, 4)) if arithmetic.fixed else (real, real)
+    whole = (layout.integer, layout.integer)
+    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine}.get(field.kind, real)
+    members = [*(_LETTERS.get(letter, real) for letter in field.members), *field.flags * [(1, 1)]]
+    size, alignment = layout.struct(*members) if members else one
     return size * max(field.count, 1), alignment
 
 

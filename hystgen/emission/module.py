@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import re
+import shlex
 import textwrap
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -21,7 +22,9 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import SHARE_BITS, Compiled
-from hystgen.emission import banner, chain, cost, layout, numbers, runtime, selftest
+from hystgen.effects import own as own_effects
+from hystgen.effects.base import USER
+from hystgen.emission import banner, chain, cost, layout, numbers, own, runtime, selftest
 from hystgen.emission.layout import define
 from hystgen.emission.options import Options
 from hystgen.emission.text import literal
@@ -79,7 +82,7 @@ def files(
         )
     if shared:
         made.update(runtime_files(options.arithmetic))
-    operators = selftest.operators(values.numbers, options)
+    operators = selftest.operators(values.numbers, options, values.calls)
     costs = _selftest_cost(options, values.cost, sum(len(each["samples"]) for each in operators))
     for ending, about, details in (
         (".h", f"checks {name} on the target", costs),
@@ -215,7 +218,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         shared=shared,
         single_header=options.layout == "single-header",
         version=__version__,
-        command=_command(name, options),
+        command=_command(parameters, options),
         sha256=parameters_sha256(parameters),
         units=_units(parameters),
         n=n,
@@ -236,18 +239,19 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
     values.functions = front + "\n" + glue.functions if glue else front
-    calls = glue.calls if glue else {}
-    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls)
+    values.calls = calls = glue.calls if glue else {}
+    own_types, own_functions = own.pieces(compiled.tables) if compiled else ([], [])
+    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls, own_functions)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
     values.types = ""
     if glue:
-        types = runtime.chain_types("\n".join(glue.states.values()), family)
+        types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
-        own = runtime.needed(types, sorted(runtime.used(pieces)))
-        tables = [piece for piece in own if piece not in states]
+        tabled = runtime.needed(types, sorted(runtime.used(pieces)))
+        tables = [piece for piece in tabled if piece not in states]
         values.types = runtime.render_operators(tables, name, 0, prefix, family)
     else:
         states = runtime.state_pieces(values.variant, operators)
@@ -364,9 +368,13 @@ def _macros(values: SimpleNamespace) -> list[str]:
     ]
 
 
-def _command(name: str, options: Options) -> str:
-    partial = " --allow-partial" if options.left_out else ""
-    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}{partial}"
+def _command(parameters: Parameters, options: Options) -> str:
+    origins = dict.fromkeys(
+        own_effects.origin(type(effect)) for effect in parameters.model.effects if effect.name.startswith(USER)
+    )
+    more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
+    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in banner.OPTIONS)
+    return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 
 def _units(parameters: Parameters) -> SimpleNamespace:

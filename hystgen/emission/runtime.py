@@ -14,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
+from hystgen.compensator.chain.blocks import KINDS
 
 VERSION = 2  # of the interface between emitted models and a shared run time
 
@@ -29,7 +30,7 @@ FLOAT_KERNELS = (
     "loop_solve.c",
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
-CHAIN_BLOCKS = ("creep.c", "lag.c", "lag_exact.c", "ageing.c", "gain.c", "preview.c", "preview_float.c")
+CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "preview.c", "preview_float.c")
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "preview.c",
@@ -316,17 +317,22 @@ def table_pieces(family: Family) -> list[Piece]:
 
 
 def operator_pieces(
-    variant: Variant, operators: Iterable[str], glue: str, calls: Mapping[str, Iterable[str]] = MappingProxyType({})
+    variant: Variant,
+    operators: Iterable[str],
+    glue: str,
+    calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
+    own: Iterable[Piece] = (),
 ) -> list[Piece]:
-    """The functions of a model's operators, with those that `glue` defines for it; `calls` as for `api`."""
+    """The functions of a model's operators, with those that `glue` defines for it; `calls` as for `api`; `own`: of
+    blocks that are the user's own."""
     blocks = (FIXED_CHAIN_BLOCKS if variant.fixed else CHAIN_BLOCKS) if variant.chain else ()
     wanted = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
-    return needed([*_pieces(blocks), *split_pieces(glue), *_pieces(variant.sources())], wanted)
+    return needed([*_pieces(blocks), *own, *split_pieces(glue), *_pieces(variant.sources())], wanted)
 
 
-def chain_types(glue: str, family: Family) -> list[Piece]:
-    """The types of blocks and of instances of models with effects, those before these."""
-    return [*_pieces(family.chain_types), *split_pieces(glue)]
+def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
+    """The types of blocks, those of the user's own last, and then of instances of models with effects."""
+    return [*_pieces(family.chain_types), *own, *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.front import curve
@@ -130,12 +130,6 @@ def suite(
             yield name, op, x.astype(real).astype(np.float64)
 
 
-def _codes(tables: ChainTables) -> tuple[float, float]:
-    """In fixed point, codes a degree and codes that a gain of 1 is."""
-    most = int(tables.limits[slots.CODE_MAX]) + 1
-    return 2.0 ** TEMPERATURE_BITS[most.bit_length() - 1], most / 4
-
-
 def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
     """Steps with everything else that may be called between them, now and then and often."""
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
@@ -157,7 +151,7 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         op[rng.random(length) < 0.001] = slots.OP_INIT
         drives = rng.uniform(drive_low - 5.0, drive_high + 5.0, length)
         x = np.where((op == slots.OP_SETTLE) | (op == slots.OP_COMMIT), drives, x)
-        degree, gain = (1.0, 1.0) if not tables.fixed else _codes(tables)
+        degree, gain = (1.0, 1.0) if not tables.fixed else setting_codes(tables)
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
         x = np.where(op == slots.OP_TEMPERATURE, degree * (20.0 + rng.standard_cauchy(length) * 30.0), x)
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)

@@ -10,22 +10,12 @@ from types import MappingProxyType, SimpleNamespace
 from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
 from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
 from hystgen.emission import files, module
+from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.plays import slots
 
 CALLS = {"init": slots.OP_INIT, "reset": slots.OP_RESET, "commit": slots.OP_COMMIT}
-SETTINGS = {
-    "push": slots.OP_PUSH,
-    "settle": slots.OP_SETTLE,
-    "set_offset": slots.OP_OFFSET,
-    "set_temperature": slots.OP_TEMPERATURE,
-    "set_gain": slots.OP_GAIN,
-    "set_travel": slots.OP_TRAVEL,
-}
-"""Calls of models with effects that take a number and return none."""
-
-
 @dataclass(frozen=True)
 class Sources:
     """C files by what they are: the module with its run time, and what the verification adds."""

@@ -42,6 +42,7 @@ from hystgen.compensator.chain.layout import (
     output_range,
     taps_of,
 )
+from hystgen.compensator.chain.own import OwnTables
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, lsbs, nearest
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing import fixed as ageing_fixed
@@ -53,6 +54,7 @@ from hystgen.effects.saturation.fixed import Saturations
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
+from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -122,6 +124,9 @@ class _Builder:
             self._need(self._creep_tables, "creep"),
             self._need(lambda: self._ageing(span), "ageing"),
             self._need(self._gains, "a temperature"),
+            HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
+            np.zeros((0, 8), np.int64),
+            OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
             behind,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
@@ -379,3 +384,9 @@ class _Builder:
             bend(lambda x: float(envelope.forward(x)), size, min(level, size)),
             bend(lambda y: float(envelope.inverse(y)), far, back),
         )
+
+
+def setting_codes(tables: ChainTables) -> tuple[float, float]:
+    """Codes of a degree, and of a gain of 1."""
+    most = int(tables.limits[slots.CODE_MAX]) + 1
+    return 2.0 ** TEMPERATURE_BITS[most.bit_length() - 1], most / 4

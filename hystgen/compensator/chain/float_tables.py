@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
-from hystgen.compensator.chain import moving
+from hystgen.compensator.chain import moving, own
 from hystgen.compensator.chain.layout import (
     SAMPLES_A_SWEEP,
     VERIFIED_SHARE,
     ChainTables,
     Compiled,
+    OwnChainTables,
     Parts,
     Stages,
     output_range,
@@ -29,10 +30,12 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -81,6 +84,21 @@ def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]]
     )
 
 
+def _heat(
+    parts: Parts,
+    ends: tuple[float, float],
+    span: float,
+    seconds: float,
+    reals: Callable[[Any, str], NDArray[Any]],
+    roundoff: float,
+) -> HeatTables:
+    """Gains over the temperature of own heat."""
+    return HeatTables(
+        reals([thermal.heat_numbers(each, span, seconds) for each in parts.heat], "temperatures").reshape(-1, 7),
+        np.array([thermal.heat_turns(each, ends, seconds, roundoff) for each in parts.heat], dtype=np.int64),
+    )
+
+
 def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
@@ -109,11 +127,14 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
     lags = [lag.numbers(each, seconds) for each in parts.lags]
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
     taps = taps_of(parts, seconds, how)
+    ahead = how.preview if how.preview is not None else max(taps.ahead, 0) if taps else 0
     rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
     rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
     lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
     steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
     weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
+    drives, outputs = ([own.linear(each, seconds) for each in side] for side in (parts.own_drives, parts.own_outputs))
+    lead *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
     most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
     reals([most], "intermediate results")
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
@@ -133,9 +154,15 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
         ),
         _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
         reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
+        _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
+        reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
+        own.build(drives, outputs, reals),
         _behind(parts, dtype),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),
     )
+    if drives or outputs:
+        tables = OwnChainTables(*tables)
+        tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
     return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview)

@@ -12,14 +12,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import preview
+from hystgen.compensator.chain import own, preview
+from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.compensator.chain.preview import Taps
 from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
+from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import Compensation
 from hystgen.plays.slots import Counts, Reals
@@ -68,6 +71,9 @@ class ChainTables(NamedTuple):
     creep: CreepTables
     ageing: AgeingTables
     gain: Reals  # (k, 8)
+    heat: HeatTables
+    clock: Reals  # (k, 8)
+    own: OwnTables
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
     number: Reals
@@ -85,6 +91,18 @@ class ChainTables(NamedTuple):
         return threshold
 
 
+class OwnChainTables(ChainTables):
+    """The same of a model with effects of the user's own; their classes are those of `own`, in its order."""
+
+    own_effects: tuple[type[Effect], ...]
+
+    @property
+    def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
+        """What they are made of, in front of the plays and behind."""
+        blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
+        return blocks[: self.own.ahead], blocks[self.own.ahead :]
+
+
 @dataclass(frozen=True)
 class Parts:
     """The effects of a model by what the chain makes of them, those in order that the chain meets one by one."""
@@ -93,11 +111,15 @@ class Parts:
     creeps: list[Any]
     ageing: list[Any]
     thermal: list[Any]
+    heat: list[Any]
+    drift: list[Any]
     modes: list[Any]
     saturations: list[Any]
     slew: list[Any]
     plays: list[Effect]
     delay: float
+    own_drives: list[Effect]
+    own_outputs: list[Effect]
 
     @classmethod
     def of(cls, effects: Sequence[Effect]) -> Parts:
@@ -106,11 +128,15 @@ class Parts:
         def called(name: str) -> list[Any]:
             return [effect for effect in effects if effect.name == name]
 
+        thermal_effects = called("thermal")
         return cls(
             [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
-            called("thermal"), called("resonance"), called("saturation"), called("slew_limit"),
+            [each for each in thermal_effects if each.columns], [each for each in thermal_effects if not each.columns],
+            called("drift"), called("resonance"), called("saturation"), called("slew_limit"),
             [effect for effect in effects if effect.place is Place.PLAYS],
             math.fsum(each.time for each in called("delay")),
+            [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
+            [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
         )  # fmt: skip
 
 
@@ -162,6 +188,11 @@ class Compiled:
         return max(self.taps.ahead, 0) if self.taps else 0
 
     @cached_property
+    def own(self) -> list[Linear]:
+        """Blocks of the user's own, in the order of `tables.own`."""
+        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+
+    @cached_property
     def noise_gain(self) -> float:
         """Largest gain, over all frequencies, from the reference to the drive, over that at rest."""
         z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
@@ -179,6 +210,8 @@ class Compiled:
                 gain = gain * (1.0 - (1.0 - rate) * z) / (late + second * z)
             else:
                 gain = gain * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
+        for block in self.own:
+            gain = gain * block.backward.response(z) * block.rest
         return float(np.max(np.abs(gain)))
 
 
@@ -208,6 +241,9 @@ def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[flo
     low, high = (settled(static, parts.plays, end) for end in static.play_range)
     for each in parts.creeps:
         rest = creep.numbers(each, seconds).rest
+        low, high = low * rest, high * rest
+    for each in parts.own_outputs:
+        rest = own.linear(each, seconds).rest
         low, high = low * rest, high * rest
     for effect in parts.saturations:
         low, high = (float(end) for end in effect.mapped(np.array([low, high]), None))

@@ -198,7 +198,10 @@ def build_fixed(
 def beyond_fixed(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
     """What fixed point does not have of effects on plays."""
     if effects and not build(static, effects, seconds, np.ptp(static.input_range), np.float64).scanned:
-        words = "in fixed point there is no C for plays that are bent, have a nonlinear dashpot or do not all relax with one time constant"
+        words = (
+            "in fixed point there is no C for plays that are bent, have a nonlinear dashpot or do not all relax with "
+            "one time constant"
+        )
         yield from ((effect, f"{words}; use float32") for effect in effects)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
+from hystgen.compensator.chain.sides import Blocks, sides_of
 from hystgen.compensator.step import (
     Operations,
     clamp_drive,
@@ -26,6 +27,9 @@ from hystgen.compensator.step import (
 from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
 from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
+from hystgen.effects.drift.compensator import LEAD, MOST_AHEAD, ONE, clock_drift, clock_start, clock_tick
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.thermal.compensator import heat_move, heat_reset
 from hystgen.plays import loop
 from hystgen.plays.loop import (
     ANSWER,
@@ -80,6 +84,9 @@ class ChainState(NamedTuple):
     creep: CreepState
     ageing: AgeingState
     gain: Reals  # (k, 3)
+    heat: Reals  # (k, 5)
+    clock: Reals  # (k, 3)
+    own: Reals  # (m,)
     line: Line
     real: Reals
     flags: Counts
@@ -96,25 +103,13 @@ def new_state(t: ChainTables) -> ChainState:
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
+        np.zeros((len(t.heat.turns), 5), dtype),
+        np.zeros((len(t.clock), 3), dtype),
+        np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(3, dtype),
         np.zeros(1, np.int64),
     )
-
-
-class Blocks(NamedTuple):
-    """What the blocks of a chain do in one arithmetic, each function as in the C of the same name."""
-
-    lag: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # rest, absorb, solve
-    creep: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # and resting
-    ageing: tuple[Callable[..., Any], Callable[..., Any]]  # absorb, solve
-    ageing_settings: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # move, set, set_travel
-    gain: tuple[Callable[..., Any], Callable[..., Any]]
-    gain_settings: tuple[Callable[..., Any], Callable[..., Any]]  # reset, heat
-    saturation: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
-    target: Callable[..., Any]  # of the preview's line
-    front: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
-    plays: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # follow, started, inverse input
 
 
 class Codes(NamedTuple):
@@ -129,13 +124,12 @@ class Codes(NamedTuple):
     shared: Callable[..., Any]  # a share of a signal
 
 
-def made_of(blocks: Blocks, codes: Codes) -> Operations:
-    """The operations of models with effects in one arithmetic."""
-    lag_rest, lag_absorb, lag_solve = blocks.lag
-    creep_rest, creep_absorb, creep_solve, creep_resting = blocks.creep
-    ageing_absorb, ageing_solve = blocks.ageing
+def made_of(
+    blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
+) -> Operations:
+    """The operations of models with effects in one arithmetic, with blocks of the user's own in front of the plays and
+    behind them."""
     ageing_move, ageing_set, ageing_set_travel = blocks.ageing_settings
-    gain_absorb, gain_solve = blocks.gain
     gain_reset, gain_heat = blocks.gain_settings
     saturated, unsaturated = blocks.saturation
     preview_target = blocks.target
@@ -144,95 +138,46 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
     finite, entered_drive, entered_level, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
-    # ---------------------------------------------------------------- the glue of a model's blocks
-
-    @jit
-    def drive_side_rest(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """Everything in front of the plays settles at drive v; what arrives there."""
-        x = v
-        for j in range(len(t.lag.exact)):
-            x = lag_rest(t.lag, s.lag, j, x)
-        return x
-
-    @jit
-    def drive_side_absorb(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """The drive is v at this sample; what arrives in front of the plays."""
-        x = v
-        for j in range(len(t.lag.exact)):
-            x = lag_absorb(t.lag, s.lag, j, x)
-        return x
-
-    @jit
-    def drive_side_solve(t: ChainTables, s: ChainState, y: Any) -> Any:
-        """The drive that leads to y in front of the plays."""
-        x = y
-        for j in range(len(t.lag.exact) - 1, -1, -1):
-            x = lag_solve(t.lag, s.lag, j, x)
-        return x
-
-    @jit
-    def output_side_rest(t: ChainTables, s: ChainState, h: Any) -> Any:
-        """Everything behind the plays settles at their sum h; the output."""
-        x = h
-        for j in range(len(t.creep.block)):
-            x = creep_rest(t.creep, s.creep, j, x)
-        for j in range(len(t.ageing.turns)):
-            x = ageing_absorb(s.ageing, j, x)
-        for j in range(len(t.gain)):
-            x = gain_absorb(s.gain, j, x)
-        return x
-
-    @jit
-    def output_side_absorb(t: ChainTables, s: ChainState, h: Any) -> Any:
-        """The sum of the plays is h at this sample; the output."""
-        x = h
-        for j in range(len(t.creep.block)):
-            x = creep_absorb(t.creep, s.creep, j, x)
-        for j in range(len(t.ageing.turns)):
-            x = ageing_absorb(s.ageing, j, x)
-        for j in range(len(t.gain)):
-            x = gain_absorb(s.gain, j, x)
-        return x
-
-    @jit
-    def output_side_resting(t: ChainTables, s: ChainState, y: Any) -> Any:
-        """The sum of the plays that gives the output y once everything has settled."""
-        x = y
-        for j in range(len(t.gain) - 1, -1, -1):
-            x = gain_solve(s.gain, j, x)
-        for j in range(len(t.ageing.turns) - 1, -1, -1):
-            x = ageing_solve(s.ageing, j, x)
-        for j in range(len(t.creep.block) - 1, -1, -1):
-            x = creep_resting(t.creep, s.creep, j, x)
-        return x
-
-    @jit
-    def output_side_solve(t: ChainTables, s: ChainState, y: Any) -> Any:
-        """The sum of the plays that gives the output y at this sample."""
-        x = y
-        for j in range(len(t.gain) - 1, -1, -1):
-            x = gain_solve(s.gain, j, x)
-        for j in range(len(t.ageing.turns) - 1, -1, -1):
-            x = ageing_solve(s.ageing, j, x)
-        for j in range(len(t.creep.block) - 1, -1, -1):
-            x = creep_solve(t.creep, s.creep, j, x)
-        return x
+    side = sides_of(blocks, drives, outputs)
+    drive_side_rest, drive_side_absorb, drive_side_solve = side.drive_rest, side.drive_absorb, side.drive_solve
+    output_side_rest, output_side_absorb = side.output_rest, side.output_absorb
+    output_side_resting, output_side_solve = side.output_resting, side.output_solve
 
     @jit(inline=True)
     def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
         """What leaves the actuator: the output side's answer through what saturates, and its offsets."""
-        return saturated(t.behind, y) + (t.number[OFFSET] + s.real[SET])
+        offset = t.number[OFFSET] + s.real[SET]
+        for j in range(len(t.clock)):
+            offset = offset + clock_drift(t.clock, s.clock, j, t.limits[ZERO])
+        return saturated(t.behind, y) + offset
 
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
         """What the output side has to give for the displacement u, and whether nothing does."""
-        y, limited = unsaturated(t.behind, u - (t.number[OFFSET] + s.real[SET]))
+        offset = t.number[OFFSET] + s.real[SET]
+        for j in range(len(t.clock)):
+            lead = s.clock[j, LEAD] if s.line.filled[0] else t.limits[ZERO]
+            offset = offset + clock_drift(t.clock, s.clock, j, lead + t.clock[j, ONE] if s.flags[MOVING] else lead)
+        y, limited = unsaturated(t.behind, u - offset)
         return y, limited
+
+    @jit
+    def led(t: ChainTables, s: ChainState) -> None:
+        """A reference has come: the next one is a sample more ahead, up to the preview."""
+        for j in range(len(t.clock)):
+            lead = t.clock[j, ONE]
+            if s.line.filled[0]:
+                lead = lead + s.clock[j, LEAD]
+            s.clock[j, LEAD] = t.clock[j, MOST_AHEAD] if lead > t.clock[j, MOST_AHEAD] else lead
 
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
         """Offset and gains as in the parameter file."""
         s.real[SET] = t.limits[ZERO]
+        for j in range(len(t.clock)):
+            clock_start(s.clock, j)
+        for j in range(len(t.heat.turns)):
+            heat_reset(t.heat, s.heat, j)
         for j in range(len(t.gain)):
             gain_reset(t.gain, s.gain, j)
         for j in range(len(t.ageing.turns)):
@@ -240,7 +185,11 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
 
     @jit
     def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
-        """The drive moves to v from where it was."""
+        """The drive moves to v from where it was, in one sample."""
+        for j in range(len(t.clock)):
+            clock_tick(t.clock, s.clock, j)
+        for j in range(len(t.heat.turns)):
+            heat_move(t.heat, s.heat, j, s.real[APPLIED], v)
         for j in range(len(t.ageing.turns)):
             ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
 
@@ -355,6 +304,7 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
             s.plays.counts[STATUS] |= DOMAIN
         if len(t.tap) == 0:
             return wanted
+        led(t, s)
         preview_put(s.line, wanted)
         return preview_target(t.tap, s.line)
 
@@ -399,8 +349,8 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
         inverse_replace(s.plays, applied, clamp_drive(t, applied) + t.limits[ZERO])  # no drive is -0
 
     @jit
-    def shift(t: ChainTables, s: ChainState, d: Any) -> None:
-        """An offset of the displacement, from the next step on."""
+    def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+        """An offset of the displacement, from the next step on, within its limits."""
         if not finite(t, d):
             s.plays.counts[STATUS] |= HELD
             return
@@ -414,10 +364,18 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
         s.real[SET] = inside
 
     @jit
+    def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+        """An offset of the displacement, from the next step on; drift begins anew."""
+        put_offset(t, s, d)
+        if finite(t, d):
+            for j in range(len(t.clock)):
+                clock_start(s.clock, j)
+
+    @jit
     def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
         """Trim the offset by a share of what a sensor sees beyond the expected displacement."""
         more = shared(t, share, entered_level(t, measured) - displacement(t, s, s.real[OUTPUT]))
-        shift(t, s, s.real[SET] + more)
+        put_offset(t, s, s.real[SET] + more)
 
     @jit
     def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
@@ -461,7 +419,7 @@ def made_of(blocks: Blocks, codes: Codes) -> Operations:
                 inverse_take(t, s)
                 settle(t, s, x[i])
             elif op[i] == OP_OFFSET:
-                shift(t, s, entered_level(t, x[i]))
+                set_offset(t, s, entered_level(t, x[i]))
             elif op[i] == OP_TEMPERATURE:
                 set_temperature(t, s, x[i])
             elif op[i] == OP_GAIN:

@@ -22,7 +22,8 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.moving import fixed_relaxing_follow
 from hystgen.compensator.chain.preview import Line
-from hystgen.compensator.chain.step import MOVING, Blocks, ChainState, Codes
+from hystgen.compensator.chain.sides import Blocks
+from hystgen.compensator.chain.step import MOVING, ChainState, Codes
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects.ageing.fixed import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
 from hystgen.effects.creep.fixed import creep_absorb, creep_rest, creep_resting, creep_solve

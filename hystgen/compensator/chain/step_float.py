@@ -17,7 +17,8 @@ from hystgen.compensator.chain.moving import (
     relaxing_input,
 )
 from hystgen.compensator.chain.preview import preview_target
-from hystgen.compensator.chain.step import MOVING, Blocks, ChainState, Codes
+from hystgen.compensator.chain.sides import Blocks
+from hystgen.compensator.chain.step import MOVING, ChainState, Codes
 from hystgen.effects.ageing.compensator import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
 from hystgen.effects.creep.compensator import creep_absorb, creep_rest, creep_resting, creep_solve
 from hystgen.effects.lag.compensator import lag_absorb, lag_rest, lag_solve

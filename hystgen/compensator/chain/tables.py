@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.chain import Chain
-from hystgen.compensator.chain import fixed_tables, float_tables, moving
+from hystgen.compensator.chain import fixed_tables, float_tables, moving, own
 from hystgen.compensator.chain.layout import Compiled, Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import SHAPES as AGEING
-from hystgen.effects.base import USER, Effect
+from hystgen.effects.base import USER, Effect, Place
+from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal.model import SelfHeating
 from hystgen.parameters.schema import Compensation
 
 STANDARD = Compensation()
@@ -33,17 +35,42 @@ def build(
     return float_tables.build(chain, arithmetic, seconds, how)
 
 
-def refusals(chain: Chain, operator: str, seconds: float, arithmetic: str) -> Iterator[tuple[Effect, str]]:
+def _behind_slew(chain: Chain) -> int:
+    """Number of effects up to the slew limit, 0 without one."""
+    return max((i for i, effect in enumerate(chain.effects) if effect.name == "slew_limit"), default=-1) + 1
+
+
+def refusals(
+    chain: Chain, operator: str, seconds: float, arithmetic: str, how: Compensation = STANDARD
+) -> Iterator[tuple[Effect, str]]:
     """The effects that an operator cannot have in the C in an arithmetic, each with its reason."""
     low, high = chain.cascade.input_range
     parts = Parts.of(chain.effects)
     for effect in chain.effects:
         if operator != "inverse" and effect.name in ("delay", "resonance"):
             yield effect, "only the inverse has it; emit the inverse alone"
-        elif effect.name == "drift":
-            yield effect, "a clock that runs alone, and nothing says when it began; set_offset takes it from outside"
-        elif effect.name == "thermal" and not effect.columns:
-            yield effect, "the drive's own heat, open loop: its temperature drifts with the room's; measure it"
+        elif effect.name == "drift" and "drift" not in how.compensate:
+            yield effect, (
+                "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
+                "emit.compensation.compensate: [drift] lets the module count from there"
+            )
+        elif isinstance(effect, SelfHeating) and "self_heating" not in how.compensate:
+            yield effect, (
+                "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
+                "followed by emit.compensation.compensate: [self_heating]"
+            )
+        elif effect.name == "thermal" and not effect.columns and not isinstance(effect, SelfHeating):
+            yield effect, "the heat of loops, open loop: its temperature drifts with the room's; measure it"
+        elif ARITHMETICS[arithmetic].fixed and (effect.name == "drift" or isinstance(effect, SelfHeating)):
+            yield effect, "in fixed point there is no C for a clock and for own heat; use float32"
+        elif ARITHMETICS[arithmetic].fixed and effect.block:
+            yield effect, "an effect of your own, whose block is in floating point; use float32"
+        elif isinstance(effect, SelfHeating):
+            yield from ((effect, reason) for reason in thermal.heat_problems(effect, (low, high), seconds))
+        elif effect.block:
+            yield from ((effect, reason) for reason in own.problems(effect, seconds))
+            if effect.place is Place.DRIVE and effect in chain.effects[: _behind_slew(chain)]:
+                yield effect, "in front of the slew limit; give it an order: ClassVar[int] above that of slew_limit, 1"
         elif effect.name.startswith(USER):
             yield effect, "an effect of your own, which has no compensator"
         elif effect in parts.ageing[1:]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing import compensator as floating
 from hystgen.effects.ageing.compensator import GAIN, HIGH, INVERSE, LAST, AgeingState, AgeingTables
 from hystgen.effects.base import Array
+from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, reciprocal
 from hystgen.plays.slots import zero
 
@@ -20,6 +23,18 @@ SHARE_BITS = 20
 
 LONGEST = 2**61
 """Drive codes that a travel is counted to at most."""
+
+
+KIND = Kind(
+    "ageing", rows=Rows("piece", letters="wfbc"), counts=("n", "turns", "bits"), flags=("own",), reading=(),
+    own=("solve", "absorb"), letters="w", memory="wii",
+)  # fmt: skip
+
+
+def constants(t: AgeingTables) -> Iterator[Constants]:
+    """The numbers of each gain."""
+    for each, number in zip(floating.constants(t), t.number, strict=True):
+        yield replace(each, kind=KIND, table=number[-1:], counts=(*each.counts, int(number[0])))
 
 
 def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:

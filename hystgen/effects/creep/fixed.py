@@ -8,13 +8,17 @@ rounding leaves is a dead band, and no cycle.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hystgen.arithmetic.factors import BEYOND, LARGEST, factor, times
 from hystgen.basics.jit import jit
+from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
+from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
@@ -23,6 +27,16 @@ STATE_BITS = 61
 
 GUARD = 3
 """Bits of a state below the last one in which it stalls: a dead band of at most 1/16 of a signal's last bit."""
+
+
+KIND = Kind(
+    "creep", rows=Rows("term", letters="fffb", memory="w"), counts=("n",), letters="fffbb", memory="ww",
+)
+
+
+def constants(t: CreepTables) -> Iterator[Constants]:
+    """The numbers of each block."""
+    yield from (replace(each, kind=KIND) for each in floating.constants(t))
 
 
 def guard(effect: CreepNumbers, size: float) -> tuple[int, int]:

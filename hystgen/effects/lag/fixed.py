@@ -7,12 +7,15 @@ move `lead` of the lag that it was to make: what another input makes of it is `c
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hystgen.arithmetic.factors import LARGEST, factor, times
 from hystgen.basics.jit import jit
+from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.plays.fixed import nearest
@@ -26,6 +29,16 @@ GUARD = 3
 
 EXACT_BITS = 8
 """The same of a lag that is inverted exactly, which no rounding can hold up."""
+
+
+KIND = Kind("lag", own=("rest", "solve", "absorb"), letters="fffbb", memory="wwww")
+EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb", memory="ww")
+
+
+def constants(t: LagTables) -> Iterator[Constants]:
+    """The numbers of each lag."""
+    for each, exact in zip(floating.constants(t), t.exact, strict=True):
+        yield replace(each, kind=EXACT_KIND if exact else KIND)
 
 
 class Sizes:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
+from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import GAIN, INVERSE, LARGEST_GAIN, LEAST_GAIN, OFFSET
 from hystgen.plays.slots import Reals, zero
@@ -20,6 +22,14 @@ LEAST, LARGEST = int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)
 
 TEMPERATURE_BITS = 37
 """Fraction bits of a temperature inside, so that temperatures of 512 degC are multiplied like any signal."""
+
+
+KIND = Kind("gain", reading=(), own=("solve", "absorb"), letters="ffwwwb", memory="iiw")
+
+
+def constants(t: Reals) -> Iterator[Constants]:
+    """The numbers of each gain."""
+    yield from (Constants(KIND, row, (1, 1)) for row in t)
 
 
 def tables(rows: list[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
