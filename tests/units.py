@@ -51,6 +51,8 @@ UNITS = (
     ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
     ("relaxing", "float32", "loop"),
+    ("drifting", "float32", "loop"),
+    ("heated", "float64", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
 
