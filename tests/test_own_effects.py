@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -347,6 +348,49 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
     assert said in err
     assert "Traceback" not in err
     assert not (tmp_path / "out").exists()
+
+
+STYLES = {
+    "in one line": STAGE_C.replace("\n{\n    (void)t;\n    return y;\n}", " { (void)t; return y; }"),
+    "braces behind": re.sub(r"\n {20,}", "\n    ", STAGE_C).replace(")\n{", ") {"),
+    "a helper": STAGE_C.replace(
+        "static hystgen_real_t hystgen_user_follower_absorb(",
+        "/* The rest of the way. */\nstatic hystgen_real_t\n"
+        "hystgen_user_follower_way(hystgen_real_t a, hystgen_real_t b)\n"
+        "{\n    /* from b to a */\n    return a -\n        b; /* either sign */\n}\n\n"
+        "static hystgen_real_t hystgen_user_follower_absorb(", 1,
+    ).replace("t->rate * (x - self->reached)", "t->rate * hystgen_user_follower_way(x, self->reached)"),
+    "a loop": STAGE_C.replace(
+        "    self->reached = self->reached + t->rate",
+        "    unsigned int i;\n    for (i = 0; i < 3u; ++i) {\n        if (i == 2u)\n            break;\n    }\n"
+        "    self->reached = self->reached + t->rate",
+    ),
+    "windows": STAGE_C.replace("\n", "\r\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_c_may_be_written_in_any_style(tmp_path: Path, style: str) -> None:
+    assert STYLES[style] != STAGE_C
+    one = hystgen.load(written(tmp_path, FOLLOWER), [outside(tmp_path, c=STYLES[style])])
+    hystgen.emit(one, tmp_path / "out", operator="both")
+    for source in ("stage.c", "stage_selftest.c"):
+        command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-c", source, "-o", "object.o"]
+        subprocess.run(command, cwd=tmp_path / "out", check=True)
+    assert max(map(len, (tmp_path / "out" / "stage.c").read_text().splitlines())) <= 100
+
+
+def test_two_names_that_are_one_in_c_are_refused(tmp_path: Path) -> None:
+    """The memory of `user:droop_table` would have the name of the table of `user:droop`."""
+    other = tmp_path / "other"
+    shutil.copytree(EXAMPLE, other, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ("model.py", "droop.c"):
+        text = (other / file).read_text().replace("user:droop", "user:droop_table")
+        text = text.replace("hystgen_user_droop", "hystgen_user_droop_table")
+        (other / file).write_text(re.sub(r"\n {20,}", "\n    ", text))
+    path = written(tmp_path, DROOP, DROOP.replace("user:droop", "user:droop_table"))
+    with pytest.raises(EffectsError, match="two effects of your own have the name hystgen_user_droop_table_t in C"):
+        emitted_files(hystgen.load(path, [EXAMPLE, other]))
 
 
 def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:

@@ -57,6 +57,8 @@ UNITS = (
     ("worn", "q15", "loop"),
     ("late", "q31", "loop"),
     ("relaxing", "q15", "loop"),
+    ("drifting", "float32", "loop"),
+    ("heated", "float64", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
 

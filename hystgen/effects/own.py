@@ -48,12 +48,17 @@ def kind(effect: type[Effect]) -> Kind:
 def source(effect: type[Effect]) -> Path:
     """The C file of an effect that has a block."""
     assert effect.block is not None
-    return Path(str(sys.modules[effect.__module__].__file__)).parent / effect.block.source
+    return Path(_file(effect)).parent / effect.block.source
+
+
+def _file(effect: type[Effect]) -> str:
+    """The Python file of an effect; a name alone where there is none."""
+    return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "model.py")
 
 
 def origin(effect: type[Effect]) -> str:
     """What `--effects` is given for an effect: the last part of the folder's or file's name."""
-    file = Path(str(getattr(sys.modules[effect.__module__], "__file__", "model.py")))
+    file = Path(_file(effect))
     return file.parent.name if file.name == "model.py" else file.name
 
 
@@ -145,9 +150,12 @@ def problem(effect: type[Effect]) -> str:
 
 
 @functools.cache
-def check(block: OwnBlock) -> None:
-    """Raise EffectsError where a block's functions cannot be the bit reference of its C, `FILE:LINE: what; do` each."""
-    if faults := [fault for verb, function in block.verbs() for fault in _of_function(verb, function)]:
+def check(effect: type[Effect]) -> None:
+    """Raise EffectsError where a class's block cannot be the bit reference of its C, `FILE:LINE: what; do` each."""
+    assert effect.block is not None
+    if wrong := problem(effect):
+        raise EffectsError(f"the effect {_name(effect)} {wrong}")
+    if faults := [fault for verb, function in effect.block.verbs() for fault in _of_function(verb, function)]:
         raise EffectsError("\n".join(faults))
 
 
@@ -159,9 +167,13 @@ ALLOWED = (
 
 
 def _of_function(verb: str, function: Any) -> Iterator[str]:
-    lines, first = inspect.getsourcelines(function)
-    file = inspect.getsourcefile(function)
-    (tree,) = ast.parse(textwrap.dedent("".join(lines))).body
+    try:
+        lines, first = inspect.getsourcelines(function)
+        file = inspect.getsourcefile(function)
+        tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    except (OSError, TypeError, SyntaxError):
+        yield f"{verb} has no source that can be read; write it as a function of the file"
+        return
     if not isinstance(tree, ast.FunctionDef) or len(tree.args.args) != ARGUMENTS[verb]:
         yield f"{file}:{first}: {verb} has to be a function of {ARGUMENTS[verb]} arguments"
         return

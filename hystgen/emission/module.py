@@ -21,7 +21,7 @@ from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
-from hystgen.compensator.chain.layout import SHARE_BITS, Compiled
+from hystgen.compensator.chain.layout import SHARE_BITS, Compiled, OwnChainTables
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
 from hystgen.emission import banner, chain, cost, layout, numbers, own, runtime, selftest
@@ -436,6 +436,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
         f"the parameter file; reset starts again from plays at 0.{single if values.single_header else ''}{rounding}"
     )
+    uncounted = " without blocks of your own" * isinstance(values.numbers, OwnChainTables)
     return [
         "",
         *([about] if about else []),
@@ -446,7 +447,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         *values.precision,
         "",
         "Cost (32-bit target):",
-        f"    code at -O2       about {estimate.code_words}, as measured for such a model",
+        f"    code at -O2       about {estimate.code_words}, as measured for such a model{uncounted}",
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),

@@ -8,6 +8,7 @@ static functions that they call. It is no language checker: what compiles, and t
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 
 from hystgen.basics.problems import EffectsError, printable
@@ -35,8 +36,13 @@ REFUSED = {
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
     """Types and functions of the blocks of a model that are the user's own; raises as `of_effect`."""
-    found = [of_effect(effect) for effect in t.own_effects] if isinstance(t, OwnChainTables) else []
-    return [each for types, _ in found for each in types], [each for _, functions in found for each in functions]
+    effects = dict.fromkeys(t.own_effects if isinstance(t, OwnChainTables) else ())
+    found = [of_effect(effect) for effect in effects]
+    types, functions = ([each for pair in found for each in pair[way]] for way in (0, 1))
+    twice = [name for name, count in Counter(each.name for each in (*types, *functions)).items() if count > 1]
+    if twice:
+        raise EffectsError(f"two effects of your own have the name {twice[0]} in C; rename one")
+    return types, functions
 
 
 def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
@@ -84,6 +90,7 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
             (r"#", f"a line of the preprocessor; only {INCLUDE} is one"),
             (r"//", "a comment with //; write /* */"),
             (r"[\"'\\]", "a text or a continued line; a block has none"),
+            (r"= *\{", "a list of values; put them in the table"),
             (r"[/%]", "a division; put the reciprocal in the table"),
             (r"(?<!\w)(\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as Python has it"),
         ):

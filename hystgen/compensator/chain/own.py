@@ -160,7 +160,7 @@ def _apply(effect: Effect, verb: str, *given: Any) -> Any:
 def linear(effect: Effect, seconds: float) -> Linear:
     """The block of an effect at steps of `seconds`. Raises EffectsError where its functions fail, or are none for C."""
     assert effect.block is not None
-    own.check(effect.block)
+    own.check(type(effect))
     one, n = own.Instance(effect), len(effect.block.state)
     one.advance(seconds)
     systems = []
