@@ -55,7 +55,7 @@ UNITS = (
     ("quick", "q31", "loop"),
     ("warm", "q31", "loop"),
     ("worn", "q15", "loop"),
-    ("late", "q31", "loop"),
+    ("straight", "q31", "loop"),
     ("relaxing", "q15", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
