@@ -36,7 +36,7 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
     const hystgen_signal_t x = hystgen_entered_drive(v);
     const hystgen_signal_t a = moving ? hystgen_forward_drive_side_absorb(self, x)
                                       : hystgen_forward_drive_side_rest(self, x);
-    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, (hystgen_play_t)a));
+    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
     self->output = moving ? hystgen_forward_output_side_absorb(self, self->level)
                           : hystgen_forward_output_side_rest(self, self->level);
     self->applied = v;
@@ -53,7 +53,7 @@ static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
     const hystgen_signal_t x = hystgen_entered_drive(v);
     const hystgen_signal_t a = moving ? hystgen_inverse_drive_side_absorb(self, x)
                                       : hystgen_inverse_drive_side_rest(self, x);
-    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, (hystgen_play_t)a));
+    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
     self->output = moving ? hystgen_inverse_output_side_absorb(self, self->level)
                           : hystgen_inverse_output_side_rest(self, self->level);
     self->applied = v;
@@ -83,12 +83,12 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending)
 {
     self->applied = drive;
-    self->drive = (hystgen_play_t)hystgen_entered_drive(drive);
+    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
     self->level = hystgen_forward_started(self);
-    (void)hystgen_forward_drive_side_rest(self, self->drive);
+    (void)hystgen_forward_drive_side_rest(self, hystgen_entered_drive(drive));
     self->output = hystgen_forward_output_side_rest(self, self->level);
     self->answer =
         hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
@@ -105,12 +105,12 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
     self->filled = false;
     self->bits = 0;
     self->applied = drive;
-    self->drive = (hystgen_play_t)hystgen_entered_drive(drive);
+    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
     self->level = hystgen_inverse_started(self);
-    (void)hystgen_inverse_drive_side_rest(self, self->drive);
+    (void)hystgen_inverse_drive_side_rest(self, hystgen_entered_drive(drive));
     self->output = hystgen_inverse_output_side_rest(self, self->level);
 }
 
@@ -300,7 +300,8 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     const hystgen_signal_t h = moving ? hystgen_inverse_output_side_solve(self, y)
                                       : hystgen_inverse_output_side_resting(self, y);
     self->bits = 0;
-    const hystgen_signal_t a = hystgen_inverse_drive(self, h, hystgen_inverse_input(self, h));
+    const hystgen_reach_t w = hystgen_inverse_input(self, h);
+    const hystgen_signal_t a = hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, h, w));
     const hystgen_reach_t v =
         hystgen_drive_code(moving ? hystgen_inverse_drive_side_solve(self, a) : a);
     const hystgen_reach_t reached = hystgen_inverse_slewed(self, v);

@@ -12,7 +12,13 @@ static inline bool hystgen_finite(hystgen_signal_t x)
 
 static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v)
 {
-    return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_FINE);
+    return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_DRIVE_BITS);
+}
+
+/* What arrives in front of the plays, in units of their input. */
+static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a)
+{
+    return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
 }
 
 static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u)
@@ -23,7 +29,7 @@ static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u)
 /* Drive code of a signal, kept near the range. */
 static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v)
 {
-    const hystgen_signal_t code = hystgen_nearest(v, HYSTGEN_FINE);
+    const hystgen_signal_t code = hystgen_nearest(v, HYSTGEN_DRIVE_BITS);
     return (hystgen_reach_t)(code > HYSTGEN_MOST_CODE    ? HYSTGEN_MOST_CODE
                              : code < HYSTGEN_LEAST_CODE ? HYSTGEN_LEAST_CODE
                                                          : code);

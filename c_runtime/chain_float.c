@@ -13,6 +13,11 @@ static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v)
     return v;
 }
 
+static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a)
+{
+    return a;
+}
+
 static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u)
 {
     return u;

@@ -55,7 +55,7 @@ UNITS = (
     ("quick", "q31", "loop"),
     ("warm", "q31", "loop"),
     ("worn", "q15", "loop"),
-    ("late", "q31", "loop"),
+    ("straight", "q31", "loop"),
     ("relaxing", "q15", "loop"),
     ("drifting", "float32", "loop"),
     ("heated", "float64", "loop"),

@@ -13,6 +13,8 @@ from typing import Any
 
 from hystgen.compensator.chain import blocks, moving
 from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
     LEVEL_BITS,
@@ -294,6 +296,8 @@ def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
         ("FINE_MAX", operand(high), ""),
         ("LEAST_CODE", operand(t.number[LEAST_CODE]), "between which a drive is kept before it is limited"),
         ("MOST_CODE", operand(t.number[MOST_CODE]), ""),
+        ("DRIVE_BITS", f"{t.number[DRIVE_BITS]}u", "bits of a signal in front of the plays below a drive code"),
+        ("ARRIVING_BITS", f"{t.number[ARRIVING_BITS]}u", "and below an input of the plays"),
         ("LEVEL_BITS", f"{t.number[LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
         ("LEVEL_DROP", f"{t.number[LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
         ("LARGEST_LEVEL", operand(t.number[LARGEST_LEVEL]), "sum that is asked of the plays"),

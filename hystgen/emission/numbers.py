@@ -16,7 +16,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.chain.bounds import chain_bounds
-from hystgen.compensator.chain.layout import LEVEL_BITS, Compiled
+from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
@@ -121,7 +121,7 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
         "fronts": bool(plays.fronts),
         "envelopes": any(isinstance(stage, TanhEnvelope) for stage in compiled.static.stages)
         or any(one["kind"] == "bend" for one in behind),
-        "finer": False,
+        "finer": bool(tables.number[ARRIVING_BITS]),
         "saturates": True,
         "limited": codes.limited,
         "drive_lsb": _physical(codes.drive_lsb),

@@ -169,9 +169,10 @@ class Variant:
     """The kind of a model, which decides on the files of the run time that its operators are made of.
 
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
-    drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value; `chain`: it has
-    effects, `slew`: one of them keeps the drive within a rate, `ages`: one is a gain that follows the travel, `moves`
-    and `bends`: how plays move and are bent where that is not as in engine loop.
+    drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
+    `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
+    a rate, `ages`: one is a gain that follows the travel, `moves` and `bends`: how plays move and are bent where that
+    is not as in engine loop.
     """
 
     engine: str
@@ -205,7 +206,7 @@ class Variant:
                 files.append("front_two_curves.c" if self.branches else "front_curve.c")
             files.append("inverse_two_branches.c" if self.branches else "inverse_one_branch.c")
         elif self.fixed or self.engine == "loop":
-            files.append("front_finer.c" if self.finer else "front_none.c")
+            files.append("front_finer.c" if self.finer and not self.chain else "front_none.c")
         return (*files, *(self._loop() if self.engine == "loop" else self._corners()), "status.c")
 
     def _loop(self) -> tuple[str, ...]:
@@ -219,7 +220,8 @@ class Variant:
             ending = "_fixed" * self.fixed
             alone = "relaxing" if self.moves else "plays"
             plays = moving if self.bends else (f"chain_{alone}{ending}.c",)
-            return (start, f"loop_{front}.c", slew, *plays, f"chain_{kind}.c", "chain.c", *more)
+            finer = "chain_finer.c" if self.finer else "chain_whole.c"
+            return (start, f"loop_{front}.c", slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

@@ -76,7 +76,7 @@ class Bounds:
 
     `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
     whole codes; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
-    `Compiled`.
+    `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
     """
 
     static: StaticModel
@@ -94,6 +94,12 @@ class Bounds:
     slowed: float
     reached: bool
     largest_step: float
+    finer: int
+
+    @property
+    def _fine(self) -> int:
+        """Bits of a signal in front of the plays below a drive code."""
+        return self.inner.fine + self.finer
 
     @property
     def _signal(self) -> float:
@@ -103,7 +109,7 @@ class Bounds:
     @property
     def _arriving(self) -> float:
         """A signal in front of the plays in drive units."""
-        return float(self.inner.drive_lsb) / 2.0**self.inner.fine
+        return float(self.inner.drive_lsb) / 2.0**self._fine
 
     # ------------------------------------------------------------ blocks
 
@@ -154,10 +160,10 @@ class Bounds:
 
     def _lag_sizes(self) -> list[tuple[float, float]]:
         """Of each lag, the largest input and the largest output that is asked for, in signals."""
-        given = float(max(map(abs, self.inner.drive)) << self.inner.fine) + 1.0
+        given = float(max(map(abs, self.inner.drive)) << self._fine) + 1.0
         asked = given + 1.0
         if not self.static.stages:
-            asked = float(max(map(abs, self.inner.play)) + self.inner.margin)
+            asked = float(max(map(abs, self.inner.play)) + self.inner.margin) * 2.0**self.finer
         found = []
         for exact, numbers in reversed(self.lags):
             found.append((given, asked))
@@ -205,12 +211,13 @@ class Bounds:
         to a code makes of it, in signals."""
         places = zip(range(len(self.lags)), self._lag_sizes(), strict=True)
         here = sum(self._lag(j, *sizes)[0] for j, sizes in places)
-        code = 0.5 * 2.0**self.inner.fine
+        here += 0.5 * 2.0**self.finer if self.finer else 0.0
+        code = 0.5 * 2.0**self._fine
         if self.lags:
             exact, (rate, theta, _, _) = self.lags[0]
             return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
-        finer = bool(self.static.stages) or self.inner.fine > 0
-        return here, code * finer
+        rounded = bool(self.static.stages) or self._fine > 0
+        return here, code * rounded
 
     def _viscous(self) -> float:
         """What roundings, and contacts inside a step, make of the sum of viscous plays, in output codes."""
@@ -232,7 +239,7 @@ class Bounds:
 
     def forward(self) -> float:
         """In output codes."""
-        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self.inner.fine
+        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         error = self._plays(self._arrival()[0] + short)
         for j, numbers in enumerate(self.creeps):
             error = error * numbers.rest + self._creep(j)
@@ -264,7 +271,7 @@ class Bounds:
     def _arriving_error(self) -> float:
         """Error of what the inverse asks to arrive in front of the memoryless part, in signals."""
         code = self._arrival()
-        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self.inner.fine
+        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         steep = self.static.front_slopes[1]
         solved = float(self.inner.solved()) / self._arriving + steep * float(self.inner.back())
         solved += steep * (sum(code) + short)
@@ -283,7 +290,7 @@ class Bounds:
         for j in range(len(self.lags) - 1, -1, -1):
             exact, (rate, second, late, _) = self.lags[j]
             _, kept, answer = self._lag(j, *self._lag_sizes()[j])
-            code = 0.5 * 2.0**self.inner.fine if j == 0 else 0.5
+            code = 0.5 * 2.0**self._fine if j == 0 else 0.5
             if exact:
                 error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
             else:
@@ -293,7 +300,7 @@ class Bounds:
 
     def _codes(self, error: float) -> float:
         """An error of the drive, in signals in front of the plays, in drive codes."""
-        own = SECOND_ORDER * self._led(error) / 2.0**self.inner.fine
+        own = SECOND_ORDER * self._led(error) / 2.0**self._fine
         whole = float(self.inner.drive[1] - self.inner.drive[0])
         return upward(Fraction(min(own + DOUBLE * whole + self.slowed * whole, whole)))
 

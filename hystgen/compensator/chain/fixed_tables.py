@@ -26,6 +26,8 @@ from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
     LEVEL_BITS,
@@ -65,6 +67,9 @@ TEMPERATURE_BITS = {15: 7, 31: 22}
 BEYOND = 7
 """Spans of their input by which plays in front of a lag may be asked for more than the drive gives: 8 of 2^26 steps,
 with their sign, fit 32 bits."""
+
+MOST_FINER = 16
+"""Bits of what arrives in front of the plays below their input: then a slope of 31 bits is still divided by in 64."""
 
 BEND_BITS = 30
 """Bits of the arguments and values of a curve, without their sign."""
@@ -109,6 +114,7 @@ class _Builder:
         room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
         if room < 1:
             self._refuse(f"signals behind the plays reach {self.sizes.largest:.3g} output codes, too many")
+        self.finer = 0
         self.bits = min(self.inner.bits, room)
         self.drop = self.inner.bits - self.bits
         limits = self._limits(plays.limits)
@@ -139,7 +145,7 @@ class _Builder:
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags, weights,
-            self.bends, (self.low, self.high), slowed, self.reached, step,
+            self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
@@ -250,7 +256,7 @@ class _Builder:
 
     def _numbers(self) -> list[int]:
         span = self.inner.drive[1] - self.inner.drive[0]
-        found = [0] * 11
+        found = [0] * 13
         found[OFFSET] = self.signal(self.static.output_offset)
         found[1] = self.signal(self.high - self.low)
         found[2], found[3] = self.slew(span)
@@ -261,6 +267,7 @@ class _Builder:
         found[LEAST_CODE] = self.inner.drive[0] - 2 * span
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits
+        found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
         return found
 
     def rates(self) -> tuple[Fraction, Fraction]:
@@ -280,9 +287,30 @@ class _Builder:
         return min(whole[0], span + 1), min(whole[1], span + 1)
 
     def _lags(self) -> Any:
+        wanted = self._finest()
+        for bits in range(wanted, -1, -1):  # as many as there is room for
+            self.finer = bits
+            try:
+                return self._lag_tables()
+            except OverflowError:
+                if not bits:
+                    raise
+        return None
+
+    def _finest(self) -> int:
+        """Bits below the plays' input that keep the lead of the lags from making more of its rounding than half a code.
+
+        Plays alone have them, in an arithmetic that has none below a drive code.
+        """
+        if not self.lags or self.static.stages or self.parts.plays or self.inner.fine:
+            return 0
+        leads = [math.log2(4.0 / numbers[lag.RATE]) for exact, numbers in self.lags if not exact]
+        return min(MOST_FINER, math.ceil(sum(leads)) + 1) if leads else 0
+
+    def _lag_tables(self) -> Any:
         c = self.inner
-        given = float(max(map(abs, c.drive)) << c.fine) + 1.0
-        asked = float(max(map(abs, c.play)) + c.margin) if not self.static.stages else given + 1.0
+        given = float(max(map(abs, c.drive)) << (c.fine + self.finer)) + 1.0
+        asked = float(max(map(abs, c.play)) + c.margin) * 2.0**self.finer if not self.static.stages else given + 1.0
         rows = []
         for exact, numbers in reversed(self.lags):
             sizes = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked)

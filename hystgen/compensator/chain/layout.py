@@ -31,10 +31,10 @@ OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
 """Places in `ChainTables.number`: output offset, how far another one may be set, how far the drive may move in a step,
 and the share that verification corrects with."""
 
-LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS = range(5, 11)
+LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS = range(5, 13)
 """More of them in fixed point: bits of a signal behind the plays below an output code, those that a sum of the plays
 has beyond that, the largest sum that is asked of the plays, between which codes a drive is kept before it is limited,
-and bits of a mantissa below a code."""
+bits of a mantissa below a code, and bits of a signal in front of the plays below a drive code and below their input."""
 
 TRAVEL_BITS = 16
 """In fixed point verification sets travels of whole multiples of 2^16 drive codes."""

@@ -30,6 +30,7 @@ class Blocks(NamedTuple):
     target: Callable[..., Any]  # of the preview's line
     front: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
     plays: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # follow, started, inverse input
+    finer: Callable[..., Any]  # what has to arrive, with bits below an input of the plays
 
 
 class Sides(NamedTuple):

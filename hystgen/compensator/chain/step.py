@@ -117,6 +117,7 @@ class Codes(NamedTuple):
 
     finite: Callable[..., Any]
     entered_drive: Callable[..., Any]
+    arriving: Callable[..., Any]  # a signal as an input of the plays
     entered_level: Callable[..., Any]
     drive_code: Callable[..., Any]
     output_code: Callable[..., Any]  # with status bits
@@ -135,7 +136,8 @@ def made_of(
     preview_target = blocks.target
     front_forward, front_inverse = blocks.front
     follow, started, inverse_input = blocks.plays
-    finite, entered_drive, entered_level, drive_code, output_code, entered_travel, shared = codes
+    finer = blocks.finer
+    finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
     side = sides_of(blocks, drives, outputs)
@@ -207,9 +209,9 @@ def made_of(
         s.line.filled[0] = 0
         s.flags[MOVING] = 0
         drive = s.plays.real[DRIVE]
-        s.plays.real[DRIVE] = entered_drive(t, drive)
+        s.plays.real[DRIVE] = arriving(t, entered_drive(t, drive))
         s.real[APPLIED] = drive
-        drive_side_rest(t, s, s.plays.real[DRIVE])
+        drive_side_rest(t, s, entered_drive(t, drive))
         s.plays.real[LEVEL] = started(t, s)
         s.real[OUTPUT] = output_side_rest(t, s, s.plays.real[LEVEL])
 
@@ -238,7 +240,7 @@ def made_of(
             travelled(t, s, v)
         x = entered_drive(t, v)
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
-        h = follow(t, s, arrive(t.plays, s.plays, a))
+        h = follow(t, s, arrive(t.plays, s.plays, arriving(t, a)))
         s.plays.real[LEVEL] = h
         s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
         s.real[APPLIED] = v
@@ -329,7 +331,8 @@ def made_of(
         moving = s.flags[MOVING] != 0
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
         s.plays.counts[BITS] = 0
-        a = inverse_drive(t.plays, s.plays, h, inverse_input(t, s, h))
+        w = inverse_input(t, s, h)
+        a = finer(t, s, h, w, inverse_drive(t.plays, s.plays, h, w))
         v = drive_code(t, drive_side_solve(t, s, a) if moving else a)
         reached = slewed(t, s, v)
         if reached != v:

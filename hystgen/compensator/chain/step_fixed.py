@@ -11,6 +11,8 @@ from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
     LEVEL_BITS,
@@ -31,9 +33,9 @@ from hystgen.effects.lag.fixed import lag_absorb, lag_rest, lag_solve
 from hystgen.effects.saturation.fixed import saturated, unsaturated
 from hystgen.effects.thermal.fixed import gain_absorb, gain_heat, gain_reset, gain_solve
 from hystgen.front import curve
-from hystgen.plays.fixed import loop_solve, nearest
+from hystgen.plays.fixed import loop_solve, nearest, over_slope
 from hystgen.plays.loop import loop_absorb, loop_output
-from hystgen.plays.slots import CODE_MAX, FINE, OUTPUT_CLAMPED, Reals, zero
+from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
 
 # ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
 
@@ -85,6 +87,40 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
     return loop_solve(t.plays, s.plays, inside << t.number[LEVEL_DROP])
 
 
+# ---------------------------------------------------------------- chain_finer.c or chain_whole.c
+
+
+@jit
+def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
+    """What has to arrive in front of the plays, with bits below their input w: what is left of h there, over the
+    slope."""
+    bits = t.number[ARRIVING_BITS]
+    if bits == 0:
+        return a
+    whole = a << bits
+    if h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL]:
+        return whole
+    left = h << t.number[LEVEL_DROP]
+    k = 1
+    for i in range(len(s.plays.play)):
+        low = w - t.plays.threshold[i]
+        high = w + t.plays.threshold[i]
+        play = s.plays.play[i]
+        z = play
+        if z > high:
+            z = high
+        if z < low:
+            z = low
+        if z != play:
+            k = i + 1
+        left = left - t.plays.weight[i] * z
+    size = -left if left < 0 else left
+    if size > t.plays.slope[k]:
+        return whole
+    more = over_slope(t.plays, size << bits, k)
+    return whole - more if left < 0 else whole + more
+
+
 # ---------------------------------------------------------------- preview_fixed.c
 
 
@@ -103,7 +139,13 @@ def preview_target(tap: Reals, line: Line) -> Any:
 @jit
 def entered_drive(t: ChainTables, v: Any) -> Any:
     """A drive code as a signal."""
-    return v << t.plays.limits[FINE]
+    return v << t.number[DRIVE_BITS]
+
+
+@jit
+def arriving(t: ChainTables, a: Any) -> Any:
+    """What arrives in front of the plays, in units of their input."""
+    return nearest(a, t.number[ARRIVING_BITS])
 
 
 @jit
@@ -115,7 +157,7 @@ def entered_level(t: ChainTables, u: Any) -> Any:
 @jit
 def drive_code(t: ChainTables, x: Any) -> Any:
     """Drive code of a signal, kept near the range."""
-    code = nearest(x, t.plays.limits[FINE])
+    code = nearest(x, t.number[DRIVE_BITS])
     if code > t.number[MOST_CODE]:
         return t.number[MOST_CODE]
     if code < t.number[LEAST_CODE]:
@@ -157,5 +199,8 @@ BLOCKS = Blocks(
     preview_target,
     (front_forward, front_inverse),
     (follow, started, inverse_input),
+    finer,
 )
-CODES = Codes(step_fixed.finite, entered_drive, entered_level, drive_code, output_code, entered_travel, shared)
+CODES = Codes(
+    step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
+)  # fmt: skip

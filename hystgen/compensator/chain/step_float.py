@@ -90,6 +90,12 @@ def entered(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
 
 
 @jit(inline=True)
+def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """What has to arrive in front of the plays."""
+    return a
+
+
+@jit(inline=True)
 def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:  # noqa: ARG001  as in fixed point
     """A displacement as it is given to the caller, and its status."""
     return y, 0
@@ -112,5 +118,6 @@ BLOCKS = Blocks(
     preview_target,
     (front_forward, front_inverse),
     (follow, started, inverse_input),
+    finer,
 )
-CODES = Codes(step_float.finite, entered, entered, entered, output_code, entered, shared)
+CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)
