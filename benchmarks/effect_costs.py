@@ -32,14 +32,17 @@ from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("dashpot", "polynomial", "centre")
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FLOATS = ("float32", "float64")
+FLOAT_ALONE = ("dilated", "polynomial", "centre")
+"""Plays that fixed point does not have."""
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
     "weights: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]",
     "lag": "name: lag, time_constant: 0.01",
     "lag_exact": "name: lag, time_constant: 2.0e-4",
     "ageing": "name: ageing, loss: 0.02, travel: 50",
+    "heat": "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001",
     "gain": "name: thermal, gain_per_degree: 0.001",
+    "clock": "name: drift, rate: 1.0e-3",
     "preview": "name: resonance, frequency: 30, damping: 0.05",
     "slew": "name: slew_limit, rate: 1.0e+5",
     "tanh": "name: saturation, level: 1000",
@@ -61,6 +64,7 @@ def model(effect: str) -> Model:
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
     text += f"    thresholds: {[0.45 * k for k in range(CODE_PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * CODE_PLAYS}\n"
     text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
+    text += "emit: {compensation: {compensate: [drift, self_heating]}}\n"
     return Model(parse_parameters(text, "bench.yaml"))
 
 
@@ -96,11 +100,12 @@ def main() -> None:
     cores = given.cores.split(",")
     sizes, costs = [], []
     with tempfile.TemporaryDirectory(prefix="hystgen-effects-") as place:
-        for arithmetic in FLOATS:
+        for arithmetic, about in ARITHMETICS.items():
             base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
             least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
-            moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
-            for effect in ("any", *EFFECTS):
+            if not about.fixed:
+                moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
+            for effect in ("any", *(each for each in EFFECTS if not (about.fixed and each in FLOAT_ALONE))):
                 folder = Path(place) / f"{effect}-{arithmetic}"
                 code, counts = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores)
                 before = base if effect == "any" else moved if effect in MOVED else least

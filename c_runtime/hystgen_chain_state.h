@@ -40,4 +40,18 @@ typedef struct {
     bool own; /* the gain follows the travel */
 } hystgen_ageing_t;
 
+typedef struct {
+    hystgen_real_t high; /* rise of the temperature, in two parts */
+    hystgen_real_t low;
+    hystgen_real_t gain;
+    hystgen_real_t inverse;
+    hystgen_real_t offset;
+} hystgen_heat_t;
+
+typedef struct {
+    hystgen_real_t high; /* samples, in units of the table's carry and of one */
+    hystgen_real_t low;
+    hystgen_real_t lead; /* samples that the next reference is ahead */
+} hystgen_clock_t;
+
 #endif

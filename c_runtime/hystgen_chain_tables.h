@@ -68,4 +68,24 @@ typedef struct {
     uint_least8_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
 } hystgen_ageing_table_t;
 
+/* Own heat: degrees of a change of the drive's signed square in one step, and what a step keeps. */
+typedef struct {
+    hystgen_real_t rate;
+    hystgen_real_t per_square;
+    hystgen_real_t per_degree;
+    hystgen_real_t offset_per_degree;
+    hystgen_real_t hottest; /* rise up to which gain and offset follow */
+    uint_least16_t turns;   /* steps of Newton's to the reciprocal of a gain that has moved */
+} hystgen_heat_table_t;
+
+/* Drift over time: rate, and half of what it changes by. */
+typedef struct {
+    hystgen_real_t sample; /* s, of one sample and of `carry` of them */
+    hystgen_real_t block;
+    hystgen_real_t carry;
+    hystgen_real_t rate;
+    hystgen_real_t half_change;
+    hystgen_real_t farthest;
+} hystgen_clock_table_t;
+
 #endif

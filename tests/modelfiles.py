@@ -56,11 +56,12 @@ BRANCHES = (
 )
 
 
-def chain(name: str, *effects: str, front: str = "") -> str:
-    """A model with effects, a sample a millisecond."""
+def chain(name: str, *effects: str, front: str = "", compensate: str = "") -> str:
+    """A model with effects, a sample a millisecond; `compensate`: of those that nothing measures."""
+    asked = f"emit: {{compensation: {{compensate: [{compensate}]}}}}\n" if compensate else ""
     return (
         head(name) + PLAYS + front + "  output_offset: 0.5\n  effects:\n"
-        + "".join(f"    - {{{effect}}}\n" for effect in effects) + "sample_time: 1.0e-3\n"
+        + "".join(f"    - {{{effect}}}\n" for effect in effects) + "sample_time: 1.0e-3\n" + asked
     )  # fmt: skip
 
 
@@ -89,6 +90,12 @@ CHAINS = {
     "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
     "straight": chain("straight", "name: resonance, frequency: 20, damping: 0.1", "name: lag, time_constant: 3.0e-3",
                       CREEP).replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"),
+    "drifting": chain("drifting", "name: drift, shape: curved, rate: 0.05, change: 0.01", CREEP,
+                      "name: saturation, level: 15", compensate="drift"),
+    "drifting_late": chain("drifting_late", "name: drift, rate: -0.08", "name: delay, time: 2.6e-3", CREEP,
+                           compensate="drift"),
+    "heated": chain("heated", "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.05, "
+                    "gain_per_degree: -0.02, offset_per_degree: 0.1", CREEP, compensate="self_heating"),
     "late": chain("late", "name: delay, time: 2.6e-3", "name: resonance, frequency: 30, damping: 0.05", CREEP),
     "everything": chain("everything", CREEP, "name: lag, time_constant: 0.01", "name: delay, time: 2.0e-3",
                         "name: resonance, frequency: 40, damping: 0.3", "name: saturation, level: 15",
@@ -97,4 +104,10 @@ CHAINS = {
 }  # fmt: skip
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
-INVERSE_ALONE = ("straight", "viscous_twin", "late", "everything")
+INVERSE_ALONE = ("straight", "viscous_twin", "late", "drifting_late", "everything")
+
+FLOAT_ALONE = (
+    "drifting", "drifting_late", "heated", "viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot",
+)  # fmt: skip
+"""Those with a clock or own heat, or whose plays are bent, have a nonlinear dashpot or do not all relax with one time
+constant, which fixed point does not have."""

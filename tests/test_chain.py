@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 import re
 import subprocess
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, INVERSE_ALONE, chain
+from modelfiles import CHAINS, CREEP, FILES, FLOAT_ALONE, INVERSE_ALONE, chain
 from scipy.integrate import solve_ivp
 
 import hystgen
+from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, preview, tables
@@ -21,12 +24,13 @@ from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
-from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.files import canonical_json, dump_parameters, parameters_sha256, parse_parameters
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
@@ -35,6 +39,17 @@ T, N = 1e-3, 1500
 
 def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
+
+
+FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
+EVERY = [(name, arithmetic) for name in CHAINS for arithmetic in ("float32", "float64")] + [
+    (name, arithmetic) for name in FIXED for arithmetic in ("q31", "q15")
+]
+
+
+def noisy(name: str) -> Model:
+    """A model of which fixed point may make any noise."""
+    return with_options(name, noise_gain=1e9)
 
 
 def operator(name: str) -> str:
@@ -56,24 +71,27 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
     return Run(np.arange(n) * T, np.clip(np.float32(u).astype(float), low, high), {"temperature": 20.0 + u})
 
 
-@pytest.mark.parametrize("name", CHAINS)
-@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize(("name", "arithmetic"), EVERY)
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
-    report = hystgen.verify(model(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["everything", "viscous", "aged"])
-def test_cores_give_the_same_bits(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [("everything", "float32"), ("viscous", "float32"), ("aged", "float32"), ("everything", "q31"),
+     ("everything", "q15"), ("worn", "q15"), ("quick", "q15")],
+)  # fmt: skip
+def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]
     known = [core for core in cores if core in hystgen.verification.targets.NAMES]
-    report = hystgen.verify(model(name), operator=operator(name), targets=known, target_length=150)
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), targets=known, target_length=150)
     assert report.ok, report.table()
 
 
-EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy"), 1e-12) | {
+EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy", "drifting"), 1e-12) | {
     "viscous": 2e-4, "relaxing": 2e-4, "dashpot": 1e-4, "soft_dashpot": 2e-3,
 }  # fmt: skip
 """Of the output range. Viscous plays: contacts inside a step. Dashpots: where on its way in a step an input counts as
@@ -99,6 +117,82 @@ def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: in
     assert np.max(np.abs(y - run.v)[free]) <= EXACT[name] * span
 
 
+def test_drift_is_compensated_ahead_of_time() -> None:
+    """References are ahead of a motion by whole samples, in which the drift goes on."""
+    text = chain("ahead", "name: drift, rate: -0.08", "name: delay, time: 3.0e-3", CREEP, compensate="drift")
+    one = model("ahead", text)
+    numbers = compiled(one, "float64")
+    t = np.arange(N) * T
+    u = 0.5 + 1.5 * t
+    v = answers(numbers, Run(t, u, {}), True)
+    known = N - numbers.ahead
+    assert np.max(np.abs(one.simulate(v, t=t) - u)[numbers.ahead : known]) < 1e-12
+    assert np.ptp(one.effects[0].added(Run(t, u))) > 0.1, "what it is worth"
+
+
+def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None:
+    one = model("drifting")
+    numbers = compiled(one, "float64")
+    calls: list[tuple[int, float]] = [(slots.OP_STEP, 1.0)] * 2001
+    drifted = 0.05 * 2.0 + 0.005 * 2.0**2
+    answer, status = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_EXPECTED, 0.0)])
+    fresh, _ = run_calls(one, [(slots.OP_SETTLE, 1.0), (slots.OP_EXPECTED, 0.0)])
+    counted = 2.001
+    assert float(answer[-1] - fresh[-1]) == pytest.approx(0.05 * counted + 0.005 * counted**2, abs=1e-12)
+    assert not np.any(status)
+    anew, _ = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_OFFSET, 0.25), (slots.OP_EXPECTED, 0.0)])
+    assert float(anew[-1] - fresh[-1]) == pytest.approx(0.25, abs=1e-12), "the clock begins anew"
+    held, _ = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_OFFSET, math.nan), (slots.OP_EXPECTED, 0.0)])
+    assert float(held[-1]) == float(answer[-1]), "no number changes nothing"
+    trimmed, _ = run_calls(one, [*calls, (slots.OP_SETTLE, 1.0), (slots.OP_CORRECT, float(answer[-1])),
+                                 (slots.OP_EXPECTED, 0.0)])  # fmt: skip
+    assert float(trimmed[-1]) == float(answer[-1]), "a sensor that sees what is expected changes nothing"
+    assert drifted > 0.1
+    span = float(numbers.tables.number[tables.FARTHEST])
+    far = chain("far", "name: drift, rate: 1.0e+4", compensate="drift")
+    late, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0)] * 50 + [(slots.OP_EXPECTED, 0.0)])
+    none, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0), (slots.OP_EXPECTED, 0.0)])
+    assert abs(float(late[-1])) <= abs(float(none[-1])) + 3.0 * span, "drift stays within what can be set"
+
+
+def test_a_clock_counts_beyond_the_digits_of_a_float() -> None:
+    one = compiled(model("drifting"), "float32").tables
+    state = np.zeros((1, 3), np.float32)
+    with jit.plain():
+        for start in (0.0, 2.0**24 - 2.0):
+            state[0] = 0.0, start, 0.0
+            for _ in range(5):
+                drift.clock_tick(one.clock, state, 0)
+            assert float(state[0, drift.HIGH]) * 2.0**24 + float(state[0, drift.LOW]) == start + 5.0
+        seconds = (2.0**24 + 3.0) * T
+        limited = min(0.05 * seconds + 0.005 * seconds**2, float(one.clock[0, drift.FARTHEST]))
+        assert float(drift.clock_drift(one.clock, state, 0, np.float32(0.0))) == pytest.approx(limited, rel=1e-6)
+
+
+def test_own_heat_leaves_the_gain_of_one_sample() -> None:
+    """The forward operator has it exactly; the inverse takes the gain before the last move."""
+    one = model("heated")
+    numbers = compiled(one, "float64")
+    run = record(numbers, 5, share=0.6)
+    v = answers(numbers, run, True)
+    left = np.abs(one.simulate(v, t=run.t) - run.v)
+    heat = one.effects[0]
+    rises = heat.above(Run(run.t, v))  # type: ignore[attr-defined]
+    most = np.max(np.abs(np.diff(rises)))
+    loss = 1.0 - math.exp(-T / 0.5)
+    sample = 0.05 * loss * np.max(np.abs(np.diff(v * np.abs(v)))) / (4.0 * T)
+    assert sample >= most
+    size = float(np.max(np.abs(one.without([heat]).simulate(v) - 0.5)))
+    assert 0.0 < np.max(left) <= (0.02 * size + 0.1) * sample * 1.001
+    assert np.max(rises) > 0.5, "it has warmed"
+    plain = one.without([heat]).inverse().simulate(run.v)
+    assert np.max(np.abs(one.simulate(plain, t=run.t) - run.v)) > 20.0 * np.max(left), "what it is worth"
+    forward = answers(numbers, Run(run.t, v, {}), False)
+    assert np.max(np.abs(forward - one.simulate(v, t=run.t))) < 1e-12
+    exact = one.inverse().simulate(run.v, t=run.t)
+    assert np.max(np.abs(one.simulate(exact, t=run.t) - run.v)) < 1e-12, "in double precision the drive is sought"
+
+
 def test_ageing_leaves_the_gain_of_one_sample() -> None:
     one = model("worn")
     numbers = compiled(one, "float64")
@@ -120,7 +214,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
     run = record(numbers, seed)
     ends = tuple(float(end) for end in numbers.tables.limits[:2])
     v = answers(numbers, run, True).astype(float)
-    wanted = Compensator(one.chain).drives(run, ends)  # type: ignore[arg-type]
+    wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(run, ends)  # type: ignore[arg-type]
     known = N - numbers.ahead
     assert np.max(np.abs(v - wanted)[:known]) <= bound.inverse
     if operator(name) == "both":
@@ -273,7 +367,7 @@ def test_preview_reads_ahead_what_is_late() -> None:
 
 def with_options(name: str, **options: Any) -> Model:
     one = model(name).parameters
-    how = Compensation(**options)
+    how = one.emit.compensation.model_copy(update=Compensation(**options).model_dump(exclude_unset=True))
     return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
 
 
@@ -337,6 +431,49 @@ def test_preview_hold_corner_and_rate_are_options() -> None:
     assert middle == pytest.approx(0.0, abs=1e-12), "rounding corners moves nothing in time"
 
 
+DOUBTFUL = 'not_separable: [[asymmetry, sensor_nonlinearity], [creep, drift]]\n'
+
+
+def test_a_front_that_may_be_the_sensor_s_is_emitted_with_a_warning(
+    tmp_path: Path, run: Callable[..., tuple[int, str, str]]
+) -> None:
+    for name, text, wanted in (
+        ("logarithmic", CHAINS["logarithmic"] + DOUBTFUL, True),
+        ("logarithmic", CHAINS["logarithmic"], False),
+        ("logarithmic", CHAINS["logarithmic"] + DOUBTFUL.replace("asymmetry", "saturation"), False),
+        ("creeping", CHAINS["creeping"] + DOUBTFUL, False),
+        ("curved", FILES["curved"] + DOUBTFUL, True),
+    ):
+        path = tmp_path / "one.yaml"
+        path.write_text(text)
+        code, out, err = run("emit", path, "-o", tmp_path / "out")
+        assert code == 0, err
+        assert (f"warning: {name}: the memoryless part was diagnosed as asymmetry" in err) == wanted
+        assert ("nested loops" in err) == wanted
+        assert ("the inverse bends the true motion" in err) == wanted
+        assert f"{name}.c" in out
+    parameters = parse_parameters(CHAINS["creeping"] + DOUBTFUL, "f")
+    assert parse_parameters(dump_parameters(parameters), "f") == parameters
+    plain = parse_parameters(CHAINS["creeping"], "f")
+    assert parameters_sha256(parameters) != parameters_sha256(plain)
+    assert "not_separable" not in canonical_json(plain)
+
+
+@pytest.mark.parametrize("name", ["aged", "warm", "late", "drifting", "everything"])
+def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
+    """Each of them, and one that is beyond its limits."""
+    one = model(name)
+    text = emitted_files(one, operator=operator(name))
+    calls = set(re.findall(rf"{name}_inverse_(push|settle|set_\w+)\(", text[f"{name}.h"]))
+    tested = dict(re.findall(rf"kind == '(\w)'\) {{\n +{name}_inverse_(\w+)\(", text[f"{name}_selftest.c"]))
+    assert set(tested.values()) == calls | {"reset", "commit"}
+    samples = text[f"{name}_selftest.c"].partition("_selftest_inverse[")[2].partition("};")[0]
+    counts = Counter(re.findall(r"{'(\w)'", samples))
+    assert all(counts[letter] >= 1 for letter in tested)
+    limited = re.findall(r"{'(\w)', [^}]*, (\d+)u}", samples)
+    assert any(int(status) & slots.LIMITED_SETTING for letter, status in limited if letter in tested)
+
+
 def test_only_what_the_model_has_is_emitted() -> None:
     one = model("creeping")
     text = module.files(one.parameters, one.cascade, emit_options(one))["creeping.h"]
@@ -348,12 +485,12 @@ def test_only_what_the_model_has_is_emitted() -> None:
     assert {"travel", "set_travel", "set_gain"} <= calls
 
 
-@pytest.mark.parametrize("name", CHAINS)
-def test_memory_in_the_banner_is_that_of_the_compiler(name: str, tmp_path: Path) -> None:
-    one = model(name)
-    options = emit_options(one, operator=operator(name))
+@pytest.mark.parametrize(("name", "arithmetic"), [pair for pair in EVERY if pair[1] != "float64"])
+def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
+    one = noisy(name)
+    options = emit_options(one, operator(name), arithmetic)
     cost = module.cost_of(one.parameters, one.cascade, options)
-    hystgen.emit(one, tmp_path, operator=operator(name))
+    hystgen.emit(one, tmp_path, operator=operator(name), arithmetic=arithmetic)
     sizes = "".join(f'    printf("%u ", (unsigned)sizeof({name}_{op}_t));\n' for op, _ in cost.memory.instances)
     main = f"int main(void)\n{{\n{sizes}    return 0;\n}}\n"
     (tmp_path / "size.c").write_text(f'#include "{name}.h"\n#include <stdio.h>\n{main}')
@@ -385,12 +522,20 @@ def test_what_has_no_inverse_is_refused_or_left_out_and_named(effect: str, reaso
     assert "part_creep" in emitted_files(one, allow_partial=True)["part.c"], "what there is stays"
 
 
-def test_needs_a_sample_time_and_floating_point(tmp_path: Path) -> None:
+def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
-    with pytest.raises(UnsupportedEffectsError, match="not in q15"):
-        emit_options(model("creeping"), arithmetic="q15")
+    for name in FLOAT_ALONE:
+        with pytest.raises(UnsupportedEffectsError, match="in fixed point there is no C for plays that"):
+            emit_options(model(name), arithmetic="q15", operator="inverse")
+    assert emit_options(model("viscous"), arithmetic="q31", allow_partial=True).left_out
+    with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
+        emit_options(model("straight"), arithmetic="q15")
+    with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes a sample are less than one"):
+        compiled(model("slow", chain("slow", "name: slew_limit, rate: 0.1")), "q15")
+    with pytest.raises(FormatError, match="a lag: its states and constants do not fit q31"):
+        compiled(model("slow", chain("slow", "name: lag, time_constant: 1.0e9")), "q31")
     with pytest.raises(UnsupportedEffectsError, match="only the inverse has it"):
         emit_options(model("late"), operator="both")
     with pytest.raises(FormatError, match="too large for float32"):

@@ -732,6 +732,30 @@ def five_records(output: Callable[[Array, Array], Array]) -> list[Record]:
     return made
 
 
+def test_a_bend_that_may_be_the_stage_s_or_the_sensor_s_is_said_where_c_is_made(tmp_path: Path, run: Call) -> None:
+    """Loops so narrow that a stage that bends in front of its plays looks like a sensor that bends behind them."""
+
+    def output(_: Array, v: Array) -> Array:
+        bent = v + 0.003 * (v - 20.0) ** 2
+        return np.asarray(brute_output(bent, (0.0, 10.0), (1.0, 0.01), 0.0))
+
+    path = tmp_path / "stage.yaml"
+    path.write_text(
+        "hystgen: 1\nname: stage\nsample_time: 1.0e-3\ninput_range: [0, 40]\n"
+        "model: {pi: {thresholds: [0, 10.0], weights: [1.0, 0.01]}}\n"
+    )
+    records = five_records(output)
+    found = hystgen.diagnose(path, records[:3], holdout=records[3:], history=[0.0])
+    assert found.content["not_separable"] == [["sensor_nonlinearity", "asymmetry"]]
+    found.write(tmp_path / "out")
+    extended = tmp_path / "out" / "params.yaml"
+    assert hystgen.load(extended).parameters.not_separable == (("sensor_nonlinearity", "asymmetry"),)
+    code, _, err = run("emit", extended, "-o", tmp_path / "firmware")
+    assert code == 0
+    assert "warning: stage: the sensor was diagnosed as curved" in err
+    assert "the inverse leaves it as it is" in err
+
+
 class TestNominalEffects:
     """A model that has effects already: their numbers are refitted, and wrong ones are no missing effect."""
 
@@ -822,7 +846,7 @@ class TestOwnEffects:
         for each in records:
             table = np.column_stack([each.t, each.v, each.y])
             np.savetxt(tmp_path / f"{each.name}.csv", table, delimiter=",", header="t,v,y", comments="")
-        own = Path(__file__).parents[1] / "examples" / "my_effect.py"
+        own = Path(__file__).parent / "neighbour.py"
         files = [tmp_path / f"{each.name}.csv" for each in records]
         words = [*files[:3], "--holdout", files[3], "--holdout", files[4], "--history", "0", "--effects", own]
         code, _, err = run("diagnose", _model(tmp_path), *words, "-o", tmp_path / "out")

@@ -976,7 +976,7 @@ def test_loading_a_plain_model_imports_no_effect() -> None:
 
 # Effects of the user's own --------------------------------------------------------------------------------
 
-EXAMPLE = Path(__file__).parents[1] / "examples" / "my_effect.py"
+EXAMPLE = Path(__file__).parent / "neighbour.py"
 OWN = """from typing import ClassVar, Literal
 import numpy as np
 from hystgen.effects import Effect, Place, Run

@@ -213,11 +213,11 @@ REFUSED = [
     ]),
     case('unknown_keys', H + M + "sampletime: 1\nfoo: 2\n", [
         '5:1: sampletime: unknown key; did you mean sample_time?',
-        '6:1: foo: unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit',
+        '6:1: foo: unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
     ]),
     case('odd_unknown_keys', H + M + '"a b\\n": 1\n' + "k" * 70 + ": 2\n", [
-        '5:1: "a b\\n": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit',
-        '6:1: "kkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkk...": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit',
+        '5:1: "a b\\n": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
+        '6:1: "kkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkk...": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
     ]),
     case('no_values', "hystgen:\nname: ~\ninput_range: null\nmodel:\n  pi:\nsample_time:\nunits: {input: }\n", [
         '1:1: hystgen: has no value; write one, or remove it',
@@ -602,7 +602,13 @@ REFUSED = [
         '6:78: emit.compensation.corner: must be a whole number, not 1.5; write it like 12',
         '6:94: emit.compensation.resonance: must be inverse or none, not the text "notch"; choose one of them',
         '6:101: emit.compensation.quiet: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
-        'resonance, taps, corner',
+        'resonance, taps, corner, compensate',
+    ]),
+    case('compensate', H + M + "emit: {compensation: {compensate: [lag]}}\nnot_separable: [[creep], [a, b, c], 3]\n", [
+        '5:36: emit.compensation.compensate[0]: must be drift or self_heating, not the text "lag"; choose one of them',
+        '6:17: not_separable[0]: must be two names; write [asymmetry, sensor_nonlinearity]',
+        '6:26: not_separable[1]: must be two names; write [asymmetry, sensor_nonlinearity]',
+        '6:37: not_separable[2]: must be a list, not 3; write [ ] around the values',
     ]),
     case('emit_lsb', H + M + "emit: {drive_lsb: q, output_lsb: 1e31}\n", [
         '5:19: emit.drive_lsb: must be a number, not the text "q"; write it like 0.45',

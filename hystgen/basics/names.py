@@ -19,7 +19,7 @@ def _words(text: str) -> frozenset[str]:
 _NAME = re.compile(NAME_PATTERN.rstrip("$") + r"\Z")
 
 # C up to C23 and C++ up to C++23; keywords with a leading underscore are no names anyway.
-_KEYWORDS = _words(
+KEYWORDS = _words(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class
     co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype
@@ -72,7 +72,7 @@ def name_problem(name: str) -> str | None:
         return f'"{printable(name)}" is not a usable C prefix; {rule}'
     word = name.lower()
     other = f"choose another name, such as axis_{word}" if len(name) + 5 <= MAX_NAME else "choose another name"
-    if word in _KEYWORDS:
+    if word in KEYWORDS:
         return f"{name} is a keyword of C or C++; {other}"
     if word == "main":
         return "main would write main.h and main.c, which are the firmware's own; choose another name"

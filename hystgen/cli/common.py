@@ -88,7 +88,8 @@ optimize_option = click.option(
     "--optimize", type=click.Choice(["auto", "speed", "size"]), help="what engine auto chooses for; default: the file's"
 )
 effects_option = click.option(
-    "--effects", multiple=True, type=click.Path(), metavar="FILE.py", help="effects of your own (user:..); repeatable"
+    "--effects", multiple=True, type=click.Path(), metavar="FOLDER",
+    help="effects of your own (user:..): a folder with model.py, or a Python file; repeatable",
 )
 partial_option = click.option(
     "--allow-partial", is_flag=True, help="leave out effects that the C cannot have; its banner names them"

@@ -13,6 +13,7 @@ from hystgen.basics import console
 from hystgen.cli.common import (
     Failed,
     arithmetic_option,
+    effects_option,
     engine_option,
     for_each,
     guarded,
@@ -37,22 +38,27 @@ if TYPE_CHECKING:
 @layout_option
 @click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
 @partial_option
+@effects_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
-def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, **options: Any) -> None:
+def emit(
+    params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: Any
+) -> None:
     """Write the C files of models.
 
     Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
+
+    With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
     from hystgen.emission import calls, files
 
     params = tuple(dict.fromkeys(params))
-    models = for_each(params, load_model)
+    models = for_each(params, partial(load_model, effects=effects))
     guarded(output, lambda: calls.check_names(models))
     named = list(zip(params, models, strict=True))
     texts = for_each(named, lambda one: guarded(one[0], lambda: calls.emitted_files(one[1], **options)))
     made = {name: text for each in texts for name, text in each.items()}
     if check:
-        _check(named, output, options)
+        _check(named, output, options, effects)
     elif list_outputs:
         for name in made:
             console.say(str(Path(output) / name))
@@ -61,7 +67,9 @@ def emit(params: tuple[str, ...], output: str, check: bool, list_outputs: bool, 
             console.say(str(path))
 
 
-def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, Any]) -> None:
+def _check(
+    models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, Any], effects: Sequence[str]
+) -> None:
     """Exit code 1 with the differences of files on disk, and the commands that fit."""
     from hystgen.emission import banner, calls, stale
 
@@ -82,6 +90,6 @@ def _check(models: Sequence[tuple[str, Model]], output: str, options: Mapping[st
             except ValueError:  # no such model any more
                 return list(found)
 
-        advice += stale.advice(found, path, output, given, wanted, again)
+        advice += stale.advice(found, path, output, given, wanted, again, effects)
     if problems:
         raise Failed("\n".join(dict.fromkeys([*problems, *advice])), 1)

@@ -11,6 +11,7 @@ from hystgen.basics import console
 from hystgen.cli.common import (
     Failed,
     arithmetic_option,
+    effects_option,
     engine_option,
     guarded,
     keep_inputs,
@@ -32,13 +33,15 @@ from hystgen.verification.targets import NAMES as TARGETS
 @optimize_option
 @layout_option
 @partial_option
+@effects_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
 @click.option("--target-length", type=click.IntRange(min=1), help="calls of a record on emulated cores")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report for programs")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 def verify(
-    params: str, compiler: tuple[str, ...], targets: str, json_file: str | None, junit_file: str | None, **options: Any
+    params: str, compiler: tuple[str, ...], targets: str, json_file: str | None, junit_file: str | None,
+    effects: tuple[str, ...], **options: Any,
 ) -> None:
     """Compile the emitted C, run it and compare it with the Python reference, bit for bit.
 
@@ -55,7 +58,7 @@ def verify(
     for file in (json_file, junit_file):
         if file:
             guarded(file, partial(writing.check_writable, file))
-    model = load_model(params)
+    model = load_model(params, effects)
 
     def say(what: str) -> None:
         console.note(f"verifying: {what}")

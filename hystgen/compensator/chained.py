@@ -8,7 +8,7 @@ ahead: a delay and a mode take the reference before its time.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,17 @@ from hystgen.basics.problems import EffectsError, NotInvertibleError, Unsupporte
 from hystgen.chain.blocks import Block
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
+from hystgen.effects import own
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.base import Array, Effect, Place, Run
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag.model import Lag
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.resonance.compensator import led
 from hystgen.effects.saturation.compensator import unsaturated
+from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal.model import SelfHeating
 
 EVEN = 1e-3
 """Share of a step by which steps may differ where they are taken for equal: as much as the error of a mode's inverse,
@@ -137,36 +141,56 @@ class Actuator:
         return sign * max(sign * w, sign * float(inputs[k]))
 
 
-def refusal(effect: Effect) -> str:
-    """Why a compensator cannot take an effect in; empty where it can."""
+SWITCH = "; to have it all the same, write emit: {compensation: {compensate: [%s]}}"
+
+
+def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
+    """Why a compensator cannot take an effect in; empty where it can. `compensate`: those asked for all the same."""
     if effect.name == "drift":
-        return "drift (a clock that runs alone; nothing says when it began)"
+        ask = SWITCH % "drift"
+        return "" if "drift" in compensate else f"drift (a clock that runs alone; nothing says when it began{ask})"
+    if isinstance(effect, SelfHeating):
+        unmeasured = "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's"
+        return "" if "self_heating" in compensate else f"{unmeasured}{SWITCH % 'self_heating'})"
     if effect.name == "thermal" and not effect.columns:
-        return "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's)"
-    if effect.name not in TAKEN_IN:
+        return "thermal from the heat of loops (the temperature is not measured, and drifts with the room's)"
+    if effect.name not in TAKEN_IN and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
     return ""
+
+
+def filter_block(effect: Effect) -> Block | None:
+    """The block of an effect that filters what passes, in front of the plays or behind them; none of any other."""
+    if isinstance(effect, creep.EFFECTS):
+        return creep.block(effect)
+    if isinstance(effect, Lag):
+        return lag.block(effect)
+    return own.Instance(effect) if effect.block else None
 
 
 class Compensator:
     """Drives for a reference; a sensor's own nonlinearity is left out, the reference being true displacement.
 
-    Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
+    `compensate`: `drift`, which begins at t = 0, and `self_heating`, where these are to be taken in although nothing
+    measures them. Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
     """
 
-    def __init__(self, chain: Chain) -> None:
+    def __init__(self, chain: Chain, compensate: Collection[str] = ()) -> None:
         static, effects = chain.cascade, chain.effects
         creeping = [effect for effect in effects if isinstance(effect, creep.EFFECTS)]
         missing = [*(reason for each in creeping for reason in creep.problems(each)), *static.inverse_problems()]
         if missing:
             raise NotInvertibleError(missing)
-        refused = [reason for effect in effects if (reason := refusal(effect))]
+        refused = [reason for effect in effects if (reason := refusal(effect, compensate))]
         if refused:
             raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
         self.static, self.effects = static, effects
         plays = [effect for effect in effects if effect.place is Place.PLAYS]
-        lags = [block for effect in self._called("lag") if (block := lag.block(effect))]
-        self.blocks: list[Block] = [*lags, Actuator(static, plays), *map(creep.block, creeping)]
+        drives, outputs = (
+            [block for effect in effects if effect.place is place and (block := filter_block(effect))]
+            for place in (Place.DRIVE, Place.LINEAR)
+        )
+        self.blocks: list[Block] = [*drives, Actuator(static, plays), *outputs]
         self.slew = self._called("slew_limit")
         self.modes = self._called("resonance")
         self.delay = math.fsum(effect.time for effect in self._called("delay"))
@@ -186,8 +210,10 @@ class Compensator:
         gains = self._gains(reference)
         targets = self._targets(reference, asked)
         ageing_effects = self._called("ageing")
+        heating = [effect for effect in self.effects if isinstance(effect, SelfHeating)]
         v = np.empty(n)
         travelled = 0.0
+        rises = [0.0] * len(heating)
         for k in range(n):
             seconds = float(t[k] - t[k - 1]) if k else 0.0
             if k:
@@ -201,14 +227,19 @@ class Compensator:
                     break
                 last = drive
                 way = travelled + (abs(drive - before) if k else 0.0)
-                drive = self._solve(float(targets[k]), gains, k, [ageing.gain(e, way) for e in ageing_effects])
+                warm = self._warm(heating, rises, before, drive, seconds)
+                y = float(targets[k])
+                for effect, rise in zip(heating, warm, strict=True):
+                    y = (y - effect.offset_per_degree * rise) / (1.0 + effect.gain_per_degree * rise)
+                drive = self._solve(y, gains, k, [ageing.gain(e, way) for e in ageing_effects])
                 drive = min(max(self._slewed(drive, before, seconds), ends[0]), ends[1])
-                if drive == last or not ageing_effects:
+                if drive == last or not (ageing_effects or heating):
                     break
             x = drive
             for block in self.blocks:
                 x = block.absorb(x) if k else block.rest(x)
             travelled += abs(drive - before) if k else 0.0
+            rises = self._warm(heating, rises, before, drive, seconds)
             v[k] = drive
         return v
 
@@ -219,6 +250,16 @@ class Compensator:
         for block in reversed(self.blocks):
             y = block.solve(y) if k else block.resting(y)
         return y
+
+    @staticmethod
+    def _warm(
+        heating: Sequence[SelfHeating], rises: list[float], before: float, drive: float, seconds: float
+    ) -> list[float]:
+        """The rise of each temperature behind a step in which the drive moves from `before`; at first there is none."""
+        if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
+            return rises
+        pairs = zip(heating, rises, strict=True)
+        return [thermal.risen(effect, rise, before, drive, seconds) for effect, rise in pairs]
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
         """The nearest drive that the amplifier reaches in this time."""
@@ -231,11 +272,14 @@ class Compensator:
         ahead = reference.t + self.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
-        return [(effect.gain(later), effect.offset(later)) for effect in self._called("thermal")]
+        logged = [effect for effect in self._called("thermal") if effect.columns]
+        return [(effect.gain(later), effect.offset(later)) for effect in logged]
 
     def _targets(self, reference: Run, asked: NDArray[np.bool_]) -> Array:
         """What creep, or the gain behind it, has to give at each sample (N,) for the reference to arrive."""
         wanted = reference.v - self.static.output_offset
+        for effect in self._called("drift"):
+            wanted = wanted - np.where(asked, effect.added(reference), 0.0)
         for effect in reversed(self._called("saturation")):
             wanted = unsaturated(effect, wanted)
         t = reference.t

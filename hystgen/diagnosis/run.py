@@ -93,7 +93,7 @@ def diagnose(
         done, wrong = task.with_history(before, unit)
         found, made = selection.invertible(done.found, done.records, P0_FLOOR)
         ready = done.cleaned.clean
-        extended = _extended(model.parameters, model.cascade, found.fitted, ready, effects)
+        extended = _extended(model.parameters, model.cascade, found, ready, effects)
         result = result_of(
             unit,
             ready,
@@ -205,7 +205,7 @@ def _signals(ready: Prepared, found: Outcome) -> tuple[Signals, ...]:
 
 
 def _extended(
-    parameters: Parameters, cascade: Cascade, fitted: Fitted, ready: Prepared, user: Sequence[type[Effect]]
+    parameters: Parameters, cascade: Cascade, found: Outcome, ready: Prepared, user: Sequence[type[Effect]]
 ) -> Parameters:
     """The parameter file with the model refitted and the effects added; `cascade`: the nominal model.
 
@@ -213,6 +213,7 @@ def _extended(
     """
     from hystgen.parameters.files import make_parameters
 
+    fitted = found.fitted
     p = np.array([rounded(float(x), DIGITS) for x in fitted.weights])
     p[p < DUST * float(np.sum(p))] = 0.0
     if not np.any(p > 0.0):
@@ -232,6 +233,7 @@ def _extended(
         plays["initial_state"] = np.interp(r[kept], cascade.pi.thresholds, start).tolist()
     content = {
         **parameters.model_dump(),
+        "not_separable": found.not_separable,
         "input_range": list(parameters.input_range),
         "model": {
             "pi": plays,

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect as Effect
     from hystgen.effects.base import Place as Place
     from hystgen.effects.base import Run as Run
+    from hystgen.effects.base import decays as decays
+    from hystgen.effects.base import follow as follow
+    from hystgen.effects.kinds import OwnBlock as OwnBlock
     from hystgen.effects.user import load_user_effects as load_user_effects
 
 _FIRST = (
@@ -49,10 +52,25 @@ _PLACES = {
     "Effect": "base",
     "Place": "base",
     "Run": "base",
+    "OwnBlock": "kinds",
+    "decays": "base",
+    "follow": "base",
     "load_user_effects": "user",
 }
 
-__all__ = ["CATALOGUE", "About", "Candidate", "Effect", "Place", "Run", "load_user_effects", "shapes"]
+__all__ = [
+    "CATALOGUE",
+    "About",
+    "Candidate",
+    "Effect",
+    "OwnBlock",
+    "Place",
+    "Run",
+    "decays",
+    "follow",
+    "load_user_effects",
+    "shapes",
+]
 
 
 @functools.cache

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict
 from hystgen.basics.jit import jit
 from hystgen.basics.problems import counted
 from hystgen.effects import guarded
+from hystgen.effects.kinds import OwnBlock
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -239,6 +240,8 @@ class Effect(BaseModel):
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
+    block: ClassVar[OwnBlock | None] = None
+    """compensator of an effect of the user's own; those of the catalogue have theirs in their folders"""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -312,6 +315,10 @@ class Effect(BaseModel):
     def largest(self, run: Run) -> Array:
         """Largest of these factors (k,) that any start state makes, in spans of the play sum; inf: no such limit."""
         return np.full(len(self.transients(run)), np.inf)
+
+    def numbers(self, seconds: float) -> Sequence[float]:
+        """The numbers of the `block`'s table at steps of `seconds`."""
+        return ()
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -11,6 +11,7 @@ import traceback
 from pathlib import Path
 
 from hystgen.basics.problems import EffectsError
+from hystgen.effects import own
 from hystgen.effects.base import USER, Effect, Place
 
 METHODS = {
@@ -25,18 +26,19 @@ METHODS = {
 
 
 def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
-    """The effect classes that a Python file defines; the file is run, so it must be trusted.
+    """The effect classes that a Python file, or the `model.py` of a folder, defines; it is run, so it must be trusted.
 
     Each is a subclass of `hystgen.effects.Effect` with `name: Literal["user:..."]`, a `place` and the method of that
     place; several classes of one name are its shapes, the first is the default. Raises EffectsError, one message, for a
     file that cannot be run or has no usable effect.
     """
     file = Path(path)
+    file = file / "model.py" if file.is_dir() else file
     # A name of its own for every file and content, as pickling and numba find functions by it
     try:
         mark = hashlib.sha256(str(file.resolve()).encode() + file.read_bytes()).hexdigest()[:12]
     except OSError as error:
-        raise EffectsError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise EffectsError(f"{file}: cannot be read: {error.strerror or error}") from None
     name = f"hystgen_user_effects_{mark}"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, importlib.machinery.SourceFileLoader(name, str(file)))
@@ -48,7 +50,7 @@ def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
             spec.loader.exec_module(module)
         except (Exception, SystemExit) as error:
             del sys.modules[name]
-            raise EffectsError(f"{path}{_line(error, file)}: {type(error).__name__}: {error}") from None
+            raise EffectsError(f"{file}{_line(error, file)}: {type(error).__name__}: {error}") from None
     found = [
         value
         for value in vars(sys.modules[name]).values()
@@ -56,10 +58,10 @@ def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
         and not value.__name__.startswith("_")
     ]  # fmt: skip
     if not found:
-        raise EffectsError(f"{path}: defines no effect; write a class of hystgen.effects.Effect")
+        raise EffectsError(f"{file}: defines no effect; write a class of hystgen.effects.Effect")
     for effect in found:
         if problem := _problem(effect):
-            raise EffectsError(f"{path}: class {effect.__name__} {problem}")
+            raise EffectsError(f"{file}: class {effect.__name__} {problem}")
     return tuple(found)
 
 
@@ -81,4 +83,4 @@ def _problem(effect: type[Effect]) -> str:
     methods = METHODS[effect.place]
     if not any(getattr(effect, method) is not getattr(Effect, method) for method in methods):
         return f"has place {effect.place.value}, for which it has to define {' or '.join(methods)}"
-    return ""
+    return own.problem(effect)

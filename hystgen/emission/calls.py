@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -48,7 +49,7 @@ def emit_options(
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
     left_out: tuple[str, ...] = ()
-    if allow_partial and (refused := model.refusals(operator)):
+    if allow_partial and (refused := model.refusals(operator, arithmetic)):
         left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
         model = model.without([effect for effect, _ in refused])
     model.need_compensated(arithmetic, operator)
@@ -57,7 +58,9 @@ def emit_options(
 
 def emitted_model(model: Model, options: Options) -> Model:
     """The model that the C is of: without what `options` leave out."""
-    return model.without([effect for effect, _ in model.refusals(options.operator)]) if options.left_out else model
+    if not options.left_out:
+        return model
+    return model.without([effect for effect, _ in model.refusals(options.operator, options.arithmetic)])
 
 
 @arguments.taking(emit_options, "emit")
@@ -70,10 +73,29 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     check_names(models)
     made: dict[str, str] = {}
     for model in models:
+        for doubt in doubts(model):
+            warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
         chosen = emit_options(model, **options)
         emitted = emitted_model(model, chosen)
         made |= module.files(emitted.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
     return made
+
+
+def doubts(model: Model) -> list[str]:
+    """What may be wrong with the inverse of a model whose diagnosis could not tell the stage from its sensor."""
+    named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
+    found = []
+    if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
+        found.append(
+            "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a curved sensor; "
+            f"if it is the sensor's, the inverse bends the true motion. {advice}, and diagnose again"
+        )
+    if ("sensor_nonlinearity", "asymmetry") in named and any(e.name == "sensor_nonlinearity" for e in model.effects):
+        found.append(
+            "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
+            f"if it is the stage's, the inverse leaves it as it is. {advice}, and diagnose again"
+        )
+    return found
 
 
 def check_names(models: Sequence[Model]) -> None:

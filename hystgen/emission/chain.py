@@ -5,23 +5,43 @@ What a block does stands in `c_runtime/`; here are only its places.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import textwrap
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.moving import MovingTables
-from hystgen.compensator.chain.tables import ChainTables, Compiled
-from hystgen.emission.text import literal, operand, structure, table
+from hystgen.compensator.chain import blocks, moving
+from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
+    LARGEST_LEVEL,
+    LEAST_CODE,
+    LEVEL_BITS,
+    LEVEL_DROP,
+    MOST_CODE,
+    SHARE_BITS,
+    ChainTables,
+    Compiled,
+)
+from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
+from hystgen.effects.drift import compensator as drift
+from hystgen.effects.kinds import Constants, Kind
+from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
+from hystgen.plays import slots
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of an instance: `kind` is real, flag, status or one of `STRUCTS`; more than one where it is an array."""
+    """A field of an instance: `kind` is that of a number, flag, status, or of a block and then made of `members`, real
+    numbers r or those of fixed point as in `Kind`, and `flags`; with a `count` it is an array."""
 
     kind: str
     name: str
     comment: str = ""
     count: int = 0
+    members: str = ""
+    flags: int = 0
 
     def text(self) -> str:
         """Its declaration."""
@@ -30,81 +50,108 @@ class Field:
         return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
 
 
-STRUCTS = {
-    "creep": (2, 0), "creep_state": (2, 0), "lag": (5, 0), "lag_exact": (2, 0), "gain": (3, 0), "ageing": (4, 1),
-}  # fmt: skip
-"""Reals and flags in the memory of a block, by the name of its type."""
-
-
 @dataclass(frozen=True)
 class Block:
-    """One block of a chain: its kind, which names its functions and types, the fields of its memory, and the text of
-    its table."""
+    """One block of a chain: its numbers, and its name among those of the model."""
 
-    kind: str
+    constants: Constants
     name: str
-    fields: tuple[Field, ...]
-    arrays: tuple[str, ...]
-    table: str = ""
-    more: str = ""
+
+    @property
+    def kind(self) -> Kind:
+        """Which names its functions and types."""
+        return self.constants.kind
+
+    @property
+    def table(self) -> str:
+        """How functions name its table."""
+        return f"&hystgen_{self.name}"
+
+    @property
+    def fields(self) -> list[Field]:
+        """Its memory."""
+        kind, rows = self.kind, self.kind.rows
+        found = [Field(kind.name, self.name, members=kind.memory or len(kind.state) * "r", flags=len(kind.flags))]
+        if rows and (rows.state or rows.memory):
+            count, members = len(self.constants.rows), rows.memory or len(rows.state) * "r"
+            found.append(Field(f"{kind.name}_state", f"{self.name}_state", count=count, members=members))
+        return found
 
     def call(self, verb: str, x: str) -> str:
         """A call of one of its verbs with the argument x."""
-        given = [self.table] * (verb in _TABLE[self.kind]) + [f"&self->{self.name}"] * (verb != "resting")
-        if self.more and verb in ("rest", "absorb"):
-            given.append(f"self->{self.more}")
-        return f"hystgen_{self.kind}_{verb}({', '.join([*given, x])})"
+        own = self.kind.verb(verb)
+        given = [self.table] * (own in self.kind.reading) + [f"&self->{self.name}"] * (own != "resting")
+        if own in ("rest", "absorb"):
+            given += [f"self->{field.name}" for field in self.fields[1:]]
+        return f"hystgen_{self.kind.name}_{own}({', '.join([*given, x])})"
+
+    def arrays(self, prefix: str) -> list[str]:
+        """Its table, behind that of its rows where it has any."""
+        kind, constants, own = self.kind, self.constants, f"{prefix}_{self.name}"
+        numbers = [_entries(constants.table, kind.letters)] * (len(constants.table) > 0)
+        numbers += map(str, constants.counts)
+        if not kind.rows:
+            return [_table(f"{prefix}_{kind.name}_table_t {own}", numbers)]
+        rows, n = f"{own}_{kind.rows.name}", len(constants.rows)
+        lines = ",\n".join(f"    {{{_entries(row, kind.rows.letters)}}}" for row in constants.rows)
+        return [
+            f"static const {prefix}_{kind.name}_{kind.rows.name}_t {rows}[{n}] = {{\n{lines},\n}};\n",
+            _table(f"{prefix}_{kind.name}_table_t {own}", [rows, *numbers]),
+        ]
 
 
-_TABLE = {
-    "creep": ("rest", "resting", "solve", "absorb"),
-    "lag": ("solve", "absorb"),
-    "lag_exact": ("solve", "absorb"),
-    "gain": (),
-    "ageing": (),
-}
-"""Verbs of a block that read its table."""
+def _table(declared: str, entries: Sequence[str]) -> str:
+    lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
+    return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
 
-def _entries(values: Iterable[float]) -> str:
-    return ", ".join(map(literal, values))
+def sides(t: ChainTables) -> tuple[list[Block], list[Block]]:
+    """The blocks in front of the plays, from the drive on, and those behind them."""
+    found: list[list[Block]] = []
+    for side in blocks.sides(t):
+        counts: Counter[str] = Counter()
+        found.append([])
+        for constants in side:
+            counts[constants.kind.name] += 1
+            found[-1].append(Block(constants, f"{constants.kind.name}_{counts[constants.kind.name]}"))
+    return found[0], found[1]
 
 
-def drive_side(t: ChainTables, prefix: str) -> list[Block]:
-    """The blocks in front of the plays, from the drive on."""
-    blocks = []
-    for j, (exact, row) in enumerate(zip(t.lag.exact, t.lag.block, strict=True), 1):
-        kind, name = "lag_exact" if exact else "lag", f"lag_{j}"
-        text = f"static const {prefix}_{kind}_table_t {prefix}_{name} = {{\n    {_entries(row)},\n}};\n"
-        blocks.append(Block(kind, name, (Field(kind, name),), (text,), f"&hystgen_{name}"))
-    return blocks
+def _entries(values: Any, letters: str = "") -> str:
+    """Numbers of a table as they stand in C; `letters` as in `Kind`."""
+    found, rest = [], iter(values)
+    for letter in letters or len(values) * "r":
+        if letter == "f":
+            found.append(f"{{{literal(next(rest))}, {next(rest)}}}")
+        elif letter == "c":
+            found.append(f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}")
+        else:
+            found.append(literal(next(rest)))
+    return ", ".join(found)
 
 
-def output_side(t: ChainTables, prefix: str) -> list[Block]:
-    """The blocks behind the plays, from these on."""
-    blocks = []
-    for j, row in enumerate(t.creep.block, 1):
-        terms = t.creep.term[t.creep.first[j - 1] : t.creep.first[j]]
-        name, n = f"creep_{j}", len(terms)
-        lines = ",\n".join(f"    {{{_entries(term)}}}" for term in terms)
-        own = f"static const {prefix}_creep_term_t {prefix}_{name}_term[{n}] = {{\n{lines},\n}};\n"
-        numbers = f"    {prefix}_{name}_term, {_entries(row)}, {n},"
-        text = f"static const {prefix}_creep_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
-        fields = (Field("creep", name), Field("creep_state", f"{name}_state", "", n))
-        blocks.append(Block("creep", name, fields, (own, text), f"&hystgen_{name}", f"{name}_state"))
-    for j in range(1, len(t.ageing.turns) + 1):
-        pieces = t.ageing.piece[t.ageing.first[j - 1] : t.ageing.first[j]]
-        name, n = f"ageing_{j}", len(pieces)
-        lines = ",\n".join(f"    {{{_entries(piece)}}}" for piece in pieces)
-        own = f"static const {prefix}_ageing_piece_t {prefix}_{name}_piece[{n}] = {{\n{lines},\n}};\n"
-        numbers = f"    {prefix}_{name}_piece, {_entries(t.ageing.number[j - 1, 2:])}, {n}, {t.ageing.turns[j - 1]},"
-        text = f"static const {prefix}_ageing_table_t {prefix}_{name} = {{\n{numbers}\n}};\n"
-        blocks.append(Block("ageing", name, (Field("ageing", name),), (own, text), f"&hystgen_{name}"))
-    for j, row in enumerate(t.gain, 1):
-        name = f"gain_{j}"
-        text = f"static const {prefix}_gain_table_t {prefix}_{name} = {{\n    {_entries(row[:7])},\n}};\n"
-        blocks.append(Block("gain", name, (Field("gain", name),), (text,), f"&hystgen_{name}"))
-    return blocks
+def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]:
+    """What saturates in fixed point, as `numbers.stage` has it in floating point."""
+    behind, own = t.behind, f"{name}_behind_{j + 1}"
+    if behind.kind[j] == slots.DEAD_ZONE:
+        lower, upper, *over = behind.piece[j]
+        entries = f"{literal(lower)}, {literal(upper)}, {_entries(over, 'ff')}"
+        text = f"static const {prefix}_stops_t {own} = {{\n    {entries},\n}};\n"
+        return {"kind": "stops", "arrays": [text], "table": f"&hystgen_behind_{j + 1}", "limited": ""}
+    arrays, ends = [], []
+    for which, direction in ((2 * j, "there"), (2 * j + 1, "back")):
+        here = int(behind.first[which])
+        rows = slice(here, here + int(behind.pieces[which]))
+        arrays += [
+            table("int32_t", f"{own}_{direction}_knot", list(behind.knot[rows])),
+            table("uint8_t", f"{own}_{direction}_scale", list(behind.scale[rows])),
+            table("int32_t", f"{own}_{direction}_coefficient", list(behind.coefficient[rows].ravel())),
+        ]
+        pointers = ", ".join(f"{own}_{direction}_{part}" for part in ("knot", "scale", "coefficient"))
+        counts = (behind.domain[which, 1], behind.pieces[which], behind.coefficient.shape[1] - 1, *behind.scaled[which])
+        ends.append(f"    {{{pointers},\n     {_entries(counts)}}}")
+    arrays.append(f"static const {prefix}_bend_t {own} = {{\n" + ",\n".join(ends) + ",\n};\n")
+    return {"kind": "bend", "arrays": arrays, "table": f"&hystgen_behind_{j + 1}", "limited": ", limited"}
 
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
@@ -113,6 +160,16 @@ BENDS = ("none", "polynomial", "centre")
 
 
 SCANNED = "scanned"
+
+SETTINGS = {
+    "push": slots.OP_PUSH,
+    "settle": slots.OP_SETTLE,
+    "set_offset": slots.OP_OFFSET,
+    "set_temperature": slots.OP_TEMPERATURE,
+    "set_gain": slots.OP_GAIN,
+    "set_travel": slots.OP_TRAVEL,
+}
+"""Calls of models with effects that take a number and return none."""
 
 
 def plays(t: ChainTables) -> tuple[str, str]:
@@ -125,7 +182,7 @@ def plays(t: ChainTables) -> tuple[str, str]:
 def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends."""
     real_t = f"{prefix}_real_t"
-    arrays = []
+    arrays: list[str] = []
     if t.scanned:
         members = [("share", list(t.share)), ("inverse", list(t.inverse))]
         numbers = [("LATE", operand(t.first[1]), "of a stretch, what a play gains at the end of a step"),
@@ -141,7 +198,7 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         arrays.append(f"static const {real_t} {prefix}_yields[{n}][{terms}] = {{\n{rows},\n}};\n")
     if t.bends == moving.POLYNOMIAL:
         n, terms = t.curve.shape
-        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.curve)
+        rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in t.curve)
         arrays.append(f"static const {real_t} {prefix}_curve[{n}][{terms}] = {{\n{rows},\n}};\n")
     words = (
         ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
@@ -158,6 +215,17 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     return arrays, [*constants, *counts]
 
 
+def _relaxing(t: FixedMovingTables, prefix: str) -> list[str]:
+    """Tables of viscous plays in fixed point."""
+    return [
+        *(f"static const {prefix}_factor_t {prefix}_relaxing_{name} = {{{_entries(row, 'f')[1:-1]}}};\n"
+          for name, row in (("late", t.late), ("kept", t.kept))),
+        table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
+        table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
+        table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
+    ]  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Glue:
     """The operators of a model with effects: the memory of an instance and the text of its type by operator, functions,
@@ -172,12 +240,13 @@ class Glue:
     constants: list[tuple[str, str, str]]
 
 
-def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, str]]) -> Glue:
+def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
-    before, after = drive_side(t, prefix), output_side(t, prefix)
+    before, after = sides(t)
+    clocks = [Block(constants, "clock") for constants in drift.constants(t.clock)]
     functions = [
-        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0)
+        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, clocks)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -186,9 +255,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "forward": every,
         "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
-    arrays = [text for block in (*before, *after) for text in block.arrays]
+    arrays = [text for block in (*before, *after, *clocks) for text in block.arrays(prefix)]
     if len(t.tap):
-        arrays.append(table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap)))
+        arrays.append(
+            constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
+            if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
+        )  # fmt: skip
     number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
     words = {
         "OUTPUT_OFFSET": "part of every displacement",
@@ -197,19 +269,40 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_FALLING": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
+    constants += [("LEAD", operand(row[drift.MOST_AHEAD]), "samples that references come ahead") for row in t.clock]
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
-    if t.moving.used:
+    constants += _fixed_constants(t) if t.fixed else []
+    if isinstance(t.moving, FixedMovingTables):
+        arrays += _relaxing(t.moving, prefix) if t.moving.used else []
+    elif t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
-    blocks, n = [*before, *after], len(t.threshold) - 1
+    both, n = [*before, *after, *clocks], len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
-    fields = {op: instance(op, blocks, len(t.tap), n, kept, searched) for op in operators}
+    fields = {op: instance(op, both, len(t.tap), n, kept, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
         "\n".join(functions), arrays, [text for stage in behind for text in stage["arrays"]], calls, constants,
     )  # fmt: skip
+
+
+def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
+    """Numbers that functions name in fixed point alone."""
+    low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
+    return [
+        ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
+        ("FINE_MAX", operand(high), ""),
+        ("LEAST_CODE", operand(t.number[LEAST_CODE]), "between which a drive is kept before it is limited"),
+        ("MOST_CODE", operand(t.number[MOST_CODE]), ""),
+        ("DRIVE_BITS", f"{t.number[DRIVE_BITS]}u", "bits of a signal in front of the plays below a drive code"),
+        ("ARRIVING_BITS", f"{t.number[ARRIVING_BITS]}u", "and below an input of the plays"),
+        ("LEVEL_BITS", f"{t.number[LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
+        ("LEVEL_DROP", f"{t.number[LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
+        ("LARGEST_LEVEL", operand(t.number[LARGEST_LEVEL]), "sum that is asked of the plays"),
+        ("SHARE_BITS", f"{t.number[SHARE_BITS]}u", "bits of a mantissa below a code"),
+    ]
 
 
 _PLAYS = "play 0 is the input of the plays"
@@ -222,13 +315,13 @@ def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int,
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
-        Field("real", "drive", "what arrived of it in front of the plays"),
-        Field("real", "level", "sum of the plays"),
-        Field("real", "output", "what the output side made of it"),
+        Field("fine", "drive", "what arrived of it in front of the plays"),
+        Field("signal", "level", "sum of the plays"),
+        Field("signal", "output", "what the output side made of it"),
         Field("real", "answer", f"{'drive' if inverse else 'displacement'} returned last"),
-        Field("real", "offset", "set beside that of the model"),
+        Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
-        *([Field("real", "line", "references, the newest one last", taps)] if inverse and taps else []),
+        *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
         Field("flag", "ascending", "direction of the drive's last move"),
         Field("flag", "moving", "a drive was applied"),
         *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),
@@ -257,18 +350,19 @@ def _functions(
     op: str,
     before: Sequence[Block],
     after: Sequence[Block],
-    behind: Sequence[dict[str, str]],
+    behind: Sequence[dict[str, Any]],
     ahead: bool,
+    clocks: Sequence[Block],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
     inverse = op == "inverse"
     self_t = f"hystgen_{op}_t *self"
 
     def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
-        lines = [f"{x} = {block.call(_verb(block, verb), x)};" for block in blocks] or ["(void)self;"]
+        lines = [f"{x} = {block.call(verb, x)};" for block in blocks] or ["(void)self;"]
         if verb == "resting" and not any("self" in line for line in lines):
             lines = ["(void)self;", *lines]
-        head = f"static hystgen_real_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_real_t {x})"
+        head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
         return _function(comment, head, [*lines, f"return {x};"])
 
     yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.")
@@ -280,29 +374,41 @@ def _functions(
         yield through(back[0], "solve", "a", "drive_side", "The drive that leads to a in front of the plays.")
         yield through(back[1], "solve", "y", "output_side", "The sum of the plays that gives y at this sample.")
         yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
-    lines = ["hystgen_real_t x = y;"] if behind else []
+    lines = ["hystgen_signal_t x = y;"] if behind else []
     x = "x" if behind else "y"
     lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
+    offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset"
+
+    def drifts(lead: str) -> str:
+        return "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
+
     yield _function(
         "The displacement for an output y of the chain.",
-        f"static hystgen_real_t hystgen_{op}_displaced(const {self_t}, hystgen_real_t y)",
-        [*lines, f"return {x} + (HYSTGEN_OUTPUT_OFFSET + self->offset);"],
+        f"static hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
+        [*lines, f"return {x} + ({offsets}{drifts('0')});"],
     )
     if inverse:
-        lines = ["hystgen_real_t y = u - (HYSTGEN_OUTPUT_OFFSET + self->offset);"]
+        lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
+        lines = [f"const hystgen_real_t lead = {lead};"] * len(clocks)
+        lines.append(f"hystgen_signal_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
         lines += [
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
         ]
         unused = [] if any(stage["limited"] for stage in behind) else ["(void)limited;"]
         yield _function(
             "The output of the chain that gives the displacement u; `limited` tells whether none does.",
-            f"static hystgen_real_t hystgen_inverse_undisplaced(const {self_t}, hystgen_real_t u, bool *limited)",
+            f"static hystgen_signal_t hystgen_inverse_undisplaced(const {self_t}, hystgen_signal_t u, bool *limited)",
             [*lines, *unused, "return y;"],
         )
-        put = ["hystgen_preview_put(self->line, &self->filled, y);"]
+        put = [
+            line for each in clocks
+            for line in (f"const hystgen_real_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
+                         f"self->{each.name}.lead = lead > HYSTGEN_LEAD ? HYSTGEN_LEAD : lead;")
+        ]  # fmt: skip
+        put.append("hystgen_preview_put(self->line, &self->filled, y);")
         yield _function(
             "What has to be given now for the newest reference, y once it is undisplaced.",
-            f"static hystgen_real_t hystgen_inverse_ahead({self_t}, hystgen_real_t y)",
+            f"static hystgen_signal_t hystgen_inverse_ahead({self_t}, hystgen_signal_t y)",
             [*put, "return hystgen_preview_target(hystgen_tap, self->line);"] if ahead
             else ["(void)self;", "return y;"],
         )
@@ -311,22 +417,37 @@ def _functions(
             f"static void hystgen_inverse_repeat({self_t})",
             ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else ["(void)self;"],
         )  # fmt: skip
-    gains = [block for block in after if block.kind == "gain"]
-    ageing = [block for block in after if block.kind == "ageing"]
+    gains = [block for block in after if block.kind.name == "gain"]
+    ageing = [block for block in after if block.kind.name == "ageing"]
+    heat = [block for block in after if block.kind.name == "heat"]
+    way = "(hystgen_signal_t)v - self->applied"
     yield _function(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
         [
             "self->offset = 0;",
+            *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
+            *(f"self->{each.name}.lead = 0;" for each in clocks),
+            *(f"hystgen_heat_init(&self->{each.name});" for each in heat),
             *(f"hystgen_gain_init(&self->{block.name});" for block in gains),
             *(f"(void)hystgen_ageing_set_travel({each.table}, &self->{each.name}, 0);" for each in ageing),
         ],
     )
     yield _function(
-        "The drive moves to v from where it was.",
+        "The drive moves to v from where it was, in one sample.",
         f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
-        [f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing]
-        or ["(void)self;", "(void)v;"],
+        [
+            *(f"hystgen_clock_tick({each.table}, &self->{each.name});" for each in clocks),
+            *(f"hystgen_heat_move({each.table}, &self->{each.name}, self->applied, v);" for each in heat),
+            *(f"hystgen_ageing_move({each.table}, &self->{each.name}, {way});" for each in ageing),
+            *(["(void)self;"] if not (clocks or heat or ageing) else []),
+            *(["(void)v;"] if not (heat or ageing) else []),
+        ],
+    )
+    yield _function(
+        "Drift begins anew, at the drive absorbed last.",
+        f"static void hystgen_{op}_clock_start({self_t})",
+        [f"hystgen_clock_start(&self->{each.name});" for each in clocks] or ["(void)self;"],
     )
     heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
     yield _function(
@@ -335,8 +456,3 @@ def _functions(
         ["bool limited = false;", *(f"limited = {heat} || limited;" for heat in heats), "return limited;"]
         if heats else ["(void)self;", "(void)temperature;", "return false;"],
     )  # fmt: skip
-
-
-def _verb(block: Block, verb: str) -> str:
-    """What a block without memory calls it."""
-    return {"rest": "absorb", "resting": "solve"}.get(verb, verb) if block.kind in ("gain", "ageing") else verb

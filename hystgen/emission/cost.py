@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
-from hystgen.compensator.chain import costs
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain import blocks, costs
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.emission.chain import STRUCTS, Field
+from hystgen.effects.kinds import Kind, Rows
+from hystgen.emission.chain import Field
 from hystgen.emission.options import Options
 from hystgen.plays import slots
 
@@ -104,34 +105,58 @@ def _corner_structs(arithmetic: Arithmetic, layout: Layout) -> dict[str, tuple[i
     }
 
 
-def _constants(text: str, arithmetic: Arithmetic, layout: Layout, plays: int = 1) -> int:
+_LETTERS = {"w": (8, 8), "i": (4, 4), "c": (16, 4), "b": (1, 1)}
+"""Sizes and alignments of the numbers of a block in fixed point, by the letters of `Kind`."""
+
+
+def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout) -> dict[str, tuple[int, int]]:
+    """Sizes and alignments of the tables of a chain's blocks."""
+    sizes = {**_LETTERS, "f": layout.struct((4, 4), (1, 1))}
+
+    def made_of(numbers: Kind | Rows) -> list[tuple[int, int]]:
+        return [sizes[letter] for letter in numbers.letters] or len(numbers.table) * [real]
+
+    found = {}
+    for kind in kinds:
+        members = [(layout.pointer, layout.pointer)] * bool(kind.rows) + made_of(kind)
+        counts = [(2, 2) if i == 0 else (1, 1) for i, _ in enumerate(kind.counts)]
+        found[f"_{kind.name}_table_t"] = layout.struct(*members, *counts)
+        if kind.rows:
+            found[f"_{kind.name}_{kind.rows.name}_t"] = layout.struct(*made_of(kind.rows))
+    return found
+
+
+def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterable[Kind], plays: int = 1) -> int:
     """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
-    of `plays` the bytes of one."""
+    of `plays` the bytes of one. `kinds`: of the blocks of a chain."""
     fixed = arithmetic.fixed
     real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
+    factor, table = layout.struct((4, 4), (1, 1)), (layout.pointer, layout.pointer)
+    bend = layout.struct(table, table, table, (4, 4), count, *3 * [(1, 1)])
+    behind = {
+        "factor_t": factor,
+        "bend_t": layout.struct(bend, bend),
+        "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
+    }
     structs = {
         "dead_zone_t": layout.struct(*pointers, count),
         "envelope_t": layout.struct(*(7 * [reach])),
         "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
         "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
         **_corner_structs(arithmetic, layout),
-        "creep_term_t": layout.struct(*4 * [reach]),
-        "creep_table_t": layout.struct((layout.pointer, layout.pointer), *4 * [reach], count),
-        "lag_table_t": layout.struct(*4 * [reach]),
-        "lag_exact_table_t": layout.struct(*4 * [reach]),
-        "gain_table_t": layout.struct(*7 * [reach]),
-        "ageing_piece_t": layout.struct(*6 * [reach]),
-        "ageing_table_t": layout.struct((layout.pointer, layout.pointer), *3 * [reach], count, (1, 1)),
+        **_block_structs(kinds, reach, layout),
+        **(behind if fixed else {}),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
     for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
         found += re.findall(r"^    (\w+) \w+(\[\d+\]);", members, flags=re.MULTILINE)
     for kind, sizes in found:
-        own = next((size for ending, (size, _) in structs.items() if kind.endswith(ending)), None)
+        endings = sorted(structs, key=len, reverse=True)  # a name may end in another one
+        own = next((structs[ending][0] for ending in endings if kind.endswith(ending)), None)
         if own is None:
             own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
             own = own or (4 if fixed else real)
@@ -161,7 +186,8 @@ def estimate(
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    memory, avr = (_memory(cascade, options, text, plays, layout, fields) for layout in (CORE_32, AVR))
+    kinds = [each.kind for each in blocks.every(numbers)] if isinstance(numbers, ChainTables) else []
+    memory, avr = (_memory(cascade, options, text, plays, layout, fields, kinds) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
         more = costs.code_bytes(numbers, options.arithmetic)
@@ -179,12 +205,10 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks of a model with effects in one step, of each operator."""
-    lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
-    gains = len(t.gain) + len(t.ageing.turns)
-    envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
-    stages = len(t.behind.stage_kind) + envelopes
-    absorbed = 3 * lags + creeps + 5 * states + gains + sum(4 + 2 * int(n) for n in t.ageing.turns)
-    return {"forward": absorbed + stages, "inverse": absorbed + 2 * lags + creeps + gains + stages + len(t.tap)}
+    kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
+    stages = len(kinds) + kinds.count(slots.TANH) * (t.behind.coefficient.shape[1] - 1 if t.fixed else 1)
+    absorbed, solved = (sum(each.products[way] for each in blocks.every(t)) for way in (0, 1))
+    return {"forward": absorbed + stages, "inverse": absorbed + solved + stages + len(t.tap)}
 
 
 def _memory(
@@ -194,6 +218,7 @@ def _memory(
     plays: str,
     layout: Layout,
     chain: Mapping[str, Sequence[Field]],
+    kinds: Sequence[Kind],
 ) -> Memory:
     n = cascade.pi.n
     arithmetic = ARITHMETICS[options.arithmetic]
@@ -206,7 +231,7 @@ def _memory(
         if not getattr(options, op):
             continue
         if op in chain:
-            size = layout.struct(*(_field(each, real, layout) for each in chain[op]))[0]
+            size = layout.struct(*(_field(each, arithmetic, layout) for each in chain[op]))[0]
         elif options.engine == "corners":
             size, a_play = _corner_instance(n, op, arithmetic, bool(cascade.stages), layout)
         else:
@@ -215,15 +240,18 @@ def _memory(
                 fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
             size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
         sizes.append((op, size))
-    more = _constants(plays, arithmetic, layout, n + 1) + a_play * len(sizes)
-    return Memory(_constants(text, arithmetic, layout), sizes, more)
+    more = _constants(plays, arithmetic, layout, kinds, n + 1) + a_play * len(sizes)
+    return Memory(_constants(text, arithmetic, layout, kinds), sizes, more)
 
 
-def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
+def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, int]:
     """Size and alignment of a field of an instance."""
-    one = {"flag": 1, "status": layout.integer}.get(field.kind, real)
-    reals, flags = STRUCTS.get(field.kind, (0, 0))
-    size, alignment = layout.struct(*reals * [(real, real)], *flags * [(1, 1)]) if reals else (one, one)
+    real = (arithmetic.bytes, arithmetic.bytes)
+    signal, fine = ((8, 8), (4, 4)) if arithmetic.fixed else (real, real)
+    whole = (layout.integer, layout.integer)
+    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine}.get(field.kind, real)
+    members = [*(_LETTERS.get(letter, real) for letter in field.members), *field.flags * [(1, 1)]]
+    size, alignment = layout.struct(*members) if members else one
     return size * max(field.count, 1), alignment
 
 

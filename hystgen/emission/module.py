@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import re
+import shlex
 import textwrap
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
@@ -17,8 +20,11 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.tables import Compiled
-from hystgen.emission import banner, chain, cost, layout, numbers, runtime, selftest
+from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+from hystgen.compensator.chain.layout import SHARE_BITS, Compiled, OwnChainTables
+from hystgen.effects import own as own_effects
+from hystgen.effects.base import USER
+from hystgen.emission import banner, chain, cost, layout, numbers, own, runtime, selftest
 from hystgen.emission.layout import define
 from hystgen.emission.options import Options
 from hystgen.emission.text import literal
@@ -76,7 +82,7 @@ def files(
         )
     if shared:
         made.update(runtime_files(options.arithmetic))
-    operators = selftest.operators(values.numbers, options)
+    operators = selftest.operators(values.numbers, options, values.calls)
     costs = _selftest_cost(options, values.cost, sum(len(each["samples"]) for each in operators))
     for ending, about, details in (
         (".h", f"checks {name} on the target", costs),
@@ -186,7 +192,8 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
         return None
     assert parameters.sample_time is not None, "emit_options asks for it"
     how = parameters.emit.compensation
-    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how)
+    lsb = (parameters.emit.drive_lsb, parameters.emit.output_lsb)
+    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how, lsb)
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
@@ -198,6 +205,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     corners = options.engine == "corners"
     n = cascade.pi.n
     compiled = compiled_of(parameters, cascade, options)
+    if compiled:
+        about["family"] = dataclasses.replace(about["family"], chain=True)
     values = SimpleNamespace(
         **about,
         **(numbers.chain_fields(parameters, compiled, options, prefix) if compiled
@@ -209,7 +218,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         shared=shared,
         single_header=options.layout == "single-header",
         version=__version__,
-        command=_command(name, options),
+        command=_command(parameters, options),
         sha256=parameters_sha256(parameters),
         units=_units(parameters),
         n=n,
@@ -230,18 +239,19 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
     values.functions = front + "\n" + glue.functions if glue else front
-    calls = glue.calls if glue else {}
-    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls)
+    values.calls = calls = glue.calls if glue else {}
+    own_types, own_functions = own.pieces(compiled.tables) if compiled else ([], [])
+    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls, own_functions)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
     values.types = ""
     if glue:
-        types = runtime.chain_types("\n".join(glue.states.values()))
+        types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
-        own = runtime.needed(types, sorted(runtime.used(pieces)))
-        tables = [piece for piece in own if piece not in states]
+        tabled = runtime.needed(types, sorted(runtime.used(pieces)))
+        tables = [piece for piece in tabled if piece not in states]
         values.types = runtime.render_operators(tables, name, 0, prefix, family)
     else:
         states = runtime.state_pieces(values.variant, operators)
@@ -296,18 +306,18 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    apart = values.variant.slew and values.inverse_rounding_error != values.inverse_max_error
+    limited = "no drive is limited" if values.limited else "no slew limit acts" if values.variant.slew else ""
+    apart = limited and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
-        words = "the same while " + " and ".join(
-            ["both take the same branch"] * values.branches + ["no slew limit acts"] * values.variant.slew
-        )
+        branch = "both take the same branch" if values.branches else ""
+        words = f"the same while {' and '.join(filter(None, [branch, limited]))}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 
 
 def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
     """Macros of a model with effects about time."""
-    kind = compiled.tables.threshold.dtype.type
+    kind = np.float64 if compiled.tables.fixed else compiled.tables.threshold.dtype.type
     late = compiled.needed - compiled.ahead
     ahead = "samples that the argument of step is ahead of the motion"
     if late > 0:
@@ -317,7 +327,20 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
+        *_settings(compiled),
     ]
+
+
+def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
+    """In fixed point, what a code is that sets a temperature or a gain."""
+    if not compiled.tables.fixed:
+        return []
+    bits = int(31 - compiled.tables.number[SHARE_BITS])
+    kept = TEMPERATURE_BITS[bits]
+    degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
+    gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
+    t = compiled.tables
+    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
 
 
 def _status(values: SimpleNamespace) -> list[str]:
@@ -345,9 +368,13 @@ def _macros(values: SimpleNamespace) -> list[str]:
     ]
 
 
-def _command(name: str, options: Options) -> str:
-    partial = " --allow-partial" if options.left_out else ""
-    return f"hystgen emit {name}.yaml {' '.join(f'--{key} {getattr(options, key)}' for key in banner.OPTIONS)}{partial}"
+def _command(parameters: Parameters, options: Options) -> str:
+    origins = dict.fromkeys(
+        own_effects.origin(type(effect)) for effect in parameters.model.effects if effect.name.startswith(USER)
+    )
+    more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
+    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in banner.OPTIONS)
+    return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 
 def _units(parameters: Parameters) -> SimpleNamespace:
@@ -409,6 +436,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
         f"the parameter file; reset starts again from plays at 0.{single if values.single_header else ''}{rounding}"
     )
+    uncounted = " without blocks of your own" * isinstance(values.numbers, OwnChainTables)
     return [
         "",
         *([about] if about else []),
@@ -419,7 +447,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         *values.precision,
         "",
         "Cost (32-bit target):",
-        f"    code at -O2       about {estimate.code_words}, as measured for such a model",
+        f"    code at -O2       about {estimate.code_words}, as measured for such a model{uncounted}",
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),

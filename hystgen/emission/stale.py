@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,12 +75,14 @@ def advice(
     given: Mapping[str, str | bool],
     wanted: Mapping[str, str | bool],
     again: Callable[[Mapping[str, str]], list[Difference]],
+    effects: Sequence[str] = (),
 ) -> list[str]:
     """Commands that fit these differences of one model's files, each with what it does.
 
-    `given`: options of the command line, `wanted`: all that it led to; `again` compares the files with other options.
+    `given`: options of the command line, `wanted`: all that it led to; `again` compares the files with other options;
+    `effects`: files of effects of the user's own.
     """
-    asked = command(parameters, folder, given)
+    asked = command(parameters, folder, given, effects)
     lost = "; their edits are lost" if any(EDITED in each.reasons for each in found) else ""
     said = []
     if any(LINE_ENDS in each.reasons for each in found):
@@ -89,7 +91,7 @@ def advice(
     theirs = next((each.options for each in found if len(each.options) == len(wanted) - len(flags)), {})
     if not theirs or {**theirs, **flags} == wanted:
         return [*said, f"to write them again: {asked}{lost}"]
-    own = command(parameters, folder, {**theirs, **flags})
+    own = command(parameters, folder, {**theirs, **flags}, effects)
     if again(theirs):
         said.append(f"to write them again with their own options: {own}{lost}")
     else:
@@ -97,11 +99,14 @@ def advice(
     return [*said, f"to replace them: {asked}{lost}"]
 
 
-def command(parameters: str, folder: str, options: Mapping[str, str | bool]) -> str:
-    """The command that emits with these options."""
+def command(
+    parameters: str, folder: str, options: Mapping[str, str | bool], effects: Sequence[str] = ()
+) -> str:
+    """The command that emits with these options and files of the user's own effects."""
     words = ["hystgen", "emit", parameters, *(["-o", folder] if folder != "." else [])]
     for key, value in options.items():
         words.append(f"--{key.replace('_', '-')}")
         if isinstance(value, str):
             words.append(value)
+    words += [word for file in effects for word in ("--effects", file)]
     return shlex.join(words)

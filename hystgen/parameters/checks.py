@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -194,13 +195,15 @@ class _Checker:
         if kind == "missing" and not isinstance(path[-1], int):
             self.add(path, f"is missing; add `{self._written(effect, key)}`{hint}")
         elif kind == "missing":
-            self.add(path[:-1], _TWO_NUMBERS)
+            self.add(path[:-1], _TWO_NAMES if path[0] == "not_separable" else _TWO_NUMBERS)
         elif kind == "extra_forbidden":
             known = self._keys(path[:-1])
             near = _nearest(key, known)
             self.add(path, f"unknown key; {near or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
+        elif path[0] == "not_separable" and kind == "too_long":
+            self.add(path, _TWO_NAMES)
         elif isinstance(path[-1], int) and not kind.startswith("union_tag"):
             self.add(path, _reworded(kind, "", value, context, said))
         else:
@@ -476,6 +479,7 @@ def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
 
 
 _TWO_NUMBERS = "must be two numbers; write [lowest, highest]"
+_TWO_NAMES = "must be two names; write [asymmetry, sensor_nonlinearity]"
 _NO_VALUE = "has no value; write one, or remove it"
 
 
@@ -539,6 +543,8 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         return f"{wrong}, not {shown(value)}; {advice}"
     if kind == "literal_error" and key == "hystgen":
         return f"must be 1, not {shown(value)}; this version reads format 1 only"
+    if kind == "literal_error" and not key:  # in a list
+        return _choice(value, re.findall(r"'([^']*)'", context["expected"]))
     if kind == "literal_error":
         fields = {**schema.EmitDefaults.model_fields, **schema.Compensation.model_fields}
         known: Any = fields[key].annotation if key != "kind" else None

@@ -182,14 +182,19 @@ def _data(parameters: Parameters) -> dict[str, Any]:
 def canonical_json(parameters: Parameters) -> str:
     """The one text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
-    A density stands as it was given, not as the plays made from it. `emit.optimize` and `emit.compensation` came later:
-    they stand there only where they are not the default, so that files without them keep their hash.
+    A density stands as it was given, not as the plays made from it. What came later, `emit.optimize`,
+    `emit.compensation` and `not_separable`, stands there only where it is not the default, so that files without it
+    keep their hash.
     """
     data = _data(parameters)
     if parameters.emit.optimize == "auto":
         del data["emit"]["optimize"]
     if parameters.emit.compensation == Compensation():
         del data["emit"]["compensation"]
+    elif not parameters.emit.compensation.compensate:
+        del data["emit"]["compensation"]["compensate"]
+    if not parameters.not_separable:
+        del data["not_separable"]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 

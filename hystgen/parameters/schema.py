@@ -238,6 +238,12 @@ class Compensation(_Part):
         default=0, description="corners of the reference are rounded by three moving averages of this number of samples"
     )
 
+    compensate: tuple[Literal["drift", "self_heating"], ...] = Field(
+        default=(),
+        description="effects that are compensated although nothing measures them: a drift, counted from set_offset on, "
+        "and the drive's own heat",
+    )
+
     _preview = field_validator("preview", mode="before")(_auto)
 
 
@@ -279,6 +285,9 @@ class Parameters(_Part):
     )
     model: ModelParameters = Field(description="what the actuator does")
     emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
+    not_separable: tuple[tuple[str, str], ...] = Field(
+        default=(), description="what a diagnosis named, and what the records could not tell from it"
+    )
 
 
 _EXAMPLE = {

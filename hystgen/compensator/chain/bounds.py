@@ -11,7 +11,7 @@ Inverse. The reference less its offsets, through what saturates (slope at the en
 input, and from there through all states to later ones: `e <= R eta + R g e`, `g = sum c_i (1 - b1_i)` the states' share
 of the input before, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. The plays as in `hystgen.compensator.bounds`. A
 lag's lead multiplies by `(2 - rate)/rate`, what it is led to by `(1 + 2 theta)/(1 - theta)`: the target before counts
-too, also where it was shifted by a limit.
+too, also where it was shifted by a limit. A block of the user's own as in `hystgen.compensator.chain.own`.
 
 States that move by less than their last bit are kept in two parts; their roundings are shares of their steps, so that
 they add up to a few units of the state however slow it is, and the second part's own to `u^2/rate` of it.
@@ -26,13 +26,14 @@ import numpy as np
 
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.saturation.model import TanhSaturation
+from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LEAST_GAIN
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
@@ -53,8 +54,10 @@ def _sizes(compiled: Compiled) -> _Sizes:
     drive = max(abs(end) for end in static.input_range)
     plays = largest_sum(dataclasses.replace(static, output_offset=0.0))
     output = plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
+    output *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
     ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
-    return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + 2.0 * max(ends))
+    settings = 2.0 * max(ends) * (1 + 3 * len(t.clock))  # a drift has six roundings of its own
+    return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
 
 def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
@@ -96,6 +99,16 @@ def _late(compiled: Compiled) -> float:
     return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
 
 
+def _warmed(compiled: Compiled) -> float:
+    """Change of the output by the heat of one sample at the fastest rate."""
+    ends, output = compiled.static.input_range, _sizes(compiled).output
+    return math.fsum(
+        thermal.most_at_once(each, ends, compiled.largest_step, compiled.seconds)
+        * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
+        for each in compiled.parts.heat
+    )
+
+
 def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
     """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it."""
     u = float(np.finfo(kind).eps) / 2
@@ -128,8 +141,8 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
     u = float(np.finfo(kind).eps) / 2
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
-    gains = len(t.gain) + len(t.ageing.turns)
-    gain = (1.0 / LEAST_GAIN) ** gains
+    gains = len(t.gain) + len(t.ageing.turns) + 9 * len(t.heat.turns)  # own heat: the temperature's roundings too
+    gain = (1.0 / LEAST_GAIN) ** (len(t.gain) + len(t.ageing.turns) + len(t.heat.turns))
     taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
     inverse = 4.0 * u * sizes.displacement * slope + back
     if compiled.taps:
@@ -139,15 +152,27 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
     if t.ageing.turns.size and kind != "float64":  # the gain of the travel one sample before, and its table
         late = _late(compiled) * sizes.output
         inverse += gain * late
+    if t.heat.turns.size and kind != "float64":  # the heat of one sample
+        inverse += gain * _warmed(compiled) * (1.0 / LEAST_GAIN)
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
+    moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
+    size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
+    roundings = []
+    for each in compiled.own[t.own.ahead :]:
+        roundings.append(each.rounding(size, u))
+        size *= each.forward.largest
+    for each, (_, back) in zip(reversed(compiled.own[t.own.ahead :]), reversed(roundings), strict=True):
+        inverse = each.passed(inverse) + back
     size = sizes.plays
     for j in range(len(t.creep.block)):
         rounding, back_gain = _creep(compiled, j, size, u)
         forward = forward * float(t.creep.block[j, creep.REST]) + rounding
         inverse = back_gain * (inverse + rounding)
         size *= float(t.creep.block[j, creep.REST])
+    for each, (there_own, _) in zip(compiled.own[t.own.ahead :], roundings, strict=True):
+        forward = forward * each.forward.largest + there_own
     forward = gain * (forward + 3.0 * u * sizes.output * gains) + TABLE_ERROR * sizes.output * (late > 0.0) + there
     return forward + 3.0 * u * sizes.displacement, inverse
 
@@ -155,6 +180,8 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
 def _lags(compiled: Compiled, error: float, u: float) -> float:
     """The error of the drive, for one of what is in front of the plays."""
     drive = _sizes(compiled).drive
+    for each in reversed(compiled.own[: compiled.tables.own.ahead]):
+        error = each.passed(error) + each.rounding(drive, u)[1]
     for exact, row in zip(compiled.tables.lag.exact, compiled.tables.lag.block.astype(float), strict=True):
         rate = float(row[lag.RATE])
         if exact:
@@ -187,5 +214,8 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     if compiled.tables.slew and len(compiled.tables.lag.exact):
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
-    most = (1.0 / LEAST_GAIN) ** (len(compiled.tables.gain) + len(compiled.tables.ageing.turns)) * rest
+    rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])
+    most = (1.0 / LEAST_GAIN) ** (
+        len(compiled.tables.gain) + len(compiled.tables.ageing.turns) + len(compiled.tables.heat.turns)
+    ) * rest
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

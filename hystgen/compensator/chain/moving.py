@@ -18,8 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.chain.static import StaticModel
+from hystgen.compensator.fixed_tables import reciprocal
+from hystgen.compensator.layout import FixedTables
 from hystgen.effects.base import Effect, decays
 from hystgen.effects.noncongruent.model import LoopCentre, PlayFunctions
 from hystgen.effects.rate_dependence import compensator as dashpot
@@ -62,6 +65,23 @@ class MovingTables(NamedTuple):
     def used(self) -> bool:
         """Whether plays are other than those of engine loop."""
         return self.moves != PLAIN or self.bends != STRAIGHT
+
+
+class FixedMovingTables(NamedTuple):
+    """The same in fixed point, which has no more than viscous plays of one time constant: `late`, `kept` (2,), factors
+    of what a stretch gains, and `relaxed`, tables of plays whose sums have the slopes that these have in a step."""
+
+    moves: int
+    bends: int
+    scanned: int
+    late: Reals
+    kept: Reals
+    relaxed: FixedTables
+
+    @property
+    def used(self) -> bool:
+        """Whether plays are other than those of engine loop."""
+        return self.moves != PLAIN
 
 
 def problems(static: StaticModel, effects: Sequence[Effect]) -> Iterator[tuple[Effect, str]]:
@@ -150,6 +170,39 @@ def build(
     given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse, yields))
     first, second, curve, number, share, inverse, yields = given
     return MovingTables(moves, bends, first, second, curve, number, halves, int(scanned), share, inverse, yields)
+
+
+def build_fixed(
+    plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float
+) -> FixedMovingTables:
+    """The same in fixed point, for effects without `beyond_fixed`. Raises OverflowError."""
+    own = build(static, effects, seconds, np.ptp(static.input_range), np.float64)
+    if not own.scanned:
+        none = np.zeros(2, dtype=np.int64)
+        return FixedMovingTables(PLAIN, STRAIGHT, 0, none, none, plays)
+    late = float(own.first[1])
+    weight = plays.weight
+    sums = [0, int(weight[0])]
+    for p in weight[1:].tolist():
+        sums.append(sums[-1] + round(p * late))
+    pairs = [reciprocal(slope) for slope in sums]
+    relaxed = plays._replace(
+        slope=np.array(sums, dtype=np.int64),
+        reciprocal=np.array([pair[0] for pair in pairs], dtype=np.int64),
+        shift=np.array([pair[1] for pair in pairs], dtype=np.int64),
+    )
+    gained, kept = (np.array(factor(x), dtype=np.int64) for x in (late, float(own.second[1])))
+    return FixedMovingTables(RELAXING, STRAIGHT, 1, gained, kept, relaxed)
+
+
+def beyond_fixed(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
+    """What fixed point does not have of effects on plays."""
+    if effects and not build(static, effects, seconds, np.ptp(static.input_range), np.float64).scanned:
+        words = (
+            "in fixed point there is no C for plays that are bent, have a nonlinear dashpot or do not all relax with "
+            "one time constant"
+        )
+        yield from ((effect, f"{words}; use float32") for effect in effects)
 
 
 def _viscous(seconds: float, tau: float) -> tuple[float, float]:
@@ -292,6 +345,32 @@ def relaxing_follow(t: MovingTables, r: Reals, p: Reals, s: State, w: Any) -> An
         z = s.play[i] + t.first[1] * beyond(w - s.play[i], r[i])
         total = total + p[i] * z
         s.play[i] = z + t.second[1] * beyond(w - z, r[i])
+    s.play[0] = w
+    return total
+
+
+@jit
+def stretched(x: Any, r: Any, share: Reals) -> Any:
+    """A share of the part of x beyond +-r, in fixed point."""
+    return times(beyond(x, r), share[0], share[1])
+
+
+@jit
+def fixed_relaxing_follow(t: FixedMovingTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
+    """Viscous plays follow their input w in fixed point; their sum. They stay as near to each other as they are to be,
+    give or take no rounding."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = s.play[i] + stretched(w - s.play[i], r[i], t.late)
+        total = total + p[i] * z
+        rest = z + stretched(w - z, r[i], t.kept)
+        if i > 1:
+            room = r[i] - r[i - 1]
+            if rest > s.play[i - 1] + room:
+                rest = s.play[i - 1] + room
+            elif rest < s.play[i - 1] - room:
+                rest = s.play[i - 1] - room
+        s.play[i] = rest
     s.play[0] = w
     return total
 

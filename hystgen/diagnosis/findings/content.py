@@ -60,7 +60,7 @@ def result_of(
     gap = Gap(as_given, *(Errors(*map(rms, each)) for each in (before, after)))
     remaining = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
     everything = [*ready.to_fit, *ready.held]
-    rivals = tuple((each.name, rival) for each in found.found for rival in each.rivals)
+    rivals = found.not_separable
     structured = any(isinstance(each, Structure) for each in remaining)
     result = Result(
         verdict="effects_found" if found.found else "unexplained" if remaining else "nothing_missing",

@@ -280,6 +280,11 @@ class Outcome:
     found: tuple[Found, ...]
     rankings: tuple[tuple[Tried, ...], ...]
 
+    @property
+    def not_separable(self) -> tuple[tuple[str, str], ...]:
+        """Effects that were found, each with one that it may be instead."""
+        return tuple((each.name, rival) for each in self.found for rival in each.rivals)
+
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
     """The nominal structure with weights, front and numbers of its effects refitted.

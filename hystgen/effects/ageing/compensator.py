@@ -12,6 +12,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
+from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -114,6 +115,13 @@ HIGH, LOW, GAIN, INVERSE = range(4)
 ONE, TWO, LEAST, LARGEST, LAST = range(5)
 
 
+KIND = Kind(
+    "ageing", ("least", "largest", "last"), ("high", "low", "gain", "inverse"),
+    rows=Rows("piece", ("begin", "inverse_length", "c0", "c1", "c2", "c3")), counts=("n", "turns"), flags=("own",),
+    reading=(), own=("solve", "absorb"),
+)  # fmt: skip
+
+
 class AgeingTables(NamedTuple):
     """All ageing of a model: `piece` (m, 6), those of each from `first` (k + 1) on; `number` (k, 5); `turns` (k,)."""
 
@@ -121,6 +129,13 @@ class AgeingTables(NamedTuple):
     piece: Reals
     number: Reals
     turns: Counts
+
+
+def constants(t: AgeingTables) -> Iterator[Constants]:
+    """The numbers of each gain."""
+    for j, turns in enumerate(map(int, t.turns)):
+        pieces = t.piece[t.first[j] : t.first[j + 1]]
+        yield Constants(KIND, t.number[j, LEAST:], (5 + 2 * turns, 1), pieces, (len(pieces), turns))
 
 
 class AgeingState(NamedTuple):

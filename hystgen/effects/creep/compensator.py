@@ -11,6 +11,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
+from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
@@ -103,12 +104,25 @@ BEFORE, AHEAD = 0, 1
 HIGH, LOW = 0, 1
 
 
+KIND = Kind(
+    "creep", ("slope", "inverse_slope", "rest", "inverse_rest"), ("before", "ahead"),
+    rows=Rows("term", ("rate", "early", "late", "weight"), ("high", "low")), counts=("n",),
+)  # fmt: skip
+
+
 class CreepTables(NamedTuple):
     """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 4)."""
 
     block: Reals
     first: Counts
     term: Reals
+
+
+def constants(t: CreepTables) -> Iterator[Constants]:
+    """The numbers of each block."""
+    for j, row in enumerate(t.block):
+        terms = t.term[t.first[j] : t.first[j + 1]]
+        yield Constants(KIND, row, (1 + 5 * len(terms), 1), terms, (len(terms),))
 
 
 class CreepState(NamedTuple):

@@ -17,7 +17,9 @@ class _Drift(Effect):
 
     place: ClassVar[Place] = Place.ADDED
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "none without a sensor"
+    compensation: ClassVar[str] = (
+        "by set_offset, where it is measured; over the time since then with emit.compensation.compensate: [drift]"
+    )
 
 
 class LinearDrift(_Drift):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.effects.base import decays
+from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -86,11 +88,27 @@ HIGH, LOW, WANTED, ASKED, ANSWER = 0, 1, 2, 3, 4
 REACHED, BEFORE = HIGH, LOW
 
 
+KIND = Kind(
+    "lag", ("rate", "theta", "late", "inverse_rate"), ("high", "low", "wanted", "asked", "answer"),
+    reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
+)  # fmt: skip
+EXACT_KIND = Kind(
+    "lag_exact", ("rate", "early", "late", "inverse_late"), ("reached", "before"),
+    reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
+)  # fmt: skip
+
+
 class LagTables(NamedTuple):
     """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4)."""
 
     exact: Counts
     block: Reals
+
+
+def constants(t: LagTables) -> Iterator[Constants]:
+    """The numbers of each lag."""
+    for exact, row in zip(t.exact, t.block, strict=True):
+        yield Constants(EXACT_KIND if exact else KIND, row, (3, 2))
 
 
 @jit

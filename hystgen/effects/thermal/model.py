@@ -159,6 +159,10 @@ class SelfHeating(_OwnHeat):
     source: Literal["self_heating"] = Field(description="temperature from the drive's own heat")
     heating: NotNegative = Field(description="K s/input^2: heating f V^2 is the final rise", examples=[1.0e-5])
 
+    compensation: ClassVar[str] = (
+        "the temperature is not measured; followed open loop with emit.compensation.compensate: [self_heating]"
+    )
+
     def heat(self, run: Run) -> Array:
         """`heating |v v'|/2`."""
         return self.heating * run.heat

@@ -1,16 +1,4 @@
-"""An effect of one's own: the offset of a heated neighbour that follows a duty cycle.
-
-    hystgen simulate stage_x.yaml drive.csv -o predicted.csv --effects my_effect.py
-
-with, in stage_x.yaml,
-
-    model:
-      effects:
-        - {name: user:neighbour, amplitude: 0.05, period: 120.0}
-
-A class is an effect: a name `user:..`, a place in the chain, the method of that place, and a field for each key of the
-parameter file. `candidates`, which may be left out, tells a fit what to try.
-"""
+"""An effect of one's own that has no compensator: the offset of a heated neighbour that follows a duty cycle."""
 
 from __future__ import annotations
 

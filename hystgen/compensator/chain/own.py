@@ -1,0 +1,254 @@
+"""Blocks of effects of the user's own: their numbers, what they do to signals, and to errors.
+
+Such a block is linear, so that its functions, called with one number after the other, say what it does: forwards
+`s <- A s + B x`, `y = C s + D x` by absorb, and backwards from y to x by solve and then absorb. Sums over all later
+samples are bounded mode by mode: `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j|)` in the eigenvectors of A.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.effects import own
+from hystgen.effects.base import Array, Effect, Place
+from hystgen.effects.kinds import Constants
+from hystgen.plays.slots import Counts, Reals
+
+SAME = 1e-9
+"""Relative difference up to which two answers of a block are the same but for rounding, with a time constant of up to a
+million samples: their quotient is what a difference of states loses."""
+
+
+class OwnTables(NamedTuple):
+    """Blocks in front of the plays, then those behind: `number` (m,), those of each from `first` (k + 1) on; the memory
+    of each from `place` (k + 1) on; `ahead`: how many stand in front."""
+
+    first: Counts
+    number: Reals
+    place: Counts
+    ahead: int
+
+
+@dataclass(frozen=True)
+class System:
+    """`s <- a s + b x`, `y = c s + d x` of a state (n,)."""
+
+    a: Array
+    b: Array
+    c: Array
+    d: float
+
+    def _modes(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Reciprocals of what each mode loses in a sample, eigenvectors, and their inverse."""
+        values, vectors = np.linalg.eig(self.a)
+        with np.errstate(divide="ignore"):
+            return 1.0 / np.maximum(1.0 - np.abs(values), 0.0), vectors, np.linalg.pinv(vectors)
+
+    @property
+    def radius(self) -> float:
+        """Largest share of a disturbance that is left after a sample, in the end."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0))
+
+    def states(self) -> Array:
+        """Largest states (n,) for inputs within 1."""
+        lost, vectors, back = self._modes()
+        return np.asarray(np.abs(vectors) @ (np.abs(back @ self.b) * lost))
+
+    def after(self) -> Array:
+        """Sum (n,) of all that one disturbance of each state makes of the output."""
+        lost, vectors, back = self._modes()
+        return np.asarray((np.abs(self.c @ vectors) * lost) @ np.abs(back))
+
+    def before(self) -> float:
+        """Largest output that inputs within 1 up to the sample before make."""
+        lost, vectors, back = self._modes()
+        return float(np.sum(np.abs(self.c @ vectors) * np.abs(back @ self.b) * lost))
+
+    @property
+    def largest(self) -> float:
+        """Largest output for inputs within 1."""
+        return abs(self.d) + self.before()
+
+    def response(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Response (N,) where the sample before is z^-1 = `z` (N,) of the sample."""
+        eye = np.eye(len(self.b))
+        return np.array([self.d + x * self.c @ np.linalg.solve(eye - x * self.a, self.b) for x in z])
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A block at one step length: forwards and backwards, its gain at rest, and the states (n,) of the input 1."""
+
+    effect: Effect
+    numbers: Array
+    forward: System
+    backward: System
+    rest: float
+    settled: Array
+
+    @property
+    def exact(self) -> bool:
+        """Whether the inverse solves for the very input that absorb takes."""
+        f, b = self.forward, self.backward
+        return abs(b.d * f.d - 1.0) <= SAME and bool(np.all(np.abs(b.c + b.d * f.c) <= SAME * (1.0 + np.abs(f.c))))
+
+    def sizes(self) -> Array:
+        """Largest states (n,) for inputs within 1, from rest at one."""
+        return self.forward.states() + np.abs(self.settled)
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output for inputs within `size`, and of the input that the inverse gives, errors of the
+        output asked for left out."""
+        shares = self._shares(u)
+        sizes = [Rounded(each, 0.0, u) for each in (size * self.sizes()).tolist()]
+        state = np.array(sizes, dtype=object)
+        y = _apply(self.effect, "absorb", shares, state, Rounded(size, 0.0, u))
+        lost = np.array([each.error for each in state])
+        begun = np.array(sizes, dtype=object)
+        _apply(self.effect, "rest", shares, begun, Rounded(size, 0.0, u))
+        lost = lost + np.array([each.error for each in begun])
+        forward = y.error + float(self.forward.after() @ lost)
+        asked = Rounded(self.forward.largest * size, 0.0, u)
+        x = _apply(self.effect, "solve", shares, np.array(sizes, dtype=object), asked)
+        return forward, self.passed(forward, x.error)
+
+    def passed(self, error: float, own: float = 0.0) -> float:
+        """Error of the input for one of the output, and for roundings `own` of solve."""
+        before, now = self.forward.before(), abs(self.forward.d)
+        if self.exact and before < now:  # whatever is limited or committed on the way
+            return (error / now + own) / (1.0 - before / now)
+        return self.backward.largest * error + own * (1.0 + self.backward.largest * self.forward.largest)
+
+    def _shares(self, u: float) -> NDArray[Any]:
+        return np.array([Rounded(abs(each), u * abs(each), u) for each in self.numbers.tolist()], dtype=object)
+
+
+@dataclass(frozen=True)
+class Rounded:
+    """A number within `size`, of which roundings `u` have taken no more than `error`."""
+
+    size: float
+    error: float
+    u: float
+
+    def _made(self, size: float, error: float) -> Rounded:
+        return Rounded(size, error + self.u * (size + error), self.u)
+
+    def __add__(self, other: Rounded) -> Rounded:
+        return self._made(self.size + other.size, self.error + other.error)
+
+    def __mul__(self, other: Rounded) -> Rounded:
+        error = self.error * other.size + other.error * self.size + self.error * other.error
+        return self._made(self.size * other.size, error)
+
+    def __neg__(self) -> Rounded:
+        return self
+
+    __sub__ = __add__
+
+
+def _apply(effect: Effect, verb: str, *given: Any) -> Any:
+    assert effect.block is not None
+    return getattr(effect.block, verb)(*given)
+
+
+def linear(effect: Effect, seconds: float) -> Linear:
+    """The block of an effect at steps of `seconds`. Raises EffectsError where its functions fail, or are none for C."""
+    assert effect.block is not None
+    own.check(type(effect))
+    one, n = own.Instance(effect), len(effect.block.state)
+    one.advance(seconds)
+    systems = []
+    for back in (False, True):
+        found = []
+        for j in range(n + 1):
+            one.state[:] = 0.0
+            one.state[:n] = np.eye(n + 1)[j, :n]
+            x = float(j == n)
+            if back:
+                x = answer = one.solve(x)
+                one.absorb(x)
+            else:
+                answer = one.absorb(x)
+            found.append((one.state.copy(), answer))
+        states, outputs = np.array([s for s, _ in found]).T, np.array([y for _, y in found])
+        systems.append(System(states[:, :n], states[:, n], outputs[:n], float(outputs[n])))
+    rest = one.rest(1.0)
+    return Linear(effect, one.table, systems[0], systems[1], rest, one.state.copy())
+
+
+def problems(effect: Effect, seconds: float) -> Iterator[str]:
+    """Why the C cannot have the block of an effect."""
+    assert effect.block is not None
+    one = linear(effect, seconds)
+    if not _adds_up(one, seconds):
+        yield "its block is not linear: the answer to a sum is not the sum of the answers"
+        return
+    instance = own.Instance(effect)
+    instance.advance(seconds)
+    settled = instance.rest(2.0)
+    before = instance.state.copy()
+    instance.advance(2.0 * seconds)
+    stays = abs(instance.absorb(2.0) - settled) <= SAME * max(abs(settled), 1.0)
+    if not stays or np.max(np.abs(instance.state - before)) > SAME * max(1.0, float(np.max(np.abs(before)))):
+        yield (
+            "its block does not stay where rest leaves it: absorb of the same input has to give the same output, "
+            "at steps of any length"
+        )
+    elif abs(instance.resting(settled) - 2.0) > SAME:
+        yield f"resting({settled:g}) is {instance.resting(settled):g}, and rest(2) is {settled:g}; one undoes the other"
+    elif one.rest <= 0.0:
+        yield f"its output at rest is {one.rest:g} times its input; the inverse needs it to rise"
+    elif max(one.forward.radius, one.backward.radius) >= 1.0:
+        where, radius = max(("its block", one.forward.radius), ("its inverse", one.backward.radius), key=lambda e: e[1])
+        yield f"{where} keeps {radius:.6g} of a disturbance from sample to sample, and has to lose it"
+    elif effect.place is Place.DRIVE and (abs(one.rest - 1.0) > SAME or one.forward.largest > 1.0 + SAME):
+        yield (
+            f"in front of the plays a drive at rest has to pass as it is, and none may overshoot; it passes "
+            f"{one.rest:g} of it at rest and up to {one.forward.largest:g} on the way"
+        )
+
+
+def _adds_up(one: Linear, seconds: float) -> bool:
+    """Whether a block answers as the system that its single answers make, from states and inputs of either sign."""
+    rng = np.random.default_rng(0)
+    instance = own.Instance(one.effect)
+    instance.advance(seconds)
+    for _ in range(8):
+        s, x = rng.normal(size=len(instance.state)), float(rng.normal())
+        for back, system in ((False, one.forward), (True, one.backward)):
+            instance.state[:] = s
+            answer = instance.solve(x) if back else instance.absorb(x)
+            if back:
+                instance.absorb(answer)
+            wanted, states = float(system.c @ s + system.d * x), system.a @ s + system.b * x
+            scale = 1.0 + float(np.abs(system.c) @ np.abs(s)) + abs(system.d * x) + float(np.max(np.abs(states)))
+            if max(abs(answer - wanted), float(np.max(np.abs(instance.state - states)))) > SAME * scale:
+                return False
+    return True
+
+
+def build(drives: Sequence[Linear], outputs: Sequence[Linear], reals: Any) -> OwnTables:
+    """The numbers of blocks in front of the plays and behind."""
+    every = [*drives, *outputs]
+    return OwnTables(
+        np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
+        reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
+        np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
+        len(drives),
+    )
+
+
+def constants(t: OwnTables, kinds: Sequence[type[Effect]]) -> list[Constants]:
+    """The numbers of each block of these effects."""
+    found = []
+    for j, effect in enumerate(kinds):
+        assert effect.block is not None
+        row = t.number[t.first[j] : t.first[j + 1]]
+        found.append(Constants(own.kind(effect), row, effect.block.products))
+    return found

@@ -1,0 +1,107 @@
+"""What a kind of block of a compensator is made of: its numbers by name and its verbs, in Python and in C alike."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from hystgen.basics.jit import jit
+
+VERBS = ("rest", "resting", "solve", "absorb")
+"""What every block does: settle at an input, give the input of a settled output, solve for one, absorb one."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What a block has several of: what one is called, its real numbers, and those of its memory; in fixed point their
+    `letters` and those of its `memory`, as in `Kind`."""
+
+    name: str
+    table: tuple[str, ...] = ()
+    state: tuple[str, ...] = ()
+    letters: str = ""
+    memory: str = ""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of block, in the order of its C types.
+
+    `name`: of its functions, `hystgen_NAME_solve` and so on, and of its file; `table`: its real constants, behind a
+    pointer to `rows` where it has these; `counts`: whole numbers behind them, the first of 16 bits, others of 8;
+    `state`: real numbers of its memory; `flags`: booleans of it; `reading`: the verbs that take the table; `own`: those
+    that it has; without `rest` it settles as it absorbs, without `resting` it rests as it solves.
+
+    In fixed point numbers are of several types: `letters` are those of the table, `memory` those of its memory, f for a
+    factor, which takes two numbers, w for 64 bits, i for 32, c for four of these in an array, and b for 8.
+    """
+
+    name: str
+    table: tuple[str, ...] = ()
+    state: tuple[str, ...] = ()
+    rows: Rows | None = None
+    counts: tuple[str, ...] = ()
+    flags: tuple[str, ...] = ()
+    reading: tuple[str, ...] = VERBS
+    own: tuple[str, ...] = VERBS
+    letters: str = ""
+    memory: str = ""
+
+    @property
+    def file(self) -> str:
+        """Its C file in `c_runtime/`."""
+        return f"{self.name}.c"
+
+    def verb(self, asked: str) -> str:
+        """The function that does this."""
+        return asked if asked in self.own else {"rest": "absorb", "resting": "solve"}[asked]
+
+
+@dataclass(frozen=True)
+class Constants:
+    """The numbers of one block: of its table (n,), rows (m, k) and counts; `products`: multiplications of absorb and of
+    solve."""
+
+    kind: Kind
+    table: Any
+    products: tuple[int, int]
+    rows: Any = ()
+    counts: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class OwnBlock:
+    """The compensator of an effect; see `hystgen.effects.own`.
+
+    `source`: the C file, beside the Python file; `table`, `state`: names of the numbers of `t` and `s`, in their order.
+    The effect's method `numbers(seconds)` gives `t` for steps of that length.
+    """
+
+    source: str
+    table: tuple[str, ...]
+    state: tuple[str, ...]
+    rest: Callable[[Any, Any, Any], Any]
+    resting: Callable[[Any, Any], Any]
+    solve: Callable[[Any, Any, Any], Any]
+    absorb: Callable[[Any, Any, Any], Any]
+
+    @functools.cached_property
+    def compiled(self) -> dict[str, Any]:
+        """The functions for the bit reference."""
+        return {verb: jit(getattr(self, verb)) for verb in VERBS}
+
+    @functools.cached_property
+    def products(self) -> tuple[int, int]:
+        """Multiplications that absorb and solve are written with."""
+        texts = [ast.parse(textwrap.dedent(inspect.getsource(each))) for each in (self.absorb, self.solve)]
+        absorb, solve = (sum(isinstance(node, ast.Mult) for node in ast.walk(text)) for text in texts)
+        return absorb, solve
+
+    def verbs(self) -> Iterator[tuple[str, Any]]:
+        """Names and functions."""
+        return ((verb, getattr(self, verb)) for verb in VERBS)

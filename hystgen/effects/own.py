@@ -1,0 +1,202 @@
+"""The compensator of an effect of the user's own: a linear block in Python, and the C file with the same functions.
+
+    def rest(t, s, x): ...      settle at the input x; returns the output
+    def resting(t, y): ...      the input of the settled output y
+    def solve(t, s, y): ...     the input that gives the output y at this sample
+    def absorb(t, s, x): ...    the input is x at this sample; returns the output
+
+`t` are the block's numbers and `s` is its memory, arrays that these functions index. They run as they stand in double
+precision, and compiled as the bit reference of the C, so that they are written with +, -, * and numbers from `t` alone:
+a number written out would be of another precision than the C computes in.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hystgen.basics.names import KEYWORDS
+from hystgen.basics.problems import EffectsError
+from hystgen.effects.base import Array, Effect, Place
+from hystgen.effects.kinds import Kind, OwnBlock
+
+ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
+"""How many arguments each function takes."""
+
+NAME = re.compile(r"user:([a-z][a-z0-9_]{0,30})")
+"""Names of effects whose block can be called after them in C."""
+
+WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
+"""Names of a block's numbers, which C has too."""
+
+
+def kind(effect: type[Effect]) -> Kind:
+    """What the C calls the block of an effect that has one."""
+    assert effect.block is not None
+    return Kind(f"user_{_name(effect).partition(':')[2]}", effect.block.table, effect.block.state)
+
+
+def source(effect: type[Effect]) -> Path:
+    """The C file of an effect that has a block."""
+    assert effect.block is not None
+    return Path(_file(effect)).parent / effect.block.source
+
+
+def _file(effect: type[Effect]) -> str:
+    """The Python file of an effect; a name alone where there is none."""
+    return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "model.py")
+
+
+def origin(effect: type[Effect]) -> str:
+    """What `--effects` is given for an effect: the last part of the folder's or file's name."""
+    file = Path(_file(effect))
+    return file.parent.name if file.name == "model.py" else file.name
+
+
+def numbers(effect: Effect, seconds: float) -> Array:
+    """The numbers of an effect's block at steps of `seconds`. Raises EffectsError for any that are none."""
+    assert effect.block is not None
+    try:
+        found = np.asarray(effect.numbers(seconds), dtype=np.float64)
+    except Exception as error:
+        raise _failed(effect, "numbers", error) from error
+    wanted = len(effect.block.table)
+    if found.shape != (wanted,) or not np.isfinite(found).all():
+        raise EffectsError(
+            f"the effect {effect.name} answered {found.tolist()} in numbers; {wanted} finite numbers were expected, "
+            f"{', '.join(effect.block.table)}"
+        )
+    return found
+
+
+def _failed(effect: Effect, function: str, error: Exception) -> EffectsError:
+    return EffectsError(f"the effect {effect.name} failed in {function}: {type(error).__name__}: {error}")
+
+
+class Instance:
+    """One block in double precision, as `hystgen.chain.blocks.Block`; the numbers of a step length are kept."""
+
+    def __init__(self, effect: Effect) -> None:
+        assert effect.block is not None
+        self.effect, self.block = effect, effect.block
+        self.state = np.zeros(len(effect.block.state))
+        self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
+        self.table = np.empty(0)
+
+    def _call(self, verb: str, *given: Any) -> float:
+        if not len(self.table) and self.block.table:
+            self.advance(1.0)  # at rest the length of a step does not matter
+        try:
+            return float(getattr(self.block, verb)(self.table, *given))
+        except Exception as error:
+            raise _failed(self.effect, verb, error) from error
+
+    def resting(self, y: float) -> float:
+        """The input of the settled output."""
+        return self._call("resting", y)
+
+    def rest(self, x: float) -> float:
+        """Settle."""
+        return self._call("rest", self.state, x)
+
+    def advance(self, seconds: float) -> None:
+        """The numbers of this step."""
+        self.table = self._numbers(seconds)
+
+    def solve(self, y: float) -> float:
+        """The input that gives `y`."""
+        return self._call("solve", self.state, y)
+
+    def absorb(self, x: float) -> float:
+        """The memory follows."""
+        return self._call("absorb", self.state, x)
+
+
+# ---------------------------------------------------------------- what is wrong with one
+
+
+def _name(effect: type[Effect]) -> str:
+    return str(effect.model_fields["name"].annotation.__args__[0])  # type: ignore[union-attr]
+
+
+def problem(effect: type[Effect]) -> str:
+    """Why the block of a class cannot be used, or nothing."""
+    block = effect.block
+    if block is None:
+        return ""
+    if not isinstance(block, OwnBlock):
+        return f"has block {type(block).__name__}; write block: ClassVar[OwnBlock] = OwnBlock(..)"
+    if not NAME.fullmatch(_name(effect)):
+        return f"has a block, and {_name(effect)} cannot name it in C; write user: and lower-case letters, digits and _"
+    if effect.place is not Place.DRIVE and (effect.place, effect.order) != (Place.LINEAR, 0):
+        return "has a block, which has its place among Place.DRIVE or Place.LINEAR with order 0"
+    words = [*block.table, *block.state]
+    wrong = [word for word in words if not WORD.fullmatch(word) or word in KEYWORDS]
+    twice = [word for names in (block.table, block.state) for word in names if names.count(word) > 1]
+    if wrong or twice or not block.table or not block.state:
+        return f"has {(wrong + twice + ['no'])[0]!r} among the names of its table and state; give each once, as C names"
+    if not re.fullmatch(r"[A-Za-z0-9_]+\.c", str(block.source)):
+        return f"has {block.source!r} as its C file; give the name of one that lies beside the Python file"
+    return ""
+
+
+@functools.cache
+def check(effect: type[Effect]) -> None:
+    """Raise EffectsError where a class's block cannot be the bit reference of its C, `FILE:LINE: what; do` each."""
+    assert effect.block is not None
+    if wrong := problem(effect):
+        raise EffectsError(f"the effect {_name(effect)} {wrong}")
+    if faults := [fault for verb, function in effect.block.verbs() for fault in _of_function(verb, function)]:
+        raise EffectsError("\n".join(faults))
+
+
+ALLOWED = (
+    ast.FunctionDef, ast.arguments, ast.arg, ast.Assign, ast.Return, ast.Expr, ast.BinOp, ast.Add, ast.Sub, ast.Mult,
+    ast.UnaryOp, ast.USub, ast.Name, ast.Load, ast.Store, ast.Subscript, ast.For, ast.Call, ast.Constant,
+)  # fmt: skip
+"""What the functions are written with."""
+
+
+def _of_function(verb: str, function: Any) -> Iterator[str]:
+    try:
+        lines, first = inspect.getsourcelines(function)
+        file = inspect.getsourcefile(function)
+        tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    except (OSError, TypeError, SyntaxError):
+        yield f"{verb} has no source that can be read; write it as a function of the file"
+        return
+    if not isinstance(tree, ast.FunctionDef) or len(tree.args.args) != ARGUMENTS[verb]:
+        yield f"{file}:{first}: {verb} has to be a function of {ARGUMENTS[verb]} arguments"
+        return
+    tree.decorator_list, tree.returns = [], None
+    for each in tree.args.args:
+        each.annotation = None
+    if isinstance(tree.body[0], ast.Expr) and isinstance(tree.body[0].value, ast.Constant):
+        tree.body = tree.body[1:]  # the docstring
+    inner = [node.slice for node in ast.walk(tree) if isinstance(node, ast.Subscript)]
+    inner += [node.iter for node in ast.walk(tree) if isinstance(node, ast.For)]
+    places = {id(part) for node in inner for part in ast.walk(node)}
+    known = inspect.getclosurevars(function).globals
+    for node in ast.walk(tree):
+        place = f"{file}:{first + getattr(node, 'lineno', 1) - 1}"
+        if id(node) in places and isinstance(node, ast.Name | ast.Constant | ast.BinOp | ast.Add | ast.Sub | ast.Load):
+            continue
+        ranged = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "range"
+        named = isinstance(node, ast.Name) and isinstance(known.get(node.id), int | float)
+        if isinstance(node, ast.Constant) or named:
+            what = ast.unparse(node)
+            yield f"{place}: the number {what} in {verb} is of another precision than the C's; put it in the table"
+        elif not isinstance(node, ALLOWED) or (isinstance(node, ast.Call) and not ranged):
+            yield (
+                f"{place}: {verb} has {ast.unparse(node) or type(node).__name__}; write it with +, -, *, `for .. in "
+                "range(..)` and numbers of the table"
+            )

@@ -1,0 +1,189 @@
+"""The C of an effect of the user's own: its file, checked, as pieces of the run time.
+
+The file is the user's own code and is carried as it stands, with the model's name in front of its own. What it may hold
+is what blocks of `c_runtime/` hold: two types of real numbers, named as in Python, and four functions, with further
+static functions that they call. It is no language checker: what compiles, and to which bits, `hystgen verify` tells.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+from hystgen.basics.problems import EffectsError, printable
+from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
+from hystgen.effects import own
+from hystgen.effects.base import Effect
+from hystgen.effects.kinds import VERBS, Kind
+from hystgen.emission.layout import WIDTH
+from hystgen.emission.runtime import Piece
+
+MOST_BYTES = 1 << 16
+
+INCLUDE = '#include "hystgen_runtime.h"'
+"""The one line of the preprocessor that a file has, so that it compiles as it stands."""
+
+CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
+"""Words before a parenthesis that call nothing."""
+
+REFUSED = {
+    "float": "hystgen_real_t", "double": "hystgen_real_t", "extern": "nothing", "volatile": "nothing",
+    "asm": "C", "union": "struct", "goto": "a loop", "register": "nothing", "auto": "a type",
+}  # fmt: skip
+"""Words that a file does not have, and what to write in their place."""
+
+
+def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
+    """Types and functions of the blocks of a model that are the user's own; raises as `of_effect`."""
+    effects = dict.fromkeys(t.own_effects if isinstance(t, OwnChainTables) else ())
+    found = [of_effect(effect) for effect in effects]
+    types, functions = ([each for pair in found for each in pair[way]] for way in (0, 1))
+    twice = [name for name, count in Counter(each.name for each in (*types, *functions)).items() if count > 1]
+    if twice:
+        raise EffectsError(f"two effects of your own have the name {twice[0]} in C; rename one")
+    return types, functions
+
+
+def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
+    """Types and functions of the C file of an effect. Raises EffectsError, a line a problem: `FILE:LINE: what; do`."""
+    file, kind = own.source(effect), own.kind(effect)
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise EffectsError(f"{file}: cannot be read: {error.strerror or error}") from None
+    if len(data) > MOST_BYTES:
+        raise EffectsError(f"{file}: has {len(data)} bytes, more than {MOST_BYTES}; give the block alone")
+    text = data.decode("utf-8", "replace").replace("\r\n", "\n")
+    problems = list(_of_lines(text))
+    found: list[Piece] = []
+    if not problems:
+        found = list(_split(text, problems))
+        problems += _of_pieces(text, found, kind)
+    if problems:
+        raise EffectsError("\n".join(f"{file}:{line}: {what}" for line, what in sorted(set(problems))))
+    return [each for each in found if "typedef" in each.text], [each for each in found if "typedef" not in each.text]
+
+
+def _code(text: str) -> str:
+    """The text with its comments blank, line by line."""
+    return re.sub(r"/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+
+
+def _of_lines(text: str) -> Iterator[tuple[int, str]]:
+    """What no line may have."""
+    code = _code(text)
+    opened = code.find("/*")
+    if opened >= 0:
+        yield text.count("\n", 0, opened) + 1, "a comment that does not end"
+        return
+    for number, (whole, line) in enumerate(zip(text.split("\n"), code.split("\n"), strict=True), 1):
+        if strange := re.search(r"[^ -~]", whole):
+            yield number, f"{printable(strange[0])!r} is no printable ASCII; write another character"
+        if len(whole) > WIDTH:
+            yield number, f"{len(whole)} columns, more than {WIDTH}; break the line"
+        if "?" "?" in whole:
+            yield number, "two question marks, which begin a trigraph; write one"
+        if line.strip() in ("", INCLUDE):
+            continue
+        for form, what in (
+            (r"#", f"a line of the preprocessor; only {INCLUDE} is one"),
+            (r"//", "a comment with //; write /* */"),
+            (r"[\"'\\]", "a text or a continued line; a block has none"),
+            (r"= *\{", "a list of values; put them in the table"),
+            (r"[/%]", "a division; put the reciprocal in the table"),
+            (r"(?<!\w)(\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as Python has it"),
+        ):
+            if re.search(form, line):
+                yield number, what
+                break
+        for word in re.findall(r"[A-Za-z_]\w*", line):
+            if word in REFUSED:
+                yield number, f"{word}; write {REFUSED[word]}"
+            elif word.startswith("_"):
+                yield number, f"{word}, a name of the compiler's; choose another one"
+
+
+_TYPE = re.compile(r"typedef struct \{([^{}]*)\} (hystgen_\w+);")
+_FUNCTION = re.compile(r"static [\w *]*?\b(hystgen_\w+)\(([^(){}]*)\) \{")
+_NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
+
+
+def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
+    """The types and functions of a file, each with the comment right above it; whatever else there is, is a problem."""
+    code = _code(text).replace(INCLUDE, " " * len(INCLUDE))
+    end = 0
+    while start := re.search(r"\S", code[end:]):
+        begin, behind = end + start.start(), end
+        end = _end(code, begin)
+        whole = " ".join(code[begin:end].split())
+        found = _TYPE.fullmatch(whole) or _FUNCTION.match(whole)
+        if not found:
+            line = text.count("\n", 0, begin) + 1
+            what = f"{printable(whole)!r} belongs to no type and no static function; a block has these"
+            problems.append((line, what))
+            continue
+        name = found[2] if whole.startswith("typedef") else found[1]
+        above = text[behind:begin].rpartition("\n\n")[2]
+        comment = above if above.strip().startswith("/*") else ""
+        yield Piece(name, f"{comment.lstrip()}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name})
+
+
+def _end(code: str, begin: int) -> int:
+    """Where a type or function ends: at the brace that closes a function, else at a semicolon."""
+    depth = 0
+    for at in range(begin, len(code)):
+        depth += {"{": 1, "}": -1}.get(code[at], 0)
+        closed = code[at] == "}" and depth == 0 and not code.startswith("typedef", begin)
+        if depth < 0 or closed or (code[at] == ";" and depth == 0):
+            return at + 1
+    return len(code)
+
+
+def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
+    """What a block has besides its types and functions, and what it lacks."""
+    own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
+    names = [piece.name for piece in found]
+    functions = {piece.name for piece in found if "typedef" not in piece.text}
+    for name, declared in wanted.items():
+        if name not in names:
+            yield 1, f"has no {name}; write {declared}"
+    at = 0
+    for piece in found:
+        at = text.index(piece.text.rstrip("\n"), at)
+        code = _code(piece.text)
+        line = text.count("\n", 0, at + len(code) - len(code.lstrip())) + 1
+        whole = " ".join(code.split())
+        head = whole if whole.startswith("typedef") else whole.partition(" {")[0]
+        if names.count(piece.name) > 1:
+            yield line, f"{piece.name} is there {names.count(piece.name)} times; one is enough"
+        elif piece.name in wanted and _bare(head) != _bare(wanted[piece.name]):
+            yield line, f"{piece.name} is declared otherwise; write {wanted[piece.name]}"
+        elif not piece.name.startswith(f"{own_name}_") or (piece.name not in wanted and piece.name not in functions):
+            yield line, f"{piece.name} is none of the block's types, and no function {own_name}_..; leave it out"
+        for number, each in enumerate(code.split("\n")):
+            place = text.count("\n", 0, at) + 1 + number
+            for used in set(_NAME.findall(each)) - functions - wanted.keys() - {"hystgen_real_t"}:
+                yield place, f"{used} is not in the file; a block has what stands in its file"
+            for called in re.findall(r"(\w+) ?\(", each):
+                if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
+                    yield place, f"{called} is called, and is not in the file; a block calls its own functions"
+
+
+def _bare(declared: str) -> str:
+    """A declaration without what makes no difference: spaces, and a memory that is only read."""
+    return re.sub(r"\s+", "", re.sub(r"const (hystgen_\w+ \*self)", r"\1", declared))
+
+
+def _declared(kind: Kind) -> Iterator[tuple[str, str]]:
+    """Names of types and functions of a block, and how they are declared."""
+    name = f"hystgen_{kind.name}"
+    for own_type, members in ((f"{name}_table_t", kind.table), (f"{name}_t", kind.state)):
+        yield own_type, f"typedef struct {{ {' '.join(f'hystgen_real_t {each};' for each in members)} }} {own_type};"
+    for verb in VERBS:
+        memory = "" if verb == "resting" else f"{name}_t *self, "
+        x = "x" if verb in ("rest", "absorb") else "y"
+        arguments = f"const {name}_table_t *t, {memory}hystgen_real_t {x}"
+        yield f"{name}_{verb}", f"static hystgen_real_t {name}_{verb}({arguments})"
+
+

@@ -1,0 +1,444 @@
+"""Effects of the user's own, from a folder outside of the package: simulated, diagnosed, inverted, and in the C."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from modelfiles import CREEP, PLAYS, head
+
+import hystgen
+from hystgen.basics.problems import EffectsError, UnsupportedEffectsError
+from hystgen.compensator.chain import blocks, bounds, own, tables
+from hystgen.compensator.chain.run import answers
+from hystgen.compensator.chained import Compensator
+from hystgen.effects import Run, load_user_effects
+from hystgen.effects.kinds import Kind
+from hystgen.emission import runtime
+from hystgen.emission.calls import emit_options, emitted_files
+from hystgen.model import Model
+from hystgen.plays import slots
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "my_effect"
+T = 1e-3
+DROOP = "name: user:droop, share: 0.05, time_constant: 0.7"
+Call = Callable[..., tuple[int, str, str]]
+
+# A drive stage that follows by a share of the way each sample, in front of the plays, with a file of its own
+STAGE = '''"""An amplifier."""
+from typing import ClassVar, Literal
+import numpy as np
+from hystgen.effects import Effect, OwnBlock, Place
+
+RATE, INVERSE_RATE = range(2)
+
+def rest(t, s, x):
+    s[0] = x
+    return x
+
+def resting(t, y):
+    return y
+
+def solve(t, s, y):
+    return s[0] + (y - s[0]) * t[INVERSE_RATE]
+
+def absorb(t, s, x):
+    s[0] = s[0] + t[RATE] * (x - s[0])
+    return s[0]
+
+class Follower(Effect):
+    name: Literal["user:follower"]
+    bandwidth: float
+    place: ClassVar[Place] = Place.DRIVE
+    order: ClassVar[int] = 2
+    block: ClassVar[OwnBlock] = OwnBlock(
+        "follower.c", ("rate", "inverse_rate"), ("reached",), rest, resting, solve, absorb)
+
+    def numbers(self, seconds):
+        rate = 1.0 - np.exp(-self.bandwidth * seconds)
+        return [rate, 1.0 / rate]
+
+    def drive(self, a, run):
+        y = a.copy()
+        for k, seconds in enumerate(run.steps, 1):
+            y[k] = y[k - 1] + (1.0 - np.exp(-self.bandwidth * seconds)) * (a[k] - y[k - 1])
+        return y
+'''
+STAGE_C = """#include "hystgen_runtime.h"
+
+typedef struct {
+    hystgen_real_t rate;
+    hystgen_real_t inverse_rate;
+} hystgen_user_follower_table_t;
+
+typedef struct {
+    hystgen_real_t reached;
+} hystgen_user_follower_t;
+
+static hystgen_real_t hystgen_user_follower_rest(const hystgen_user_follower_table_t *t,
+                                                 hystgen_user_follower_t *self, hystgen_real_t x)
+{
+    (void)t;
+    self->reached = x;
+    return x;
+}
+
+static hystgen_real_t hystgen_user_follower_resting(const hystgen_user_follower_table_t *t,
+                                                    hystgen_real_t y)
+{
+    (void)t;
+    return y;
+}
+
+static hystgen_real_t hystgen_user_follower_solve(const hystgen_user_follower_table_t *t,
+                                                  hystgen_user_follower_t *self, hystgen_real_t y)
+{
+    return self->reached + (y - self->reached) * t->inverse_rate;
+}
+
+static hystgen_real_t hystgen_user_follower_absorb(const hystgen_user_follower_table_t *t,
+                                                   hystgen_user_follower_t *self, hystgen_real_t x)
+{
+    self->reached = self->reached + t->rate * (x - self->reached);
+    return self->reached;
+}
+"""
+FOLLOWER = "name: user:follower, bandwidth: 700"
+
+
+def written(folder: Path, *effects: str, name: str = "stage") -> Path:
+    """A parameter file with these effects."""
+    listed = "".join(f"    - {{{each}}}\n" for each in effects)
+    path = folder / f"{name}.yaml"
+    path.write_text(head(name) + PLAYS + f"  output_offset: 0.5\n  effects:\n{listed}sample_time: {T}\n")
+    return path
+
+
+def outside(folder: Path, python: str = STAGE, c: str | None = STAGE_C) -> Path:
+    """A folder with an effect, which nothing in the package knows of."""
+    own_folder = folder / "follower"
+    own_folder.mkdir()
+    (own_folder / "model.py").write_text(python)
+    if c is not None:
+        (own_folder / "follower.c").write_text(c)
+    return own_folder
+
+
+def both(folder: Path, *more: str) -> Model:
+    """A model with an effect on either side of the plays, both from outside."""
+    return hystgen.load(written(folder, DROOP, FOLLOWER, *more), [EXAMPLE, outside(folder)])
+
+
+def reference(one: Model, arithmetic: str, seed: int, n: int = 1500) -> tuple[tables.Compiled, Run]:
+    compiled = tables.build(one.chain, arithmetic, T)
+    low, high = (float(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    phase = np.cumsum(np.random.default_rng(seed).uniform(0.0, 0.02, n))
+    u = np.float32(0.5 * (low + high) + 0.4 * (high - low) * np.sin(phase))
+    return compiled, Run(np.arange(n) * T, u.astype(float))
+
+
+def test_the_forward_model_is_the_integral_of_its_equation(tmp_path: Path) -> None:
+    """Of the droop, in steps a hundredth as long."""
+    one = hystgen.load(written(tmp_path, DROOP), [EXAMPLE])
+    t = np.cumsum(np.random.default_rng(1).uniform(0.5 * T, 2.0 * T, 400))
+    v = 3.0 * np.sin(9.0 * t)
+    h = one.without(one.effects).simulate(v) - 0.5
+    state, wanted = 0.05 * h[0], [0.95 * h[0]]
+    for k in range(1, len(t)):
+        step = (t[k] - t[k - 1]) / 100
+        for part in range(100):
+            state += step / 0.7 * (0.05 * (h[k - 1] + (h[k] - h[k - 1]) * (part + 0.5) / 100) - state)
+        wanted.append(h[k] - state)
+    assert np.max(np.abs(one.simulate(v, t=t) - 0.5 - wanted)) < 1e-5
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_the_inverse_composes_with_the_forward_model(tmp_path: Path, even: bool) -> None:
+    one = both(tmp_path, CREEP)
+    t = np.cumsum(np.full(500, T) if even else np.random.default_rng(2).uniform(0.5 * T, 2.0 * T, 500))
+    u = 0.5 + 4.0 * np.sin(5.0 * t)
+    v = one.inverse().simulate(u, t=t)
+    assert np.max(np.abs(one.simulate(v, t=t) - u)) < 1e-12
+    if even:
+        assert np.max(np.abs(one.inverse().simulate(u, "float64") - v)) < 1e-11
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+def test_c_gives_the_bits_of_the_reference(tmp_path: Path, arithmetic: str) -> None:
+    report = hystgen.verify(both(tmp_path, CREEP), arithmetic, "both", compiler=["gcc"], length=1000)
+    assert report.ok, report.table()
+    assert {row.operator for row in report.rows} >= {"inverse", "forward"}
+
+
+@pytest.mark.thorough
+def test_c_gives_the_same_bits_on_cores_and_beside_a_shared_run_time(tmp_path: Path) -> None:
+    one = both(tmp_path)
+    report = hystgen.verify(one, operator="both", targets=["cortex-m0plus", "cortex-m4f"], target_length=150)
+    assert report.ok, report.table()
+    report = hystgen.verify(one, operator="both", layout="shared-runtime", compiler=["gcc"], length=500)
+    assert report.ok, report.table()
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+def test_errors_stay_within_the_bounds_that_follow_from_the_functions(tmp_path: Path, arithmetic: str) -> None:
+    one = both(tmp_path, CREEP)
+    for seed in range(3):
+        compiled, run = reference(one, arithmetic, seed)
+        bound = bounds.chain_bounds(compiled, arithmetic)
+        v = answers(compiled, run, True).astype(float)
+        ends = tuple(float(end) for end in compiled.tables.limits[:2])
+        assert np.max(np.abs(v - Compensator(one.chain).drives(run, ends))) <= bound.inverse  # type: ignore[arg-type]
+        y = answers(compiled, Run(run.t, v), False).astype(float)
+        assert np.max(np.abs(y - one.simulate(v))) <= bound.forward
+        assert bound.inverse < (0.1 if arithmetic == "float32" else 1e-9)
+
+
+def test_the_noise_gain_is_that_of_an_impulse(tmp_path: Path) -> None:
+    """Without plays everything is linear."""
+    path = written(tmp_path, DROOP, FOLLOWER)
+    path.write_text(path.read_text().replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"))
+    one = hystgen.load(path, [EXAMPLE, outside(tmp_path)])
+    compiled = tables.build(one.chain, "float64", T)
+    u = np.full(1 << 14, 0.5)
+    u[200] += 1e-3
+    x = answers(compiled, Run(np.arange(len(u)) * T, u), True)
+    gain = np.max(np.abs(np.fft.rfft(x - x[0]))) / 1e-3
+    assert compiled.noise_gain == pytest.approx(float(gain) * 2.0 * 0.95, rel=1e-2)
+    assert compiled.noise_gain > 1.5
+
+
+def test_it_is_diagnosed_and_goes_into_the_c(tmp_path: Path, run: Call) -> None:
+    """Records of plays and droop, drawn from the equation alone, by the commands of the docstring."""
+    plain = written(tmp_path, name="plain")
+    plain.write_text(plain.read_text().replace("  effects:\n", ""))
+    static = hystgen.load(plain)
+    rng = np.random.default_rng(4)
+    names = []
+    for number in range(5):
+        n = 3000
+        t = np.arange(n) * T + 4.0 * number
+        v = np.interp(np.arange(n), np.arange(0, n + 60, 60), rng.uniform(-3.9, 3.9, n // 60 + 1))
+        h = static.simulate(v) - 0.5
+        state, y = 0.06 * h[0], []
+        for each in h:
+            state += (1.0 - np.exp(-T / 0.4)) * (0.06 * each - state)
+            y.append(each - state + 0.5)
+        names.append(tmp_path / f"record_{number}.csv")
+        table = np.column_stack([t, v, np.array(y) + 2e-3 * rng.normal(size=n)])
+        np.savetxt(names[-1], table, delimiter=",", header="t,v,y", comments="")
+    own_folder = tmp_path / "my_effect"
+    shutil.copytree(EXAMPLE, own_folder, ignore=shutil.ignore_patterns("__pycache__"))
+    given = ["--effects", own_folder]
+    words = [*names[:3], "--holdout", names[3], "--holdout", names[4], "-o", tmp_path / "out"]
+    code, _, err = run("diagnose", plain, *words, *given)
+    assert code == 0, err
+    (found,) = json.loads((tmp_path / "out" / "diagnosis.json").read_text())["effects"]
+    assert found["name"] == "user:droop"
+    assert found["parameters"]["share"] == pytest.approx(0.06, rel=0.1)
+    extended = tmp_path / "out" / "params.yaml"
+    code, _, err = run("emit", extended, "-o", tmp_path / "firmware", *given)
+    assert code == 0, err
+    assert "stage_user" not in (tmp_path / "firmware" / "plain.h").read_text()
+    assert "--effects my_effect" in (tmp_path / "firmware" / "plain.h").read_text()
+    assert "static plain_real_t plain_user_droop_absorb(" in (tmp_path / "firmware" / "plain.c").read_text()
+    code, out, _ = run("emit", extended, "-o", tmp_path / "firmware", "--check", *given)
+    assert code == 0, out
+    code, out, err = run("track", extended, names[3], *given)
+    assert code == 0, err
+    plays, whole = (
+        float(re.findall(rf"{which} +(\d+\.\d+)", out)[0]) for which in ("plays alone", "whole model")
+    )
+    assert whole < 0.5 * plays, "what the droop is worth"
+
+
+def test_without_a_compensator_it_is_refused_by_name(tmp_path: Path, run: Call) -> None:
+    path = written(tmp_path, "name: user:neighbour, amplitude: 0.1, period: 60")
+    neighbour = Path(__file__).parent / "neighbour.py"
+    one = hystgen.load(path, [neighbour])
+    with pytest.raises(UnsupportedEffectsError, match="an effect of your own, which has no compensator"):
+        one.inverse()
+    code, _, err = run("emit", path, "--effects", neighbour, "-o", tmp_path / "out")
+    assert code == 1
+    assert "user:neighbour: an effect of your own, which has no compensator" in err
+    assert not (tmp_path / "out").exists()
+    assert "user:neighbour" in emitted_files(one, allow_partial=True)["stage.h"]
+
+
+TABLE = "hystgen_user_follower_table_t"
+STEP, MEMORY, VOID = "self->reached + t->rate", "hystgen_real_t reached;", "    (void)t;\n    self"
+SECOND = "typedef struct {\n    hystgen_real_t reached"
+RATES = "hystgen_real_t rate;\n    hystgen_real_t inverse_rate;"
+BAD_C = {
+    "number": (STEP, f"0.5f * {STEP}", ":36: a number with a fraction; put it in the table"),
+    "division": ("* t->inverse_rate", "/ t->rate", ":30: a division; put the reciprocal in the table"),
+    "directive": (SECOND, f"#include <math.h>\n{SECOND}", ":8: a line of the preprocessor; only #include"),
+    "call": ("return self->reached;", "return sin(self->reached);", ":37: sin is called, and is not in the file"),
+    "type": (MEMORY, "double reached;", ":9: double; write hystgen_real_t"),
+    "field": (MEMORY, "hystgen_real_t seen;", ":8: hystgen_user_follower_t is declared otherwise; write typedef"),
+    "swapped": (RATES, "hystgen_real_t inverse_rate;\n    hystgen_real_t rate;", f":3: {TABLE} is declared otherwise"),
+    "global": (SECOND, f"static int count;\n{SECOND}", ":8: 'static int count;' belongs to no type"),
+    "verb": ("follower_absorb(", "follower_absrb(", ":1: has no hystgen_user_follower_absorb; write static"),
+    "comment": (VOID, "    (void)t; /* open\n    self", ":15: a comment that does not end"),
+    "slashes": (VOID, "    (void)t; // unused\n    self", ":15: a comment with //; write /* */"),
+    "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":15: 114 columns, more than 100"),
+    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":15: '\u00e9' is no printable ASCII"),
+    "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":39: 'int x' belongs to no type"),
+    "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":16: hystgen_tanh is not in the file"),
+    "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":24: 'int y(void)"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", BAD_C)
+def test_a_wrong_c_file_is_refused_with_its_place(tmp_path: Path, run: Call, wrong: str) -> None:
+    before, after, said = BAD_C[wrong]
+    assert before in STAGE_C
+    folder = outside(tmp_path, c=STAGE_C.replace(before, after))
+    code, _, err = run("emit", written(tmp_path, FOLLOWER), "--effects", folder, "-o", tmp_path / "out")
+    assert code == 2
+    assert said in err
+    assert re.search(r"follower\.c:(\d+:)? ", err)
+    assert "Traceback" not in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
+    code, _, err = run("emit", written(tmp_path, FOLLOWER), "--effects", outside(tmp_path, c=None), "-o", tmp_path)
+    assert code == 2
+    assert "follower.c: cannot be read: No such file" in err
+
+
+SOLVED, NUMBERS = "    return s[0] + (y", "return [rate, 1.0 / rate]"
+PRECISE = "is of another precision than the C's; put it in the table"
+BAD_PYTHON = {
+    "number": (SOLVED, "    return 1.0 * s[0] + (y", f":16: the number 1.0 in solve {PRECISE}"),
+    "named number": (SOLVED, "    return RATE + (y", f":16: the number RATE in solve {PRECISE}"),
+    "call": ("    return s[0] + (y - s[0])", "    return np.abs(y - s[0])", ":16: solve has np.abs"),
+    "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, for which it has to define mapped"),
+    "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
+    "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),
+    "word": ('("reached",)', '("while",)', "has 'while' among the names of its table and state"),
+    "file": ('"follower.c"', '"../follower.c"', "has '../follower.c' as its C file"),
+    "numbers": (NUMBERS, "return [rate]", "2 finite numbers were expected, rate, inverse_rate"),
+    "infinite": (NUMBERS, "return [rate, np.inf]", "2 finite numbers were expected"),
+    "fails": (NUMBERS, "return [rate, 1 / 0]", "failed in numbers: ZeroDivisionError"),
+    "not linear": ("    return s[0]\n\nclass", "    return s[0] * s[0]\n\nclass", "its block is not linear"),
+    "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay where rest leaves it"),
+    "other at rest": ("(t, y):\n    return y", "(t, y):\n    return y * t[RATE]", "one undoes the other"),
+    "gain": ("    return s[0]\n\nclass", "    return s[0] + s[0]\n\nclass", "does not stay where rest leaves it"),
+    "grows": ("- np.exp(", "- 3.0 * np.exp(", "its block keeps"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", BAD_PYTHON)
+def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str) -> None:
+    before, after, said = BAD_PYTHON[wrong]
+    assert before in STAGE
+    folder = outside(tmp_path, STAGE.replace(before, after))
+    slew = "name: slew_limit, rate: 500"
+    name = "My-Follower" if wrong == "name" else "follower"
+    path = written(tmp_path, f"name: user:{name}, bandwidth: 700", slew)
+    code, _, err = run("emit", path, "--effects", folder, "-o", tmp_path / "out")
+    assert code in (1, 2)
+    assert said in err
+    assert "Traceback" not in err
+    assert not (tmp_path / "out").exists()
+
+
+STYLES = {
+    "in one line": STAGE_C.replace("\n{\n    (void)t;\n    return y;\n}", " { (void)t; return y; }"),
+    "braces behind": re.sub(r"\n {20,}", "\n    ", STAGE_C).replace(")\n{", ") {"),
+    "a helper": STAGE_C.replace(
+        "static hystgen_real_t hystgen_user_follower_absorb(",
+        "/* The rest of the way. */\nstatic hystgen_real_t\n"
+        "hystgen_user_follower_way(hystgen_real_t a, hystgen_real_t b)\n"
+        "{\n    /* from b to a */\n    return a -\n        b; /* either sign */\n}\n\n"
+        "static hystgen_real_t hystgen_user_follower_absorb(", 1,
+    ).replace("t->rate * (x - self->reached)", "t->rate * hystgen_user_follower_way(x, self->reached)"),
+    "a loop": STAGE_C.replace(
+        "    self->reached = self->reached + t->rate",
+        "    unsigned int i;\n    for (i = 0; i < 3u; ++i) {\n        if (i == 2u)\n            break;\n    }\n"
+        "    self->reached = self->reached + t->rate",
+    ),
+    "windows": STAGE_C.replace("\n", "\r\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_c_may_be_written_in_any_style(tmp_path: Path, style: str) -> None:
+    assert STYLES[style] != STAGE_C
+    one = hystgen.load(written(tmp_path, FOLLOWER), [outside(tmp_path, c=STYLES[style])])
+    hystgen.emit(one, tmp_path / "out", operator="both")
+    for source in ("stage.c", "stage_selftest.c"):
+        command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-c", source, "-o", "object.o"]
+        subprocess.run(command, cwd=tmp_path / "out", check=True)
+    assert max(map(len, (tmp_path / "out" / "stage.c").read_text().splitlines())) <= 100
+
+
+def test_two_names_that_are_one_in_c_are_refused(tmp_path: Path) -> None:
+    """The memory of `user:droop_table` would have the name of the table of `user:droop`."""
+    other = tmp_path / "other"
+    shutil.copytree(EXAMPLE, other, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ("model.py", "droop.c"):
+        text = (other / file).read_text().replace("user:droop", "user:droop_table")
+        text = text.replace("hystgen_user_droop", "hystgen_user_droop_table")
+        (other / file).write_text(re.sub(r"\n {20,}", "\n    ", text))
+    path = written(tmp_path, DROOP, DROOP.replace("user:droop", "user:droop_table"))
+    with pytest.raises(EffectsError, match="two effects of your own have the name hystgen_user_droop_table_t in C"):
+        emitted_files(hystgen.load(path, [EXAMPLE, other]))
+
+
+def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
+    text = emitted_files(both(tmp_path), operator="both")
+    assert "stage_user_droop_absorb" in text["stage.c"]
+    assert "stage_user_follower_absorb" in text["stage.c"]
+    assert max(map(len, text["stage.c"].splitlines())) <= 100
+
+
+@pytest.mark.parametrize("kind", blocks.KINDS, ids=lambda kind: kind.name)
+def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind) -> None:
+    """Names and order of numbers in the headers of the run time are those that tables are written by."""
+    text = {piece.name: piece.text for piece in runtime._pieces(runtime.CHAIN_TYPES)}
+
+    def members(name: str) -> list[str]:
+        code = re.sub(r"/\*.*?\*/", "", text[name], flags=re.DOTALL)
+        return re.findall(r"(\w+) \*?(\w+);", code.partition("{")[2].rpartition("}")[0])
+
+    rows = [(f"hystgen_{kind.name}_{kind.rows.name}_t", kind.rows.name)] if kind.rows else []
+    counts = list(zip(("uint_least16_t", "uint_least8_t"), kind.counts, strict=False))
+    reals = [("hystgen_real_t", name) for name in kind.table]
+    assert members(f"hystgen_{kind.name}_table_t") == [*rows, *reals, *counts]
+    memory = [("hystgen_real_t", name) for name in kind.state] + [("bool", name) for name in kind.flags]
+    assert members(f"hystgen_{kind.name}_t") == memory
+    if kind.rows:
+        assert [name for _, name in members(rows[0][0])] == list(kind.rows.table)
+        if kind.rows.state:
+            assert [name for _, name in members(f"hystgen_{kind.name}_state_t")] == list(kind.rows.state)
+    functions = {piece.name for piece in runtime._pieces([kind.file])}
+    assert {f"hystgen_{kind.name}_{verb}" for verb in kind.own} <= functions
+
+
+def test_a_block_says_what_it_does_to_signals() -> None:
+    """Against sums over a long record."""
+    (effect,) = load_user_effects(EXAMPLE)
+    one = own.linear(effect.model_validate({"name": "user:droop", "share": 0.05, "time_constant": 0.02}), T)
+    a, b, c = one.forward.a, one.forward.b, one.forward.c
+    powers = [c @ np.linalg.matrix_power(a, k) for k in range(2000)]
+    assert one.forward.before() == pytest.approx(sum(abs(p @ b) for p in powers), rel=1e-9)
+    assert np.all(one.forward.after() >= np.sum(np.abs(powers), axis=0) * (1.0 - 1e-9))
+    assert one.rest == pytest.approx(0.95)
+    assert one.exact
+    with pytest.raises(EffectsError, match="failed in numbers"):
+        own.linear(effect.model_construct(name="user:droop", share=0.05, time_constant=None), T)
+
+
+def test_emit_options_take_it(tmp_path: Path) -> None:
+    one = hystgen.load(written(tmp_path, DROOP), [EXAMPLE])
+    assert emit_options(one).left_out == ()
+    with pytest.raises(UnsupportedEffectsError, match="not in q15"):
+        emit_options(one, arithmetic="q15")
