@@ -170,17 +170,19 @@ def test_no_sequence_of_calls_can_fault(name: str, arithmetic: str, engine: str,
     assert alarms(write(tmp_path, name, arithmetic, engine), machine) == []
 
 
+CLAMP, UNCLAMPED = r"(_clamp_drive\(\w+ v\)\s*\{\s*)[^}]*", r"\1return (two_branches_real_t)v;\n"
+
 # Faults put into the emitted two_branches in q31, and the alarm that has to follow: table entries, limits, a loop, a
 # start; a search that goes too far
 FAULTS = [
     ("loop", ".c", r"(#define TWO_BRANCHES_FRACTION )\d+u", r"\g<1>40u", "signed overflow"),
     ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
     ("loop", ".c", r"(_front_ascending_scale\[\d+\] = \{\s*)\d+", r"\g<1>32", "shift"),
-    ("loop", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*)[^}]*", r"\1return (two_branches_real_t)v;\n", "signed downcast"),
+    ("loop", ".c", CLAMP, UNCLAMPED, "signed downcast"),
     ("loop", ".c", r"return \(two_branches_real_t\)\(code > [^;]*", r"return (two_branches_real_t)code", "downcast"),
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
     ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
-    ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*)[^}]*", r"\1return (two_branches_real_t)v;\n", "signed downcast"),
+    ("corners", ".c", CLAMP, UNCLAMPED, "signed downcast"),
     ("corners", ".c", r"(#define TWO_BRANCHES_HIGH_STEP \(\(int64_t\)1 << )\d+", r"\g<1>37", "signed overflow"),
     ("corners", ".c", r"(middle = \(low \+ left\)) / 2;", r"\1 / 2 + 1u;", "out of bounds"),
 ]
