@@ -3,8 +3,7 @@
 /* Gain that follows the distance travelled, as cubic pieces over it. */
 
 /* The gain after a travel, from the piece that it lies in; behind the last one it stays. */
-static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystgen_real_t travel)
-{
+static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystgen_real_t travel) {
     unsigned int low = 0;
     unsigned int high = t->n;
     while (high - low > 1u) {
@@ -23,8 +22,7 @@ static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystg
 
 /* The travel from the next step on. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
-                                      hystgen_real_t travel)
-{
+                                      hystgen_real_t travel) {
     const hystgen_real_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
     self->high = inside;
     self->low = 0;
@@ -37,8 +35,7 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
 /* A gain in place of that of the travel, from the next step on. Returns whether it had to be
    limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
-                               hystgen_real_t gain)
-{
+                               hystgen_real_t gain) {
     const hystgen_real_t inside = gain < t->least     ? t->least
                                   : gain > t->largest ? t->largest
                                                       : gain;
@@ -50,8 +47,7 @@ static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t
 
 /* The drive has moved by `way`. The reciprocal of the gain follows by Newton's steps. */
 static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
-                                hystgen_real_t way)
-{
+                                hystgen_real_t way) {
     const hystgen_real_t high = self->high;
     hystgen_real_t change = (way >= 0 ? way : -way) + self->low;
     hystgen_real_t next = high + change;
@@ -71,13 +67,11 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
 }
 
 /* The input that gives the output y. */
-static hystgen_real_t hystgen_ageing_solve(const hystgen_ageing_t *self, hystgen_real_t y)
-{
+static hystgen_real_t hystgen_ageing_solve(const hystgen_ageing_t *self, hystgen_real_t y) {
     return y * self->inverse;
 }
 
 /* The output for the input x. */
-static hystgen_real_t hystgen_ageing_absorb(const hystgen_ageing_t *self, hystgen_real_t x)
-{
+static hystgen_real_t hystgen_ageing_absorb(const hystgen_ageing_t *self, hystgen_real_t x) {
     return self->gain * x;
 }

@@ -7,8 +7,7 @@
 #define HYSTGEN_PART_HALF ((int64_t)1 << (HYSTGEN_PART_BITS - 1u))
 
 /* The gain after a travel, from the piece that it lies in; behind the last one it stays. */
-static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t travel)
-{
+static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t travel) {
     unsigned int low = 0;
     unsigned int high = t->n;
     while (high - low > 1u) {
@@ -33,8 +32,7 @@ static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t trav
 
 /* The travel from the next step on. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
-                                      int64_t travel)
-{
+                                      int64_t travel) {
     const int64_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
     self->high = inside;
     self->own = true;
@@ -46,8 +44,7 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
 /* A gain in place of that of the travel, from the next step on. Returns whether it had to be
    limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
-                               hystgen_real_t gain)
-{
+                               hystgen_real_t gain) {
     const int64_t given = (int64_t)gain * ((int64_t)1 << t->bits);
     self->own = false;
     self->gain = hystgen_gain_inside(given);
@@ -57,8 +54,7 @@ static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t
 
 /* The drive has moved by `way`. The reciprocal of the gain follows by Newton's steps. */
 static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
-                                int64_t way)
-{
+                                int64_t way) {
     const int64_t next = self->high + (way >= 0 ? way : -way);
     self->high = next > t->last ? t->last : next;
     if (self->own) {
@@ -76,13 +72,11 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
 }
 
 /* The input that gives the output y. */
-static int64_t hystgen_ageing_solve(const hystgen_ageing_t *self, int64_t y)
-{
+static int64_t hystgen_ageing_solve(const hystgen_ageing_t *self, int64_t y) {
     return hystgen_gain_times(y, self->inverse);
 }
 
 /* The output for the input x. */
-static int64_t hystgen_ageing_absorb(const hystgen_ageing_t *self, int64_t x)
-{
+static int64_t hystgen_ageing_absorb(const hystgen_ageing_t *self, int64_t x) {
     return hystgen_gain_times(x, self->gain);
 }

@@ -29,13 +29,11 @@ static const hystgen_real_t hystgen_atanh_row[8][5] = {
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
 /* The piece of [1, 2) that m lies in, a whole number of 2^24 to [1, 2). */
-static inline unsigned int hystgen_atanh_piece(uint_least32_t m)
-{
+static inline unsigned int hystgen_atanh_piece(uint_least32_t m) {
     return (unsigned int)(m >> 21) & 7u;
 }
 
-HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
-{
+HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x) {
     hystgen_real_t a = x < 0.0f ? -x : x;
     unsigned int step;
     if (a <= 0.5f) {

@@ -49,13 +49,11 @@ static const hystgen_real_t hystgen_atanh_row[8][11] = {
      -0.00031316844998055933, 0.0001451208468374469, -0.00022989476911220504}};
 
 /* The piece of [1, 2) that m lies in, a whole number of 2^53 to [1, 2). */
-static inline unsigned int hystgen_atanh_piece(uint_least64_t m)
-{
+static inline unsigned int hystgen_atanh_piece(uint_least64_t m) {
     return (unsigned int)(m >> 50) & 7u;
 }
 
-HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x)
-{
+HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x) {
     hystgen_real_t a = x < 0.0 ? -x : x;
     unsigned int n;
     unsigned int step;

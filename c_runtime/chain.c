@@ -19,16 +19,14 @@
    or chain_fixed.c. */
 
 /* An offset that is set, kept to what the displacement spans. */
-static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d)
-{
+static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d) {
     return d > HYSTGEN_FARTHEST_OFFSET    ? HYSTGEN_FARTHEST_OFFSET
            : d < -HYSTGEN_FARTHEST_OFFSET ? -HYSTGEN_FARTHEST_OFFSET
                                           : d;
 }
 
 /* The actuator has seen drive v. */
-static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
-{
+static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
     const bool moving = self->moving;
     if (moving) {
         hystgen_forward_travelled(self, v);
@@ -44,8 +42,7 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
 }
 
 /* The actuator has seen drive v. */
-static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
-{
+static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
     const bool moving = self->moving;
     if (moving) {
         hystgen_inverse_travelled(self, v);
@@ -61,8 +58,7 @@ static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
 }
 
 /* What is pending is what the actuator has seen. */
-static void hystgen_inverse_take(hystgen_inverse_t *self)
-{
+static void hystgen_inverse_take(hystgen_inverse_t *self) {
     if (self->has_pending) {
         hystgen_inverse_absorb(self, self->pending);
         self->has_pending = false;
@@ -70,8 +66,7 @@ static void hystgen_inverse_take(hystgen_inverse_t *self)
 }
 
 /* Returns drive v and leaves it pending. */
-static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v)
-{
+static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v) {
     self->answer = v;
     self->pending = v;
     self->has_pending = true;
@@ -80,8 +75,7 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 }
 
 /* What init and reset have in common once the plays are set; they stand for this drive. */
-static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending)
-{
+static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending) {
     self->applied = drive;
     self->drive = hystgen_arriving(hystgen_entered_drive(drive));
     self->ascending = ascending;
@@ -96,8 +90,7 @@ static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
 }
 
 /* What init and reset have in common once the plays are set; they stand for this drive. */
-static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive, bool ascending)
-{
+static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive, bool ascending) {
     self->pending = drive;
     self->answer = drive;
     self->has_pending = false;
@@ -114,36 +107,31 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
     self->output = hystgen_inverse_output_side_rest(self, self->level);
 }
 
-void hystgen_forward_init(hystgen_forward_t *self)
-{
+void hystgen_forward_init(hystgen_forward_t *self) {
     hystgen_forward_settings_init(self);
     hystgen_loop_init(self->play);
     hystgen_forward_begin(self, HYSTGEN_FORWARD_INIT_DRIVE, HYSTGEN_FORWARD_INIT_ASCENDING);
 }
 
-void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
-{
+void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
     hystgen_forward_begin(self, HYSTGEN_FORWARD_RESET_DRIVE, HYSTGEN_FORWARD_RESET_ASCENDING);
     (void)hystgen_forward_step(self, v);
 }
 
-void hystgen_inverse_init(hystgen_inverse_t *self)
-{
+void hystgen_inverse_init(hystgen_inverse_t *self) {
     hystgen_inverse_settings_init(self);
     hystgen_loop_init(self->play);
     hystgen_inverse_begin(self, HYSTGEN_INVERSE_INIT_DRIVE, HYSTGEN_INVERSE_INIT_ASCENDING);
 }
 
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
     hystgen_inverse_begin(self, HYSTGEN_INVERSE_RESET_DRIVE, HYSTGEN_INVERSE_RESET_ASCENDING);
     (void)hystgen_inverse_step(self, u);
 }
 
-void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v)
-{
+void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v) {
     if (!hystgen_finite(v)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
@@ -159,8 +147,7 @@ void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v)
     hystgen_forward_absorb(self, inside);
 }
 
-void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
-{
+void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
     hystgen_inverse_take(self);
     if (!hystgen_finite(v)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -178,8 +165,7 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
 }
 
 /* The offset from the next step on, within its limits. */
-static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d)
-{
+static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d) {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
@@ -191,8 +177,7 @@ static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t
     self->offset = inside;
 }
 
-void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
-{
+void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d) {
     const hystgen_signal_t level = hystgen_entered_level(d);
     hystgen_forward_put_offset(self, level);
     if (hystgen_finite(level)) {
@@ -201,8 +186,7 @@ void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
 }
 
 /* The offset from the next step on, within its limits. */
-static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d)
-{
+static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d) {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
@@ -214,8 +198,7 @@ static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t
     self->offset = inside;
 }
 
-void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
-{
+void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d) {
     const hystgen_signal_t level = hystgen_entered_level(d);
     hystgen_inverse_put_offset(self, level);
     if (hystgen_finite(level)) {
@@ -223,8 +206,7 @@ void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
     }
 }
 
-void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature)
-{
+void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature) {
     if (!hystgen_finite(temperature)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_forward_heat(self, temperature)) {
@@ -232,8 +214,7 @@ void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t tem
     }
 }
 
-void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t temperature)
-{
+void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t temperature) {
     if (!hystgen_finite(temperature)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_inverse_heat(self, temperature)) {
@@ -241,8 +222,7 @@ void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t tem
     }
 }
 
-hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
-{
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (!hystgen_finite(v)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return self->answer;
@@ -262,8 +242,7 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
 }
 
 /* The next reference. Returns what the output side has to give at this sample. */
-static hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_real_t u)
-{
+static hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_real_t u) {
     bool limited = false;
     const hystgen_real_t level = hystgen_inverse_clamp(u);
     if (level < u || level > u) {
@@ -277,8 +256,7 @@ static hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_rea
     return hystgen_inverse_ahead(self, wanted);
 }
 
-void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
     if (hystgen_finite(u)) {
         (void)hystgen_inverse_put(self, u);
     } else {
@@ -287,8 +265,7 @@ void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u)
     }
 }
 
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_take(self);
     if (!hystgen_finite(u)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -316,8 +293,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     return hystgen_inverse_answer(self, inside);
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     if (!hystgen_finite(applied)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
@@ -330,14 +306,13 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->has_pending = true;
 }
 
-hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self)
-{
+hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self) {
     unsigned int status = 0; /* of what is asked beside the steps */
     return hystgen_output_code(hystgen_inverse_displaced(self, self->output), &status);
 }
 
-void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured, hystgen_real_t share)
-{
+void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
+                             hystgen_real_t share) {
     const hystgen_signal_t more =
         hystgen_entered_level(measured) - hystgen_inverse_displaced(self, self->output);
     hystgen_inverse_put_offset(self, self->offset + hystgen_shared(share, more));

@@ -2,18 +2,15 @@
 
 /* Operators of a model with effects: the travel that its gain follows. */
 
-hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self)
-{
+hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self) {
     return self->ageing_1.high;
 }
 
-hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self)
-{
+hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self) {
     return self->ageing_1.high;
 }
 
-void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel)
-{
+void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel) {
     if (!hystgen_finite(travel)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel)) {
@@ -21,8 +18,7 @@ void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel
     }
 }
 
-void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel)
-{
+void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel) {
     if (!hystgen_finite(travel)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel)) {
@@ -30,8 +26,7 @@ void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel
     }
 }
 
-void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain)
-{
+void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain) {
     if (!hystgen_finite(gain)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_ageing_set(&hystgen_ageing_1, &self->ageing_1, gain)) {
@@ -39,8 +34,7 @@ void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain)
     }
 }
 
-void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain)
-{
+void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain) {
     if (!hystgen_finite(gain)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_ageing_set(&hystgen_ageing_1, &self->ageing_1, gain)) {

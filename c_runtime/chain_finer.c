@@ -6,8 +6,7 @@
 /* Input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS bits below w, which is the
    nearest: what is left of h there, over the slope. */
 static hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self, hystgen_signal_t h,
-                                              hystgen_reach_t w, hystgen_reach_t a)
-{
+                                              hystgen_reach_t w, hystgen_reach_t a) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     const hystgen_signal_t whole = (hystgen_signal_t)a * ((int64_t)1 << HYSTGEN_ARRIVING_BITS);
     hystgen_sum_t left = h;

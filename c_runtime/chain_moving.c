@@ -5,8 +5,7 @@
 
 /* What the plays give once their input has gone to w. It rises with w. */
 static hystgen_real_t hystgen_moved_sum(const hystgen_real_t *play, const hystgen_real_t *bent,
-                                        hystgen_real_t w)
-{
+                                        hystgen_real_t w) {
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -19,8 +18,7 @@ static hystgen_real_t hystgen_moved_sum(const hystgen_real_t *play, const hystge
 
 /* The plays follow their input w. Returns their sum. */
 static hystgen_real_t hystgen_moved_follow(hystgen_real_t *play, hystgen_real_t *bent,
-                                           hystgen_real_t w)
-{
+                                           hystgen_real_t w) {
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -38,8 +36,7 @@ static hystgen_real_t hystgen_moved_follow(hystgen_real_t *play, hystgen_real_t 
 
 /* The plays as they are set, at rest with their input at w. Returns their sum. */
 static hystgen_real_t hystgen_moved_rest(hystgen_real_t *play, hystgen_real_t *bent,
-                                         hystgen_real_t w)
-{
+                                         hystgen_real_t w) {
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -55,22 +52,19 @@ static hystgen_real_t hystgen_moved_rest(hystgen_real_t *play, hystgen_real_t *b
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_real_t w) {
     return self->moving ? hystgen_moved_follow(self->play, self->bent, w)
                         : hystgen_moved_rest(self->play, self->bent, w);
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_real_t w) {
     return self->moving ? hystgen_moved_follow(self->play, self->bent, w)
                         : hystgen_moved_rest(self->play, self->bent, w);
 }
 
 /* What rest at an input w gives, for plays as they are. */
-static hystgen_real_t hystgen_resting_sum(const hystgen_real_t *play, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_resting_sum(const hystgen_real_t *play, hystgen_real_t w) {
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -83,27 +77,23 @@ static hystgen_real_t hystgen_resting_sum(const hystgen_real_t *play, hystgen_re
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_forward_started(hystgen_forward_t *self)
-{
+static hystgen_real_t hystgen_forward_started(hystgen_forward_t *self) {
     return hystgen_moved_rest(self->play, self->bent, self->play[0]);
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_inverse_started(hystgen_inverse_t *self)
-{
+static hystgen_real_t hystgen_inverse_started(hystgen_inverse_t *self) {
     return hystgen_moved_rest(self->play, self->bent, self->play[0]);
 }
 
 /* What the plays give with their input at w. */
-static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_real_t w) {
     return self->moving ? hystgen_moved_sum(self->play, self->bent, w)
                         : hystgen_resting_sum(self->play, w);
 }
 
 /* Input of the plays at which their sum is h, by halves between where it is and the farthest. */
-static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_real_t h)
-{
+static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_real_t h) {
     const hystgen_real_t here = self->play[0];
     const hystgen_real_t sum = hystgen_inverse_sum(self, here);
     hystgen_real_t low = sum < h ? here : HYSTGEN_LEAST_INPUT;

@@ -6,14 +6,12 @@
    begins or ends inside a step, it does so at the first touch. */
 
 /* The part of x beyond +-r. */
-static hystgen_real_t hystgen_stretch(hystgen_real_t x, hystgen_real_t r)
-{
+static hystgen_real_t hystgen_stretch(hystgen_real_t x, hystgen_real_t r) {
     return x > r ? x - r : x < -r ? x + r : 0;
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real_t w) {
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -28,8 +26,7 @@ static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real
 
 /* Input of the plays at which their sum is h: of none at first, then of those that are stretched on
    the way there, one after the other. They come in the order of their thresholds. */
-static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen_real_t h)
-{
+static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen_real_t h) {
     hystgen_real_t rest = 0;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
@@ -54,8 +51,7 @@ static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_real_t w) {
     if (self->moving) {
         return hystgen_relaxing_follow(self->play, w);
     }
@@ -64,8 +60,7 @@ static hystgen_real_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_re
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_real_t w) {
     if (self->moving) {
         return hystgen_relaxing_follow(self->play, w);
     }
@@ -74,20 +69,17 @@ static hystgen_real_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_re
 }
 
 /* Input of the plays at which their sum is h. */
-static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_real_t h)
-{
+static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_real_t h) {
     return self->moving ? hystgen_relaxing_input(self->play, h)
                         : hystgen_loop_solve(&hystgen_model_tables, self->play, h);
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_forward_started(const hystgen_forward_t *self)
-{
+static hystgen_real_t hystgen_forward_started(const hystgen_forward_t *self) {
     return hystgen_loop_output(&hystgen_model_tables, self->play);
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_inverse_started(const hystgen_inverse_t *self)
-{
+static hystgen_real_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return hystgen_loop_output(&hystgen_model_tables, self->play);
 }

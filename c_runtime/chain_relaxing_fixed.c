@@ -6,14 +6,12 @@
    stays. */
 
 /* A share of the part of x beyond +-r. */
-static int64_t hystgen_stretched(int64_t x, int32_t r, const hystgen_factor_t *share)
-{
+static int64_t hystgen_stretched(int64_t x, int32_t r, const hystgen_factor_t *share) {
     return hystgen_times(x > r ? x - r : x < -(int64_t)r ? x + r : 0, share);
 }
 
 /* Where play i rests, as near to the one before as their thresholds are: rounding must not pass. */
-static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest)
-{
+static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     if (i > 1u) {
         const int64_t room = (int64_t)t->threshold[i] - t->threshold[i - 1u];
@@ -25,8 +23,7 @@ static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i,
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w)
-{
+static hystgen_signal_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     hystgen_sum_t sum = (hystgen_sum_t)t->weight[0] * w;
     unsigned int i;
@@ -42,22 +39,19 @@ static hystgen_signal_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_pl
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self)
-{
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
     return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
                            HYSTGEN_LEVEL_DROP);
 }
 
 /* Sum of the plays as they are set. */
-static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self)
-{
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
                            HYSTGEN_LEVEL_DROP);
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w)
-{
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
     if (self->moving) {
         return hystgen_relaxing_follow(self->play, w);
     }
@@ -66,8 +60,7 @@ static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w)
-{
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
     if (self->moving) {
         return hystgen_relaxing_follow(self->play, w);
     }
@@ -77,8 +70,7 @@ static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_
 
 /* Input of the plays at which their sum is h. Of viscous plays none is stretched with their input
    where play 1 rests; from there on they are solved for like others, with smaller slopes. */
-static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h)
-{
+static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
     const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
                                     : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
                                                                  : h;

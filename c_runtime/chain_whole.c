@@ -4,8 +4,7 @@
 
 static inline hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self,
                                                      hystgen_signal_t h, hystgen_reach_t w,
-                                                     hystgen_reach_t a)
-{
+                                                     hystgen_reach_t a) {
     (void)self;
     (void)h;
     (void)w;

@@ -3,15 +3,13 @@
 /* Drift over the time since the clock was set, counted in samples. A number of 24 bits counts them
    exactly up to `carry`, 2^24; the other one, in these. */
 
-static void hystgen_clock_start(hystgen_clock_t *self)
-{
+static void hystgen_clock_start(hystgen_clock_t *self) {
     self->high = 0;
     self->low = 0;
 }
 
 /* One sample later. */
-static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self)
-{
+static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
     const hystgen_real_t next = self->low + 1;
     const bool full = next >= t->carry;
     self->low = full ? 0 : next;
@@ -20,8 +18,7 @@ static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *
 
 /* The drift so many samples ahead of the clock, at most as large as `farthest`. */
 static hystgen_real_t hystgen_clock_drift(const hystgen_clock_table_t *t,
-                                          const hystgen_clock_t *self, hystgen_real_t ahead)
-{
+                                          const hystgen_clock_t *self, hystgen_real_t ahead) {
     const hystgen_real_t time = self->high * t->block + (self->low + ahead) * t->sample;
     const hystgen_real_t drift = (t->rate + t->half_change * time) * time;
     return drift > t->farthest ? t->farthest : drift < -t->farthest ? -t->farthest : drift;

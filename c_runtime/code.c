@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Output code of a sum. */
-static hystgen_real_t hystgen_code(hystgen_sum_t sum, unsigned int *status)
-{
+static hystgen_real_t hystgen_code(hystgen_sum_t sum, unsigned int *status) {
     const hystgen_sum_t code = hystgen_nearest(sum, HYSTGEN_FRACTION);
     (void)status;
     return (hystgen_real_t)(code > HYSTGEN_CODE_MAX    ? HYSTGEN_CODE_MAX

@@ -3,13 +3,11 @@
 #define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's output, in sums */
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
-static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x)
-{
+static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x) {
     return here->rising ? x : -x;
 }
 
-HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t *corner)
-{
+HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t *corner) {
     hystgen_corner_t *c = &corner[here->depth];
     c->high = (int32_t)(here->output >> HYSTGEN_LOW_BITS);
     c->low = (hystgen_low_t)here->output;
@@ -21,8 +19,7 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
 
 /* Where the play of a segment of a corner's block begins to follow, as the move sees it. */
 static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
-                                     const hystgen_segment_t *s, bool by_output)
-{
+                                     const hystgen_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * HYSTGEN_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     return hystgen_along(here, by_output ? output : c->input) +
@@ -30,8 +27,7 @@ static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_
 }
 
 /* A corner stays where plays have followed. */
-HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *corner)
-{
+HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *corner) {
     if (here->k > 0) {
         hystgen_leave_corner(here, corner);
         here->k = 0;
@@ -42,8 +38,7 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
 /* The last place where another play begins to follow before the output, or input, `to`; or here. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
                                 const hystgen_corner_t *corner, int64_t to, bool by_output,
-                                hystgen_kink_t *kink)
-{
+                                hystgen_kink_t *kink) {
     const hystgen_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
@@ -85,8 +80,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
 
 /* The same for any move to an input; turns, moves nothing. */
 static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
-                                      hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink)
-{
+                                      hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
     }
@@ -95,8 +89,7 @@ static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t 
 
 /* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
-                          int64_t moved)
-{
+                          int64_t moved) {
     here->output = hystgen_along(here, kink->output + moved);
     here->input = to;
     here->k = kink->k;
@@ -105,8 +98,7 @@ static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int
 
 /* Output that is gained from a kink on until the input comes to `to`, which may lie before it. */
 HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                     const hystgen_kink_t *kink, int32_t to)
-{
+                                     const hystgen_kink_t *kink, int32_t to) {
     const int64_t way = hystgen_along(here, to) - kink->input;
     return way < 0 ? -1 : (int64_t)hystgen_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
@@ -114,16 +106,14 @@ HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_pla
 /* Moves the plays to any input. */
 HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here,
                                           hystgen_corner_t *corner, hystgen_kink_t *kink,
-                                          int32_t to)
-{
+                                          int32_t to) {
     hystgen_find_input(t, here, corner, to, kink);
     hystgen_go_on(here, kink, to, hystgen_gained(t, here, kink, to));
 }
 
 /* Input at which another play begins to follow the present move, or the last one there is. */
 static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                  const hystgen_corner_t *corner)
-{
+                                  const hystgen_corner_t *corner) {
     int64_t x = HYSTGEN_LARGEST;
     if (here->depth > 0) {
         const int64_t begins =
@@ -136,8 +126,7 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
 /* The sum of the plays for the next input; `next` is where another one begins to follow. */
 HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here,
                                        hystgen_corner_t *corner, hystgen_kink_t *kink,
-                                       int32_t *next, int32_t to)
-{
+                                       int32_t *next, int32_t to) {
     if (here->rising ? to > here->input && to < *next : to < here->input && to > *next) {
         /* the same plays follow */
         const uint32_t way = here->rising ? (uint32_t)to - (uint32_t)here->input
@@ -154,8 +143,7 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
 
 /* The input, near the range, that gives an output behind a kink, `to` as the move sees it. */
 HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                     const hystgen_kink_t *kink, int64_t to)
-{
+                                     const hystgen_kink_t *kink, int64_t to) {
     const hystgen_segment_t *s = &t->segment[kink->k];
     const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
     const int64_t most = t->range[here->rising];
@@ -166,8 +154,7 @@ HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_pla
    moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, int64_t output, int64_t next,
-                                  hystgen_kink_t *kink)
-{
+                                  hystgen_kink_t *kink) {
     if (here->rising ? output < here->output : output > here->output) {
         hystgen_turn_back(here, corner);
         next = -HYSTGEN_FAR;
@@ -186,8 +173,7 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
 
 /* Output, as the present move sees it, at which another play begins to follow behind a kink. */
 static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                   const hystgen_corner_t *corner, const hystgen_kink_t *kink)
-{
+                                   const hystgen_corner_t *corner, const hystgen_kink_t *kink) {
     return kink->depth > 0
                ? hystgen_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
                : HYSTGEN_FAR;
@@ -197,8 +183,7 @@ static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place
    the move sees it, at which another one begins to follow. */
 HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here,
                                              hystgen_corner_t *corner, hystgen_kink_t *kink,
-                                             int32_t to)
-{
+                                             int32_t to) {
     int64_t next = hystgen_next_output(t, here, corner, kink);
     int64_t moved = hystgen_gained(t, here, kink, to);
     if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
@@ -213,8 +198,8 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
 /* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
    left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
-                                  hystgen_corner_t *corner, const int32_t *play, unsigned int step)
-{
+                                  hystgen_corner_t *corner, const int32_t *play,
+                                  unsigned int step) {
     int64_t aside = t->offset; /* what the plays above play k give */
     unsigned int k;
     here->depth = 0;

@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
-static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x)
-{
+static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x) {
 #ifdef HYSTGEN_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
@@ -11,8 +10,7 @@ static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_rea
 }
 
 /* There is no line to go on along: the next sample searches. */
-HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m)
-{
+HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
     m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
@@ -21,8 +19,7 @@ HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m)
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
 HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                        hystgen_corner_t *corner)
-{
+                                        hystgen_corner_t *corner) {
     const hystgen_segment_t *s = &t->segment[m->here.k];
     const hystgen_real_t room = t->limit[!m->here.rising] + hystgen_along(m, m->here.output);
     hystgen_corner_t *c = &corner[m->here.depth];
@@ -36,8 +33,7 @@ HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_
 }
 
 static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
-                              hystgen_corner_t *corner)
-{
+                              hystgen_corner_t *corner) {
     if (m->here.k > 0) {
         hystgen_leave_corner(t, m, corner);
         m->here.k = 0;
@@ -49,11 +45,11 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
 
 /* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
-                                         unsigned int last, hystgen_real_t x)
-{
+                                         unsigned int last, hystgen_real_t x) {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const bool before = x > step[4u * middle];
+        const unsigned int at = 4u * middle;
+        const bool before = x > step[at];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -63,8 +59,7 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
 /* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
-                                          hystgen_real_t input)
-{
+                                          hystgen_real_t input) {
     const hystgen_corner_t *c = &corner[m->here.depth - 1u];
     hystgen_real_t reach = hystgen_along(m, output - c->output);
     hystgen_real_t x = c->pass[m->here.rising];
@@ -83,8 +78,7 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
 
 /* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
 HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                           hystgen_corner_t *corner, hystgen_real_t output)
-{
+                                           hystgen_corner_t *corner, hystgen_real_t output) {
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
         hystgen_turn_back(t, m, corner);
     }
@@ -104,8 +98,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
 
 /* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                          hystgen_corner_t *corner, hystgen_real_t input)
-{
+                                          hystgen_corner_t *corner, hystgen_real_t input) {
     if (hystgen_along(m, input) < hystgen_along(m, m->here.input)) {
         hystgen_turn_back(t, m, corner);
     }
@@ -171,8 +164,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
 
 /* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
 HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                          hystgen_real_t input)
-{
+                                          hystgen_real_t input) {
     const hystgen_real_t way = hystgen_along(m, input - m->from);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
@@ -197,8 +189,7 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 
 /* The sum of the plays for the next input; a NaN moves nothing. */
 HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                              hystgen_corner_t *corner, hystgen_real_t input)
-{
+                                              hystgen_corner_t *corner, hystgen_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
     if (on ? (m->here.rising ? input < m->next : input > m->next)
            : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
@@ -218,8 +209,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
 
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
-                                  hystgen_corner_t *corner, const hystgen_start_t *start)
-{
+                                  hystgen_corner_t *corner, const hystgen_start_t *start) {
     unsigned int k;
     corner[0] = start->bottom;
     m->here.depth = 1;

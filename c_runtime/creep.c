@@ -5,8 +5,7 @@
 
 /* Everything has settled at the input x. Returns the output. */
 static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                         hystgen_creep_state_t *state, hystgen_real_t x)
-{
+                                         hystgen_creep_state_t *state, hystgen_real_t x) {
     hystgen_real_t ahead = 0;
     unsigned int i;
     for (i = 0; i < t->n; ++i) {
@@ -22,22 +21,19 @@ static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen
 }
 
 /* The input that gives the output y once everything has settled. */
-static hystgen_real_t hystgen_creep_resting(const hystgen_creep_table_t *t, hystgen_real_t y)
-{
+static hystgen_real_t hystgen_creep_resting(const hystgen_creep_table_t *t, hystgen_real_t y) {
     return y * t->inverse_rest;
 }
 
 /* The input that gives the output y at this sample. */
 static hystgen_real_t hystgen_creep_solve(const hystgen_creep_table_t *t,
-                                          const hystgen_creep_t *self, hystgen_real_t y)
-{
+                                          const hystgen_creep_t *self, hystgen_real_t y) {
     return (y - self->ahead) * t->inverse_slope;
 }
 
 /* The input is x at this sample. Returns the output. */
 static hystgen_real_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                           hystgen_creep_state_t *state, hystgen_real_t x)
-{
+                                           hystgen_creep_state_t *state, hystgen_real_t x) {
     const hystgen_real_t y = self->ahead + t->slope * x;
     const hystgen_real_t before = self->before;
     hystgen_real_t ahead = 0;

@@ -6,8 +6,7 @@
 
 /* Everything has settled at the input x. Returns the output. */
 static int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                  hystgen_creep_state_t *state, int64_t x)
-{
+                                  hystgen_creep_state_t *state, int64_t x) {
     int64_t sum = 0;
     unsigned int i;
     for (i = 0; i < t->n; ++i) {
@@ -20,22 +19,19 @@ static int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_
 }
 
 /* The input that gives the output y once everything has settled. */
-static int64_t hystgen_creep_resting(const hystgen_creep_table_t *t, int64_t y)
-{
+static int64_t hystgen_creep_resting(const hystgen_creep_table_t *t, int64_t y) {
     return hystgen_times(y, &t->inverse_rest);
 }
 
 /* The input that gives the output y at this sample. */
 static int64_t hystgen_creep_solve(const hystgen_creep_table_t *t, const hystgen_creep_t *self,
-                                   int64_t y)
-{
+                                   int64_t y) {
     return self->before + hystgen_times(y - self->ahead, &t->inverse_slope);
 }
 
 /* The input is x at this sample. Returns the output. */
 static int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                    hystgen_creep_state_t *state, int64_t x)
-{
+                                    hystgen_creep_state_t *state, int64_t x) {
     const int64_t change = x - self->before;
     const int64_t direct = hystgen_times(x, &t->direct);
     int64_t sum = 0;

@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* x / 2^bits to the nearest whole number, ties away from zero. */
-HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits)
-{
+HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
     if (bits == 0) {
         return x;
     }
@@ -14,8 +13,7 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits)
    coefficients from degree 0. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
-                                  unsigned int degree, int32_t x)
-{
+                                  unsigned int degree, int32_t x) {
     unsigned int low = 0;
     unsigned int high = pieces - 1u;
     int64_t y = 0;
@@ -42,8 +40,7 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
 /* Drive code for an input w of the plays that the drive range does not give: its end, and one code
    more where that is not just rounding; tells whether w is more than an envelope can give. */
 HYSTGEN_API hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w,
-                                           int32_t drive_min, int32_t drive_max, bool *limited)
-{
+                                           int32_t drive_min, int32_t drive_max, bool *limited) {
     if (w > e->last) {
         *limited = w > e->most && w > e->envelope_most;
         return (hystgen_reach_t)drive_max + (w > e->most ? 1 : 0);

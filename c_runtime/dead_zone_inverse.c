@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
 /* Finds the straight piece that y lies on and follows it. */
-HYSTGEN_API hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z, hystgen_real_t y)
-{
+HYSTGEN_API hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z,
+                                                     hystgen_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;
     while (low < high) {

@@ -3,8 +3,7 @@
 /* (atanh((y - a3) / a0) - a2) / a1; an argument that no x can reach is limited, and `limited` set.
  */
 HYSTGEN_API hystgen_real_t hystgen_envelope_inverse(const hystgen_envelope_t *e, hystgen_real_t y,
-                                                    bool *limited)
-{
+                                                    bool *limited) {
     hystgen_real_t argument = (y - e->a3) * e->inverse_a0;
     if (argument > e->limit) {
         argument = e->limit;

@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* One sample. */
-hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
-{
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (!(v >= HYSTGEN_DRIVE_MIN && v <= HYSTGEN_DRIVE_MAX)) {
         if (!(v >= -HYSTGEN_REAL_MAX && v <= HYSTGEN_REAL_MAX)) {
             self->status |= HYSTGEN_STATUS_HELD;
@@ -15,19 +14,16 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
            HYSTGEN_OFFSET;
 }
 
-static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start)
-{
+static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start) {
     hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, start);
     self->status = 0;
 }
 
-void hystgen_forward_init(hystgen_forward_t *self)
-{
+void hystgen_forward_init(hystgen_forward_t *self) {
     hystgen_forward_begin(self, &hystgen_forward_start[0]);
 }
 
-void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
-{
+void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_forward_begin(self, &hystgen_forward_start[1]);
     (void)hystgen_forward_step(self, v);
 }

@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Input of the plays: w = G[v]. */
-HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending)
-{
+HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending) {
     (void)ascending;
     return (hystgen_play_t)hystgen_curve(hystgen_front_knot, hystgen_front_scale,
                                          hystgen_front_coefficient, HYSTGEN_FRONT_PIECES,
@@ -11,8 +10,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
 
 /* v = G^-1[w]; `limited` tells whether no drive at all gives w. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
-                                                    bool *limited)
-{
+                                                    bool *limited) {
     const hystgen_ends_t *ends = &hystgen_back_ends;
     int64_t v;
     (void)ascending;

@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
-HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending)
-{
+HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending) {
     if (ascending) {
         return (hystgen_play_t)hystgen_curve(
             hystgen_front_ascending_knot, hystgen_front_ascending_scale,
@@ -15,8 +14,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
 
 /* v = G^-1[w] on one branch; `limited` tells whether no drive at all gives w on it. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
-                                                    bool *limited)
-{
+                                                    bool *limited) {
     const hystgen_ends_t *ends =
         ascending ? &hystgen_back_ascending_ends : &hystgen_back_descending_ends;
     int64_t v;

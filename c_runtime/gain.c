@@ -2,8 +2,7 @@
 
 /* Gain and offset behind the plays, set from outside. */
 
-static void hystgen_gain_init(hystgen_gain_t *self)
-{
+static void hystgen_gain_init(hystgen_gain_t *self) {
     self->gain = 1;
     self->inverse = 1;
     self->offset = 0;
@@ -11,8 +10,7 @@ static void hystgen_gain_init(hystgen_gain_t *self)
 
 /* The gain from the next step on. Returns whether it had to be limited. */
 static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self,
-                             hystgen_real_t gain)
-{
+                             hystgen_real_t gain) {
     const hystgen_real_t inside = gain < t->least     ? t->least
                                   : gain > t->largest ? t->largest
                                                       : gain;
@@ -23,8 +21,7 @@ static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self
 
 /* Gain and offset of a temperature from the next step on. Returns whether it had to be limited. */
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
-                              hystgen_real_t temperature)
-{
+                              hystgen_real_t temperature) {
     const hystgen_real_t inside = temperature < t->coldest   ? t->coldest
                                   : temperature > t->hottest ? t->hottest
                                                              : temperature;
@@ -35,13 +32,11 @@ static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *sel
 }
 
 /* The input that gives the output y. */
-static hystgen_real_t hystgen_gain_solve(const hystgen_gain_t *self, hystgen_real_t y)
-{
+static hystgen_real_t hystgen_gain_solve(const hystgen_gain_t *self, hystgen_real_t y) {
     return (y - self->offset) * self->inverse;
 }
 
 /* The output for the input x. */
-static hystgen_real_t hystgen_gain_absorb(const hystgen_gain_t *self, hystgen_real_t x)
-{
+static hystgen_real_t hystgen_gain_absorb(const hystgen_gain_t *self, hystgen_real_t x) {
     return self->gain * x + self->offset;
 }

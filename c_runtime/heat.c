@@ -2,8 +2,7 @@
 
 /* Gain and offset of the actuator's own heat, from the drives that were applied. */
 
-static void hystgen_heat_init(hystgen_heat_t *self)
-{
+static void hystgen_heat_init(hystgen_heat_t *self) {
     self->high = 0;
     self->low = 0;
     self->gain = 1;
@@ -13,8 +12,7 @@ static void hystgen_heat_init(hystgen_heat_t *self)
 
 /* The drive has moved to v, from `before`. The reciprocal of the gain follows by Newton's steps. */
 static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
-                              hystgen_real_t before, hystgen_real_t v)
-{
+                              hystgen_real_t before, hystgen_real_t v) {
     const hystgen_real_t way =
         (v >= 0 ? v * v : -(v * v)) - (before >= 0 ? before * before : -(before * before));
     const hystgen_real_t high = self->high;
@@ -33,13 +31,11 @@ static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *sel
 }
 
 /* The input that gives the output y. */
-static hystgen_real_t hystgen_heat_solve(const hystgen_heat_t *self, hystgen_real_t y)
-{
+static hystgen_real_t hystgen_heat_solve(const hystgen_heat_t *self, hystgen_real_t y) {
     return (y - self->offset) * self->inverse;
 }
 
 /* The output for the input x. */
-static hystgen_real_t hystgen_heat_absorb(const hystgen_heat_t *self, hystgen_real_t x)
-{
+static hystgen_real_t hystgen_heat_absorb(const hystgen_heat_t *self, hystgen_real_t x) {
     return self->gain * x + self->offset;
 }

@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Any other sample than a usual one. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u)
-{
+HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     const hystgen_curve_t *t = &hystgen_inverse_curve;
     hystgen_plays_t *m = &self->plays;
     hystgen_real_t x = u - HYSTGEN_OFFSET;
@@ -42,8 +41,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
    no       yes        the committed drive  the committed drive  the committed drive
    yes      no         the last answer      the last answer      the last answer
    yes      yes        the committed drive  the committed drive  the last answer, `returned` */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
     const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
@@ -66,8 +64,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     return hystgen_inverse_search(self, u);
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t v = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
     if (!(applied >= -HYSTGEN_REAL_MAX && applied <= HYSTGEN_REAL_MAX)) {
@@ -91,8 +88,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
     self->before = m->here.input;
 }
 
-HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start)
-{
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start) {
     hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
     hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner,
                            hystgen_clamp_drive(self->plays.here.output));
@@ -103,13 +99,11 @@ HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_
     self->status = 0;
 }
 
-void hystgen_inverse_init(hystgen_inverse_t *self)
-{
+void hystgen_inverse_init(hystgen_inverse_t *self) {
     hystgen_inverse_begin(self, &hystgen_inverse_start[0]);
 }
 
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_begin(self, &hystgen_inverse_start[1]);
     (void)hystgen_inverse_step(self, u);
 }

@@ -1,21 +1,18 @@
 #include "hystgen_runtime.h"
 
 /* A reference as the present move sees it; ~u is -u - 1, which overflows for no code. */
-static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_t u)
-{
+static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_t u) {
     return self->here.rising ? u : ~u;
 }
 
 /* No step is usual until another search; the next one begins here. */
-static void hystgen_inverse_stay(hystgen_inverse_t *self)
-{
+static void hystgen_inverse_stay(hystgen_inverse_t *self) {
     self->next = -HYSTGEN_LARGEST - 1;
     self->usual = false;
 }
 
 /* Steps are usual to the next kink or limit, less rounding, but not before the least reference. */
-HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next)
-{
+HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next) {
     const hystgen_place_t *here = &self->here;
     const int32_t most =
         hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
@@ -33,8 +30,7 @@ HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t n
 }
 
 /* Any other sample than a usual one. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u)
-{
+HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     self->undo = self->here;
     self->usual = false;
     if (!self->repeat || u != self->reference) {
@@ -69,8 +65,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_place_t *here = &self->here;
     const int64_t output = (int64_t)u * ((int64_t)1 << HYSTGEN_FRACTION);
     const int64_t on = here->rising ? output - here->output : here->output - output;
@@ -94,8 +89,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     return hystgen_inverse_search(self, u);
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     const hystgen_real_t v = hystgen_clamp_drive(applied);
     if (v != applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
@@ -113,8 +107,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
                           hystgen_front_forward(v));
 }
 
-static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step)
-{
+static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step) {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
     self->undo = self->here;
     hystgen_inverse_stay(self);
@@ -125,13 +118,11 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, 
     self->status = 0;
 }
 
-void hystgen_inverse_init(hystgen_inverse_t *self)
-{
+void hystgen_inverse_init(hystgen_inverse_t *self) {
     hystgen_inverse_begin(self, hystgen_model_start, HYSTGEN_START_STEP);
 }
 
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_begin(self, hystgen_model_zero, 0);
     (void)hystgen_inverse_step(self, u);
 }

@@ -1,23 +1,20 @@
 #include "hystgen_runtime.h"
 
 /* The next step begins here. */
-static void hystgen_inverse_keep(hystgen_inverse_t *self)
-{
+static void hystgen_inverse_keep(hystgen_inverse_t *self) {
     self->undo = self->plays.here;
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
 /* The actuator is at drive v; the direction is that of its move. */
-static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
-{
+static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
 }
 
 /* The actuator has gone to v in place of where the last step led. */
-HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v)
-{
+HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v) {
     self->plays.here = self->undo;
     hystgen_forget_line(&self->plays);
     self->drive = self->undo_drive;
@@ -30,8 +27,7 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
 }
 
 /* A sample that is no number: the last answer once more. */
-static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self)
-{
+static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
     hystgen_inverse_keep(self);
     hystgen_inverse_replace(self, self->stepped && self->committed ? self->returned : self->drive);
     self->stepped = true;
@@ -48,8 +44,7 @@ static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self)
    no       yes        the committed drive  the committed drive  the committed drive
    yes      no         the last answer      the last answer      the last answer
    yes      yes        the committed drive  the committed drive  the last answer, `returned` */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
         return hystgen_inverse_hold(self);
     }
@@ -82,8 +77,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     return self->drive;
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     const hystgen_real_t v = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
     if (!(applied >= -HYSTGEN_REAL_MAX && applied <= HYSTGEN_REAL_MAX)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -101,8 +95,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
 }
 
 HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start,
-                                         const hystgen_drive_t *first)
-{
+                                         const hystgen_drive_t *first) {
     hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
     self->level = self->plays.here.input + HYSTGEN_OFFSET;
     hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, first->w);
@@ -118,13 +111,11 @@ HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_
     self->status = 0;
 }
 
-void hystgen_inverse_init(hystgen_inverse_t *self)
-{
+void hystgen_inverse_init(hystgen_inverse_t *self) {
     hystgen_inverse_begin(self, &hystgen_inverse_start[0], &hystgen_inverse_drive[0]);
 }
 
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_begin(self, &hystgen_inverse_start[1], &hystgen_inverse_drive[1]);
     (void)hystgen_inverse_step(self, u);
 }

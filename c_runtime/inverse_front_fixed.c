@@ -1,16 +1,14 @@
 #include "hystgen_runtime.h"
 
 /* The next step begins here. */
-static void hystgen_inverse_keep(hystgen_inverse_t *self)
-{
+static void hystgen_inverse_keep(hystgen_inverse_t *self) {
     self->undo = self->here;
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
 /* The actuator is at drive v; the direction is that of its move. Returns the input of the plays. */
-HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
-{
+HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return hystgen_front_forward(v, self->ascending);
@@ -23,8 +21,7 @@ HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_re
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_keep(self);
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
@@ -52,8 +49,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     return self->drive;
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     const hystgen_real_t v = hystgen_clamp_drive(applied);
     if (v != applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
@@ -68,8 +64,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
 }
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step,
-                                  const hystgen_drive_t *first)
-{
+                                  const hystgen_drive_t *first) {
     unsigned int status = 0; /* of what no step has answered */
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
     self->drive = (hystgen_real_t)first->drive;
@@ -83,13 +78,11 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, 
     self->status = 0;
 }
 
-void hystgen_inverse_init(hystgen_inverse_t *self)
-{
+void hystgen_inverse_init(hystgen_inverse_t *self) {
     hystgen_inverse_begin(self, hystgen_model_start, HYSTGEN_START_STEP, &hystgen_inverse_drive[0]);
 }
 
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_begin(self, hystgen_model_zero, 0, &hystgen_inverse_drive[1]);
     (void)hystgen_inverse_step(self, u);
 }

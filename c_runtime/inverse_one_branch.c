@@ -4,8 +4,7 @@
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_signal_t level,
                                                                       hystgen_reach_t w,
-                                                                      bool *limited)
-{
+                                                                      bool *limited) {
     (void)self;
     (void)level;
     return hystgen_front_inverse(w, true, limited);

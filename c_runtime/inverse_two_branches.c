@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Whether going to v is a move of the branch that v was computed on. */
-static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending)
-{
+static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending) {
     const hystgen_fine_t inside = hystgen_clamp_fine(v);
     return inside > self->drive   ? ascending
            : inside < self->drive ? !ascending
@@ -15,8 +14,7 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_signal_t level,
                                                                       hystgen_reach_t w,
-                                                                      bool *limited)
-{
+                                                                      bool *limited) {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
     hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
     if (!hystgen_inverse_fits(self, v, up)) {

@@ -5,8 +5,7 @@
    step, so that x is led to the output asked for and theta of its step beyond: exact on ramps. */
 
 /* Everything has settled at the input v. Returns the output. */
-static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v)
-{
+static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v) {
     self->high = v;
     self->low = 0;
     self->wanted = v;
@@ -17,8 +16,7 @@ static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v)
 
 /* The input that leads to the output y at this sample. */
 static hystgen_real_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self,
-                                        hystgen_real_t y)
-{
+                                        hystgen_real_t y) {
     const hystgen_real_t goal = y + t->theta * (y - self->wanted);
     self->asked = y;
     self->answer = self->high + (goal - self->high) * t->inverse_rate;
@@ -27,8 +25,7 @@ static hystgen_real_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_la
 
 /* The input is v at this sample. Returns the output. */
 static hystgen_real_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self,
-                                         hystgen_real_t v)
-{
+                                         hystgen_real_t v) {
     const hystgen_real_t high = self->high;
     const hystgen_real_t change = t->rate * (v - high) + self->low;
     const hystgen_real_t next = high + change;

@@ -6,14 +6,12 @@
 
 /* A number in units of the states times a factor. */
 static int64_t hystgen_lag_scaled(const hystgen_lag_table_t *t, int64_t x,
-                                  const hystgen_factor_t *f)
-{
+                                  const hystgen_factor_t *f) {
     return hystgen_times(x >> t->drop, f);
 }
 
 /* Everything has settled at the input v. Returns the output. */
-static int64_t hystgen_lag_rest(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t v)
-{
+static int64_t hystgen_lag_rest(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t v) {
     self->high = v * ((int64_t)1 << t->bits);
     self->wanted = self->high;
     self->asked = self->high;
@@ -22,8 +20,7 @@ static int64_t hystgen_lag_rest(const hystgen_lag_table_t *t, hystgen_lag_t *sel
 }
 
 /* The input that leads to the output y at this sample. */
-static int64_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t y)
-{
+static int64_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t y) {
     const int64_t asked = y * ((int64_t)1 << t->bits);
     self->lead = asked + hystgen_lag_scaled(t, asked - self->wanted, &t->theta) - self->high;
     self->asked = asked;
@@ -32,8 +29,7 @@ static int64_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *se
 }
 
 /* The input is v at this sample. Returns the output. */
-static int64_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t v)
-{
+static int64_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t v) {
     const int64_t given = v * ((int64_t)1 << t->bits);
     const int64_t change = hystgen_lag_scaled(t, given - self->high, &t->rate);
     const int64_t left = self->lead - change;

@@ -3,21 +3,18 @@
 /* Operators of engine loop: what all arithmetics and memoryless parts have in common. */
 
 /* The actuator has seen drive v. */
-static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
-{
+static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_forward_arrive(self, v));
 }
 
 /* The actuator has seen drive v. */
-static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
-{
+static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_inverse_arrive(self, v));
 }
 
 /* Returns drive v and leaves it pending: the next step takes it, or what was committed, into the
  * memory. */
-static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v)
-{
+static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v) {
     self->answer = v;
     self->pending = v;
     self->has_pending = true;
@@ -26,8 +23,7 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 }
 
 /* What is pending is what the actuator has seen. */
-static void hystgen_inverse_take(hystgen_inverse_t *self)
-{
+static void hystgen_inverse_take(hystgen_inverse_t *self) {
     if (self->has_pending) {
         hystgen_inverse_absorb(self, self->pending);
         self->has_pending = false;
@@ -37,8 +33,7 @@ static void hystgen_inverse_take(hystgen_inverse_t *self)
 /* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self,
                                                              hystgen_real_t u, hystgen_real_t level,
-                                                             unsigned int bits)
-{
+                                                             unsigned int bits) {
     if (self->repeat && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
         return hystgen_inverse_answer(self, self->answer);
@@ -58,8 +53,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *
 
 /* Drive v, which is `applied` once it is limited, is pending in place of the last answer. */
 static void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t applied,
-                                    hystgen_real_t v)
-{
+                                    hystgen_real_t v) {
     if (v < applied || v > applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
@@ -69,8 +63,7 @@ static void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t appl
 }
 
 /* What init and reset have in common once the plays are set; they stand for this drive. */
-static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive)
-{
+static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive) {
     self->pending = drive;
     self->drive = drive;
     self->reference = 0;

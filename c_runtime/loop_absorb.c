@@ -3,8 +3,7 @@
 /* The textbook engine: every play is visited in every sample. Stores go through volatile where a
    compiler would otherwise call memset or memcpy, which a freestanding target need not have. */
 HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play,
-                                   hystgen_play_t w)
-{
+                                   hystgen_play_t w) {
     volatile hystgen_play_t *entry = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
@@ -13,8 +12,7 @@ HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *pl
 }
 
 HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play,
-                                    const hystgen_play_t *start)
-{
+                                    const hystgen_play_t *start) {
     volatile hystgen_play_t *entry = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
@@ -24,8 +22,7 @@ HYSTGEN_API void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *p
 
 /* play_r[w] = max(w - r, min(w + r, play)) */
 HYSTGEN_FIXED_KERNEL void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_play_t *play,
-                                              hystgen_play_t w)
-{
+                                              hystgen_play_t w) {
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
         const hystgen_reach_t low = (hystgen_reach_t)w - t->threshold[i];
@@ -36,8 +33,8 @@ HYSTGEN_FIXED_KERNEL void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen
 }
 
 /* p_0 play_0 + p_1 play_1 + ..., in this order */
-HYSTGEN_API hystgen_sum_t hystgen_loop_output(const hystgen_tables_t *t, const hystgen_play_t *play)
-{
+HYSTGEN_API hystgen_sum_t hystgen_loop_output(const hystgen_tables_t *t,
+                                              const hystgen_play_t *play) {
     hystgen_sum_t sum = 0;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {

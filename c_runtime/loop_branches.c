@@ -3,16 +3,14 @@
 /* Operators of engine loop: plays behind a memoryless part of two branches. */
 
 /* The actuator is at drive v, whose own move picks the branch. Returns the input of the plays. */
-static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_fine_t v)
-{
+static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_fine_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return hystgen_front_forward(v, self->ascending);
 }
 
 /* The actuator is at drive v, whose own move picks the branch. Returns the input of the plays. */
-static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fine_t v)
-{
+static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fine_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return hystgen_front_forward(v, self->ascending);
@@ -20,8 +18,7 @@ static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fi
 
 /* The drive that gives w on the branch of its own move. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_signal_t level,
-                                             hystgen_reach_t w)
-{
+                                             hystgen_reach_t w) {
     bool limited;
     const hystgen_reach_t v = hystgen_inverse_choose(self, level, w, &limited);
     self->level = level;

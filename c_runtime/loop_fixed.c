@@ -3,8 +3,7 @@
 /* Operators of engine loop: what is a sample in fixed point, where every code is a number. */
 
 /* One sample. */
-hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
-{
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     const hystgen_real_t inside = hystgen_clamp_drive(v);
     if (inside != v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
@@ -15,14 +14,12 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
 }
 
 /* One sample. */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     const hystgen_real_t level = hystgen_inverse_clamp(u);
     hystgen_inverse_take(self);
     return hystgen_inverse_search(self, u, level, level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u);
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     hystgen_inverse_replace(self, applied, hystgen_clamp_drive(applied));
 }

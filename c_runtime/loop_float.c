@@ -2,14 +2,12 @@
 
 /* Operators of engine loop: what is a sample in floating point, which has numbers that are none. */
 
-static bool hystgen_finite(hystgen_real_t x)
-{
+static bool hystgen_finite(hystgen_real_t x) {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
 }
 
 /* One sample. */
-hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
-{
+hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (!(v >= HYSTGEN_DRIVE_MIN && v <= HYSTGEN_DRIVE_MAX)) {
         if (!hystgen_finite(v)) {
             self->status |= HYSTGEN_STATUS_HELD;
@@ -24,8 +22,7 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
 }
 
 /* One sample. */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
-{
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_real_t level = u;
     unsigned int bits = 0;
     hystgen_inverse_take(self);
@@ -40,8 +37,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
     return hystgen_inverse_search(self, u, level, bits);
 }
 
-void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
-{
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     if (!hystgen_finite(applied)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;

@@ -3,29 +3,25 @@
 /* Operators of engine loop: outputs of the plays in fixed point, whose sums are finer than codes.
  */
 
-static hystgen_real_t hystgen_forward_output(hystgen_forward_t *self)
-{
+static hystgen_real_t hystgen_forward_output(hystgen_forward_t *self) {
     return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
                         &self->status);
 }
 
 /* What init and reset have in common once the plays are set. */
-static void hystgen_forward_begin(hystgen_forward_t *self)
-{
+static void hystgen_forward_begin(hystgen_forward_t *self) {
     self->answer = 0; /* no step has answered yet */
     self->status = 0;
 }
 
-static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
-{
+static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self) {
     unsigned int status = 0; /* of what no step has answered */
     return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
                         &status);
 }
 
 /* Input of the plays that gives output code `level`. */
-static hystgen_reach_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level)
-{
+static hystgen_reach_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level) {
     const hystgen_sum_t output =
         (hystgen_sum_t)level * ((hystgen_sum_t)1 << HYSTGEN_FRACTION) - HYSTGEN_OFFSET;
     return hystgen_loop_solve(&hystgen_model_tables, self->play, output);

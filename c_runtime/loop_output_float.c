@@ -2,25 +2,21 @@
 
 /* Operators of engine loop: outputs of the plays in floating point. */
 
-static hystgen_real_t hystgen_forward_output(const hystgen_forward_t *self)
-{
+static hystgen_real_t hystgen_forward_output(const hystgen_forward_t *self) {
     return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
 }
 
 /* What init and reset have in common once the plays are set. */
-static void hystgen_forward_begin(hystgen_forward_t *self)
-{
+static void hystgen_forward_begin(hystgen_forward_t *self) {
     self->answer = hystgen_forward_output(self);
     self->status = 0;
 }
 
-static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self)
-{
+static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self) {
     return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
 }
 
 /* Input of the plays that gives output `level`. */
-static hystgen_real_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level)
-{
+static hystgen_real_t hystgen_inverse_solve(const hystgen_inverse_t *self, hystgen_real_t level) {
     return hystgen_loop_solve(&hystgen_model_tables, self->play, level - HYSTGEN_OFFSET);
 }

@@ -6,8 +6,7 @@
    rounding error of `output` is divided by the slope before that input, which may be small, and
    must not run on along the steeper slope behind it. */
 HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_real_t *play,
-                                              hystgen_real_t output)
-{
+                                              hystgen_real_t output) {
     const bool rising = output >= hystgen_loop_output(t, play);
     hystgen_real_t tail = 0;
     hystgen_real_t next = 0; /* input at which play k would start to follow */

@@ -3,8 +3,7 @@
 /* The input of the plays that lies d further on in output than w, kept near the range of the plays'
  * input. */
 static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t w, hystgen_sum_t d,
-                                     unsigned int k, bool rising)
-{
+                                     unsigned int k, bool rising) {
     const hystgen_sum_t step = hystgen_over_slope(d, t->reciprocal[k], t->shift[k]);
     if (rising) {
         return step > (hystgen_sum_t)t->most - w ? t->most : (hystgen_reach_t)(w + step);
@@ -16,8 +15,7 @@ static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t 
    be too much. What is `left` of the way in output only shrinks, so that no sum grows beyond the
    first one, whatever the plays hold. */
 HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
-                                               const hystgen_play_t *play, hystgen_sum_t output)
-{
+                                               const hystgen_play_t *play, hystgen_sum_t output) {
     const hystgen_sum_t here = hystgen_loop_output(t, play);
     const bool rising = output > here;
     hystgen_sum_t left = rising ? output - here : here - output;

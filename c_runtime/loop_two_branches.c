@@ -2,16 +2,14 @@
 
 /* Operators of engine loop: where they start, and on which branch. */
 
-void hystgen_forward_init(hystgen_forward_t *self)
-{
+void hystgen_forward_init(hystgen_forward_t *self) {
     hystgen_loop_init(self->play);
     self->drive = HYSTGEN_FORWARD_INIT_DRIVE;
     self->ascending = HYSTGEN_FORWARD_INIT_ASCENDING;
     hystgen_forward_begin(self);
 }
 
-void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
-{
+void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
     self->drive = HYSTGEN_FORWARD_RESET_DRIVE;
     self->ascending = HYSTGEN_FORWARD_RESET_ASCENDING;
@@ -19,16 +17,14 @@ void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v)
     (void)hystgen_forward_step(self, v);
 }
 
-void hystgen_inverse_init(hystgen_inverse_t *self)
-{
+void hystgen_inverse_init(hystgen_inverse_t *self) {
     hystgen_loop_init(self->play);
     self->level = hystgen_inverse_output(self);
     self->ascending = HYSTGEN_INVERSE_INIT_ASCENDING;
     hystgen_inverse_begin(self, HYSTGEN_INVERSE_INIT_DRIVE);
 }
 
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u)
-{
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
     self->level = hystgen_inverse_output(self);
     self->ascending = HYSTGEN_INVERSE_RESET_ASCENDING;

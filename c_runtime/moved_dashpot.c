@@ -5,8 +5,7 @@
    plays stands what each has lost below its last bit: none stops short of where it creeps to. */
 
 /* What a play that is stretched by x, not negative, gains of it in a step. */
-static hystgen_real_t hystgen_yield(hystgen_real_t x)
-{
+static hystgen_real_t hystgen_yield(hystgen_real_t x) {
     unsigned int low = 0;
     unsigned int high = HYSTGEN_YIELDS;
     while (high - low > 1u) {
@@ -21,8 +20,7 @@ static hystgen_real_t hystgen_yield(hystgen_real_t x)
 }
 
 /* How far play i moves while the input of the plays goes to w. */
-static hystgen_real_t hystgen_change(unsigned int i, const hystgen_real_t *play, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_change(unsigned int i, const hystgen_real_t *play, hystgen_real_t w) {
     const hystgen_real_t r = hystgen_play.threshold[i];
     const hystgen_real_t x = play[0] + (w - play[0]) * HYSTGEN_SEEN - play[i];
     const hystgen_real_t gained = x > r    ? hystgen_yield(x - r)
@@ -32,29 +30,25 @@ static hystgen_real_t hystgen_change(unsigned int i, const hystgen_real_t *play,
 }
 
 /* Play i once the input of the plays has gone to w. */
-static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, hystgen_real_t w) {
     return play[i] + hystgen_change(i, play, w);
 }
 
 /* Where play i comes to rest from z with its input held at w: after a time, at z for now. */
-static hystgen_real_t hystgen_left(unsigned int i, hystgen_real_t z, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_left(unsigned int i, hystgen_real_t z, hystgen_real_t w) {
     (void)i;
     (void)w;
     return z;
 }
 
 /* Play i has moved to z while the input of the plays goes to w. */
-static void hystgen_keep(unsigned int i, hystgen_real_t *play, hystgen_real_t w, hystgen_real_t z)
-{
+static void hystgen_keep(unsigned int i, hystgen_real_t *play, hystgen_real_t w, hystgen_real_t z) {
     play[HYSTGEN_N_PLAYS + i] = hystgen_change(i, play, w) - (z - play[i]);
     play[i] = z;
 }
 
 /* Play i rests at z. */
-static void hystgen_put(unsigned int i, hystgen_real_t *play, hystgen_real_t z)
-{
+static void hystgen_put(unsigned int i, hystgen_real_t *play, hystgen_real_t z) {
     play[HYSTGEN_N_PLAYS + i] = 0;
     play[i] = z;
 }

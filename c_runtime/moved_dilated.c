@@ -1,8 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Play i once the input of the plays has gone to w; thresholds grow with the way of the step. */
-static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, hystgen_real_t w) {
     const hystgen_real_t way = w > play[0] ? w - play[0] : play[0] - w;
     const hystgen_real_t threshold = hystgen_play.threshold[i] + hystgen_wider[i] * way;
     const hystgen_real_t low = w - threshold;
@@ -12,8 +11,7 @@ static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, 
 }
 
 /* Where play i comes to rest from z with its input held at w. */
-static hystgen_real_t hystgen_left(unsigned int i, hystgen_real_t z, hystgen_real_t w)
-{
+static hystgen_real_t hystgen_left(unsigned int i, hystgen_real_t z, hystgen_real_t w) {
     (void)i;
     (void)w;
     return z;

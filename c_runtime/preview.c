@@ -5,8 +5,7 @@
 
 /* The next sample; the first one stands for all before it too. Stores go through volatile where a
    compiler would otherwise call memmove, which a freestanding target need not have. */
-static void hystgen_preview_put(hystgen_signal_t *line, bool *filled, hystgen_signal_t x)
-{
+static void hystgen_preview_put(hystgen_signal_t *line, bool *filled, hystgen_signal_t x) {
     volatile hystgen_signal_t *entry = line;
     unsigned int i;
     for (i = 0; i + 1u < HYSTGEN_TAPS; ++i) {
@@ -17,8 +16,7 @@ static void hystgen_preview_put(hystgen_signal_t *line, bool *filled, hystgen_si
 }
 
 /* The newest sample once more, where there is one. */
-static void hystgen_preview_repeat(hystgen_signal_t *line, bool *filled)
-{
+static void hystgen_preview_repeat(hystgen_signal_t *line, bool *filled) {
     if (*filled) {
         hystgen_preview_put(line, filled, line[HYSTGEN_TAPS - 1u]);
     }

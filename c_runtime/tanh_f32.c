@@ -33,8 +33,7 @@ static const hystgen_real_t hystgen_tanh_row[8][7] = {
     {0.9999995f, 9.619075e-07f, -9.4929607e-07f, 5.922104e-07f, -3.1420487e-07f, 1.713307e-07f,
      -5.0430643e-08f}};
 
-HYSTGEN_API hystgen_real_t hystgen_tanh(hystgen_real_t x)
-{
+HYSTGEN_API hystgen_real_t hystgen_tanh(hystgen_real_t x) {
     const hystgen_real_t a = x < 0.0f ? -x : x;
     if (a < 0.00024414062f) {
         return x;

@@ -58,8 +58,7 @@ static const hystgen_real_t hystgen_tanh_row[8][16] = {
      -2.0071490996024172e-19, 3.675347668074103e-20, -1.7362477299713478e-20,
      2.1721233154249034e-21}};
 
-HYSTGEN_API hystgen_real_t hystgen_tanh(hystgen_real_t x)
-{
+HYSTGEN_API hystgen_real_t hystgen_tanh(hystgen_real_t x) {
     const hystgen_real_t a = x < 0.0 ? -x : x;
     unsigned int n;
     if (a < 7.450580596923828e-09) {

@@ -19,8 +19,7 @@ typedef struct {
 } hystgen_counter_t;
 
 void hystgen_count_instruction(void *emulator, uint64_t address, uint32_t size, void *user);
-void hystgen_count_instruction(void *emulator, uint64_t address, uint32_t size, void *user)
-{
+void hystgen_count_instruction(void *emulator, uint64_t address, uint32_t size, void *user) {
     hystgen_counter_t *c = (hystgen_counter_t *)user;
     if (c->back != 0 && address == c->back) {
         if (c->calls < c->capacity) {

@@ -506,8 +506,8 @@ def test_text_can_be_carried_into_other_files(name: str, kernel: str) -> None:
     assert "/" not in code
     assert not re.search(r"\b(?:union|memcpy|fma\w*|double|float)\b", code)
     assert code.count("HYSTGEN_API") == 1
-    assert f"\nHYSTGEN_API hystgen_real_t hystgen_{kernel}(hystgen_real_t x)\n{{\n" in code
-    scope = re.findall(r"^\S.*?(\w+)(?:\[\d+\])*(?: = \{.*|\(\w+ [xm]\))$", code, re.MULTILINE)
+    assert f"\nHYSTGEN_API hystgen_real_t hystgen_{kernel}(hystgen_real_t x) {{\n" in code
+    scope = re.findall(r"^\S.*?(\w+)(?:\[\d+\])*(?: = \{.*|\(\w+ [xm]\) \{)$", code, re.MULTILINE)
     assert all(v == f"hystgen_{kernel}" or v.startswith(f"hystgen_{kernel}_") for v in scope)
     assert len(scope) == len(re.findall(r"^\w", code, re.MULTILINE))
     assert all(v.startswith(f"hystgen_{kernel}") or v == "hystgen_real_t" for v in re.findall(r"hystgen_\w+", code))

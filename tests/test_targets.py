@@ -361,7 +361,7 @@ def test_a_core_that_stops_or_hangs_is_a_failure(
 ) -> None:
     monkeypatch.setattr(emulator, "SECONDS", 1)
     monkeypatch.setattr(shutil, "which", lambda _: None)
-    changed_c("plain.c", lambda text: re.sub(r"(plain_inverse_step\([^;]*\)\n\{)", rf"\1 {code}", text))
+    changed_c("plain.c", lambda text: re.sub(r"(plain_inverse_step\([^;]*\)\s*\{)", rf"\1 {code}", text))
     report = hystgen.verify(model("plain"), targets=["cortex-m4f"], compiler=["zig"], target_length=100)
     row = report.rows[0]
     assert (row.build, row.operator, row.ok) == ("strict", "inverse", False)

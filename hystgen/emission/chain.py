@@ -343,7 +343,7 @@ def _state(op: str, fields: Sequence[Field]) -> str:
 
 def _function(comment: str, head: str, lines: Sequence[str]) -> str:
     body = "\n".join(f"    {line}" for line in lines)
-    return f"/* {comment} */\n{head}\n{{\n{body}\n}}\n"
+    return f"/* {comment} */\n{head} {{\n{body}\n}}\n"
 
 
 def _functions(

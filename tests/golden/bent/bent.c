@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 1727e23738cb68d534a605e5bff84cb1f97c616dfde1cb169ffb26953653841f, without this line
+ * Text: sha256 ef2bcffe2d5c7bd9921c724f79ab6ac673cf0bf0740c74cea558d210a63a9ed2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -47,8 +47,7 @@ typedef struct {
 } bent_dead_zone_t;
 
 /* Finds the straight piece that x lies on and follows it. */
-static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x)
-{
+static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x) {
     unsigned int low = 0;
     unsigned int high = z->n;
     while (low < high) {
@@ -63,8 +62,7 @@ static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t
 }
 
 /* Finds the straight piece that y lies on and follows it. */
-static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y)
-{
+static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;
     while (low < high) {
@@ -80,8 +78,7 @@ static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t
 
 /* The textbook engine: every play is visited in every sample. Stores go through volatile where a
    compiler would otherwise call memset or memcpy, which a freestanding target need not have. */
-static void bent_loop_rest(const bent_tables_t *t, bent_real_t *play, bent_real_t w)
-{
+static void bent_loop_rest(const bent_tables_t *t, bent_real_t *play, bent_real_t w) {
     volatile bent_real_t *entry = play;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
@@ -90,8 +87,7 @@ static void bent_loop_rest(const bent_tables_t *t, bent_real_t *play, bent_real_
 }
 
 /* play_r[w] = max(w - r, min(w + r, play)) */
-static void bent_loop_absorb(const bent_tables_t *t, bent_real_t *play, bent_real_t w)
-{
+static void bent_loop_absorb(const bent_tables_t *t, bent_real_t *play, bent_real_t w) {
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
         const bent_real_t low = w - t->threshold[i];
@@ -102,8 +98,7 @@ static void bent_loop_absorb(const bent_tables_t *t, bent_real_t *play, bent_rea
 }
 
 /* p_0 play_0 + p_1 play_1 + ..., in this order */
-static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *play)
-{
+static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *play) {
     bent_real_t sum = 0;
     unsigned int i;
     for (i = 0; i <= t->n; ++i) {
@@ -118,8 +113,7 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
    rounding error of `output` is divided by the slope before that input, which may be small, and
    must not run on along the steeper slope behind it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
-                                   bent_real_t output)
-{
+                                   bent_real_t output) {
     const bool rising = output >= bent_loop_output(t, play);
     bent_real_t tail = 0;
     bent_real_t next = 0; /* input at which play k would start to follow */
@@ -185,8 +179,7 @@ static const bent_dead_zone_t bent_stage_1 = {
 #define BENT_INVERSE_RESET_DRIVE 0.0 /* that the plays stand for then */
 
 /* Input of the plays: w = G[v]. */
-static bent_real_t bent_front_forward(bent_real_t v, bool ascending)
-{
+static bent_real_t bent_front_forward(bent_real_t v, bool ascending) {
     bent_real_t w = v;
     (void)ascending;
     w = bent_dead_zone_forward(&bent_stage_1, w);
@@ -194,8 +187,7 @@ static bent_real_t bent_front_forward(bent_real_t v, bool ascending)
 }
 
 /* v = G^-1[w]; `limited` tells whether no drive at all gives w. */
-static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limited)
-{
+static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limited) {
     bent_real_t v = w;
     (void)ascending;
     *limited = false;
@@ -203,50 +195,43 @@ static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limit
     return v;
 }
 
-static bent_real_t bent_clamp_drive(bent_real_t v)
-{
+static bent_real_t bent_clamp_drive(bent_real_t v) {
     const bent_real_t least = v < BENT_DRIVE_MIN ? BENT_DRIVE_MIN : v;
     return (bent_real_t)(least > BENT_DRIVE_MAX ? BENT_DRIVE_MAX : least);
 }
 
-static bent_real_t bent_inverse_clamp(bent_real_t u)
-{
+static bent_real_t bent_inverse_clamp(bent_real_t u) {
     const bent_real_t least = u < BENT_OUTPUT_MIN ? BENT_OUTPUT_MIN : u;
     return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */
 static bent_real_t bent_inverse_choose(const bent_inverse_t *self, bent_real_t level, bent_real_t w,
-                                       bool *limited)
-{
+                                       bool *limited) {
     (void)self;
     (void)level;
     return bent_front_inverse(w, true, limited);
 }
 
 /* Start memory: all plays hold the same. */
-static void bent_loop_init(bent_real_t *play)
-{
+static void bent_loop_init(bent_real_t *play) {
     bent_loop_rest(&bent_model_tables, play, BENT_START);
 }
 
 /* The actuator is at drive v. Returns the input of the plays. */
-static bent_real_t bent_forward_arrive(bent_forward_t *self, bent_real_t v)
-{
+static bent_real_t bent_forward_arrive(bent_forward_t *self, bent_real_t v) {
     (void)self;
     return bent_front_forward(v, true);
 }
 
 /* The actuator is at drive v. Returns the input of the plays. */
-static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v)
-{
+static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
     self->drive = v;
     return bent_front_forward(v, true);
 }
 
 /* The drive that gives w. */
-static bent_real_t bent_inverse_drive(bent_inverse_t *self, bent_real_t level, bent_real_t w)
-{
+static bent_real_t bent_inverse_drive(bent_inverse_t *self, bent_real_t level, bent_real_t w) {
     bool limited;
     const bent_real_t v = bent_inverse_choose(self, level, w, &limited);
     if (limited) {
@@ -255,40 +240,34 @@ static bent_real_t bent_inverse_drive(bent_inverse_t *self, bent_real_t level, b
     return v;
 }
 
-static bent_real_t bent_forward_output(const bent_forward_t *self)
-{
+static bent_real_t bent_forward_output(const bent_forward_t *self) {
     return bent_loop_output(&bent_model_tables, self->play) + BENT_OFFSET;
 }
 
 /* What init and reset have in common once the plays are set. */
-static void bent_forward_begin(bent_forward_t *self)
-{
+static void bent_forward_begin(bent_forward_t *self) {
     self->answer = bent_forward_output(self);
     self->status = 0;
 }
 
 /* Input of the plays that gives output `level`. */
-static bent_real_t bent_inverse_solve(const bent_inverse_t *self, bent_real_t level)
-{
+static bent_real_t bent_inverse_solve(const bent_inverse_t *self, bent_real_t level) {
     return bent_loop_solve(&bent_model_tables, self->play, level - BENT_OFFSET);
 }
 
 /* The actuator has seen drive v. */
-static void bent_forward_absorb(bent_forward_t *self, bent_real_t v)
-{
+static void bent_forward_absorb(bent_forward_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_forward_arrive(self, v));
 }
 
 /* The actuator has seen drive v. */
-static void bent_inverse_absorb(bent_inverse_t *self, bent_real_t v)
-{
+static void bent_inverse_absorb(bent_inverse_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
 }
 
 /* Returns drive v and leaves it pending: the next step takes it, or what was committed, into the
  * memory. */
-static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v)
-{
+static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
     self->answer = v;
     self->pending = v;
     self->has_pending = true;
@@ -297,8 +276,7 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v)
 }
 
 /* What is pending is what the actuator has seen. */
-static void bent_inverse_take(bent_inverse_t *self)
-{
+static void bent_inverse_take(bent_inverse_t *self) {
     if (self->has_pending) {
         bent_inverse_absorb(self, self->pending);
         self->has_pending = false;
@@ -307,8 +285,7 @@ static void bent_inverse_take(bent_inverse_t *self)
 
 /* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
 static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent_real_t level,
-                                       unsigned int bits)
-{
+                                       unsigned int bits) {
     if (self->repeat && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
         return bent_inverse_answer(self, self->answer);
@@ -326,8 +303,7 @@ static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent
 }
 
 /* Drive v, which is `applied` once it is limited, is pending in place of the last answer. */
-static void bent_inverse_replace(bent_inverse_t *self, bent_real_t applied, bent_real_t v)
-{
+static void bent_inverse_replace(bent_inverse_t *self, bent_real_t applied, bent_real_t v) {
     if (v < applied || v > applied) {
         self->status |= BENT_STATUS_INPUT_CLAMPED;
     }
@@ -337,8 +313,7 @@ static void bent_inverse_replace(bent_inverse_t *self, bent_real_t applied, bent
 }
 
 /* What init and reset have in common once the plays are set; they stand for this drive. */
-static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive)
-{
+static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive) {
     self->pending = drive;
     self->drive = drive;
     self->reference = 0;
@@ -350,14 +325,12 @@ static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive)
     self->status = 0;
 }
 
-static bool bent_finite(bent_real_t x)
-{
+static bool bent_finite(bent_real_t x) {
     return x >= -DBL_MAX && x <= DBL_MAX; /* false for NaN */
 }
 
 /* One sample. */
-bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v)
-{
+bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     if (!(v >= BENT_DRIVE_MIN && v <= BENT_DRIVE_MAX)) {
         if (!bent_finite(v)) {
             self->status |= BENT_STATUS_HELD;
@@ -372,8 +345,7 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v)
 }
 
 /* One sample. */
-bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
-{
+bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
     bent_real_t level = u;
     unsigned int bits = 0;
     bent_inverse_take(self);
@@ -388,8 +360,7 @@ bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u)
     return bent_inverse_search(self, u, level, bits);
 }
 
-void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied)
-{
+void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
     if (!bent_finite(applied)) {
         self->status |= BENT_STATUS_HELD;
         return;
@@ -397,41 +368,35 @@ void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied)
     bent_inverse_replace(self, applied, bent_clamp_drive(applied) + 0); /* no drive is -0 */
 }
 
-void bent_forward_init(bent_forward_t *self)
-{
+void bent_forward_init(bent_forward_t *self) {
     bent_loop_init(self->play);
     bent_forward_begin(self);
 }
 
-void bent_forward_reset(bent_forward_t *self, bent_real_t v)
-{
+void bent_forward_reset(bent_forward_t *self, bent_real_t v) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_forward_begin(self);
     (void)bent_forward_step(self, v);
 }
 
-void bent_inverse_init(bent_inverse_t *self)
-{
+void bent_inverse_init(bent_inverse_t *self) {
     bent_loop_init(self->play);
     bent_inverse_begin(self, BENT_INVERSE_INIT_DRIVE);
 }
 
-void bent_inverse_reset(bent_inverse_t *self, bent_real_t u)
-{
+void bent_inverse_reset(bent_inverse_t *self, bent_real_t u) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_inverse_begin(self, BENT_INVERSE_RESET_DRIVE);
     (void)bent_inverse_step(self, u);
 }
 
-unsigned int bent_forward_status(bent_forward_t *self)
-{
+unsigned int bent_forward_status(bent_forward_t *self) {
     const unsigned int status = self->status;
     self->status = 0;
     return status;
 }
 
-unsigned int bent_inverse_status(bent_inverse_t *self)
-{
+unsigned int bent_inverse_status(bent_inverse_t *self) {
     const unsigned int status = self->status;
     self->status = 0;
     return status;

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 9a99f04de430436b6e156dcd6720af52c09e058f44f95f29f98831b67f9dea64, without this line
+ * Text: sha256 011f4b5cda962eea630ff9e03a0251f3514f57c7e3c4844deb906a9d036420b8, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent_selftest.h"
@@ -27,8 +27,7 @@ static union {
     bent_inverse_t inverse;
 } bent_selftest_instance;
 
-static bool bent_selftest_same(bent_real_t a, bent_real_t b)
-{
+static bool bent_selftest_same(bent_real_t a, bent_real_t b) {
     const unsigned char *x = (const unsigned char *)&a;
     const unsigned char *y = (const unsigned char *)&b;
     unsigned int i;
@@ -409,8 +408,7 @@ static const bent_selftest_sample_t bent_selftest_inverse[185] = {
     {'s', -4.597047658081053, -0.22007040367307243, 0u},
 };
 
-int bent_selftest(void)
-{
+int bent_selftest(void) {
     int index = 0;
     unsigned int i;
     bent_forward_init(&bent_selftest_instance.forward);

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 0de57e8787eaced285a171eb165f76ea0a811c08f426a43cbd5ca783e96fc8a5, without this line
+ * Text: sha256 937c3e1d701ba8447f193d14567740dda61dcac3e059be61228c1a0fb47df840, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -59,8 +59,7 @@ typedef struct {
 #define CURVED_LOW_HALF 0xffffu
 
 /* a times b; with half words, and no call, on cores without a long multiplication. */
-static uint64_t curved_wide(uint32_t a, uint32_t b)
-{
+static uint64_t curved_wide(uint32_t a, uint32_t b) {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
     const uint32_t low = (a & CURVED_LOW_HALF) * (b & CURVED_LOW_HALF);
     const uint32_t one =
@@ -77,8 +76,7 @@ static uint64_t curved_wide(uint32_t a, uint32_t b)
 
 /* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
-static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift)
-{
+static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
     const uint64_t low = curved_wide((uint32_t)d, reciprocal) >> CURVED_WORD;
     const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> CURVED_WORD), reciprocal) + low;
     const uint32_t high = (uint32_t)(quotient >> CURVED_WORD);
@@ -91,13 +89,11 @@ static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int sh
 #define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's output, in sums */
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
-static inline int64_t curved_along(const curved_place_t *here, int64_t x)
-{
+static inline int64_t curved_along(const curved_place_t *here, int64_t x) {
     return here->rising ? x : -x;
 }
 
-CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *corner)
-{
+CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *corner) {
     curved_corner_t *c = &corner[here->depth];
     c->high = (int32_t)(here->output >> 16);
     c->low = (uint16_t)here->output;
@@ -109,8 +105,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
 
 /* Where the play of a segment of a corner's block begins to follow, as the move sees it. */
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
-                                    const curved_segment_t *s, bool by_output)
-{
+                                    const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     return curved_along(here, by_output ? output : c->input) +
@@ -118,8 +113,7 @@ static inline int64_t curved_begins(const curved_place_t *here, const curved_cor
 }
 
 /* A corner stays where plays have followed. */
-CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner)
-{
+CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner) {
     if (here->k > 0) {
         curved_leave_corner(here, corner);
         here->k = 0;
@@ -130,8 +124,7 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
 /* The last place where another play begins to follow before the output, or input, `to`; or here. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
                               const curved_corner_t *corner, int64_t to, bool by_output,
-                              curved_kink_t *kink)
-{
+                              curved_kink_t *kink) {
     const curved_corner_t *c = NULL; /* held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
@@ -173,8 +166,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
 
 /* The same for any move to an input; turns, moves nothing. */
 static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
-                                     curved_corner_t *corner, int32_t to, curved_kink_t *kink)
-{
+                                     curved_corner_t *corner, int32_t to, curved_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
         curved_turn_back(here, corner);
     }
@@ -182,8 +174,8 @@ static inline void curved_find_input(const curved_curve_t *t, curved_place_t *he
 }
 
 /* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
-static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to, int64_t moved)
-{
+static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to,
+                         int64_t moved) {
     here->output = curved_along(here, kink->output + moved);
     here->input = to;
     here->k = kink->k;
@@ -192,24 +184,21 @@ static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_
 
 /* Output that is gained from a kink on until the input comes to `to`, which may lie before it. */
 CURVED_APART int64_t curved_gained(const curved_curve_t *t, const curved_place_t *here,
-                                   const curved_kink_t *kink, int32_t to)
-{
+                                   const curved_kink_t *kink, int32_t to) {
     const int64_t way = curved_along(here, to) - kink->input;
     return way < 0 ? -1 : (int64_t)curved_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
 
 /* Moves the plays to any input. */
 CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *here,
-                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to)
-{
+                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
     curved_find_input(t, here, corner, to, kink);
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
 
 /* The input, near the range, that gives an output behind a kink, `to` as the move sees it. */
 CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
-                                   const curved_kink_t *kink, int64_t to)
-{
+                                   const curved_kink_t *kink, int64_t to) {
     const curved_segment_t *s = &t->segment[kink->k];
     const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
     const int64_t most = t->range[here->rising];
@@ -219,8 +208,7 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
 /* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
    moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
 static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
-                            int64_t output, int64_t next, curved_kink_t *kink)
-{
+                            int64_t output, int64_t next, curved_kink_t *kink) {
     if (here->rising ? output < here->output : output > here->output) {
         curved_turn_back(here, corner);
         next = -CURVED_FAR;
@@ -239,8 +227,7 @@ static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curve
 
 /* Output, as the present move sees it, at which another play begins to follow behind a kink. */
 static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t *here,
-                                  const curved_corner_t *corner, const curved_kink_t *kink)
-{
+                                  const curved_corner_t *corner, const curved_kink_t *kink) {
     return kink->depth > 0
                ? curved_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
                : CURVED_FAR;
@@ -249,8 +236,7 @@ static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
    the move sees it, at which another one begins to follow. */
 static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *here,
-                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to)
-{
+                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
     int64_t next = curved_next_output(t, here, corner, kink);
     int64_t moved = curved_gained(t, here, kink, to);
     if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
@@ -265,8 +251,7 @@ static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *
 /* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
    left by a move to where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
-                               curved_corner_t *corner, const int32_t *play, unsigned int step)
-{
+                               curved_corner_t *corner, const int32_t *play, unsigned int step) {
     int64_t aside = t->offset; /* what the plays above play k give */
     unsigned int k;
     here->depth = 0;
@@ -287,8 +272,7 @@ CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
 }
 
 /* x / 2^bits to the nearest whole number, ties away from zero. */
-static int64_t curved_nearest(int64_t x, unsigned int bits)
-{
+static int64_t curved_nearest(int64_t x, unsigned int bits) {
     if (bits == 0) {
         return x;
     }
@@ -299,8 +283,7 @@ static int64_t curved_nearest(int64_t x, unsigned int bits)
    0 .. 1 along each: where the pieces begin, the left shifts that stretch them to 2^31, and their
    coefficients from degree 0. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
-                            unsigned int pieces, unsigned int degree, int32_t x)
-{
+                            unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
     unsigned int high = pieces - 1u;
     int64_t y = 0;
@@ -327,8 +310,7 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
 /* Drive code for an input w of the plays that the drive range does not give: its end, and one code
    more where that is not just rounding; tells whether w is more than an envelope can give. */
 static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w,
-                                    int32_t drive_min, int32_t drive_max, bool *limited)
-{
+                                    int32_t drive_min, int32_t drive_max, bool *limited) {
     if (w > e->last) {
         *limited = w > e->most && w > e->envelope_most;
         return (curved_reach_t)drive_max + (w > e->most ? 1 : 0);
@@ -424,21 +406,18 @@ static const curved_ends_t curved_back_ends = {
 #define CURVED_BACK_PIECES 44u
 #define CURVED_BELOW 11u /* bits of a curve back below a drive code */
 
-static curved_real_t curved_clamp_drive(curved_reach_t v)
-{
+static curved_real_t curved_clamp_drive(curved_reach_t v) {
     const curved_reach_t least = v < CURVED_DRIVE_MIN ? CURVED_DRIVE_MIN : v;
     return (curved_real_t)(least > CURVED_DRIVE_MAX ? CURVED_DRIVE_MAX : least);
 }
 
-static curved_real_t curved_inverse_clamp(curved_reach_t u)
-{
+static curved_real_t curved_inverse_clamp(curved_reach_t u) {
     const curved_reach_t least = u < CURVED_OUTPUT_MIN ? CURVED_OUTPUT_MIN : u;
     return (curved_real_t)(least > CURVED_OUTPUT_MAX ? CURVED_OUTPUT_MAX : least);
 }
 
 /* Output code of a sum. */
-static curved_real_t curved_code(curved_sum_t sum, unsigned int *status)
-{
+static curved_real_t curved_code(curved_sum_t sum, unsigned int *status) {
     const curved_sum_t code = curved_nearest(sum, CURVED_FRACTION);
     (void)status;
     return (curved_real_t)(code > CURVED_CODE_MAX ? CURVED_CODE_MAX : code < -CURVED_CODE_MAX
@@ -446,8 +425,7 @@ static curved_real_t curved_code(curved_sum_t sum, unsigned int *status)
 }
 
 /* Input of the plays: w = G[v]. */
-CURVED_APART curved_play_t curved_front_forward(curved_real_t v, bool ascending)
-{
+CURVED_APART curved_play_t curved_front_forward(curved_real_t v, bool ascending) {
     (void)ascending;
     return (curved_play_t)curved_curve(curved_front_knot, curved_front_scale,
                                        curved_front_coefficient, CURVED_FRONT_PIECES,
@@ -455,8 +433,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v, bool ascending)
 }
 
 /* v = G^-1[w]; `limited` tells whether no drive at all gives w. */
-CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascending, bool *limited)
-{
+CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascending, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;
     (void)ascending;
@@ -471,24 +448,21 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascendin
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */
 static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved_real_t level,
-                                            curved_reach_t w, bool *limited)
-{
+                                            curved_reach_t w, bool *limited) {
     (void)self;
     (void)level;
     return curved_front_inverse(w, true, limited);
 }
 
 /* The next step begins here. */
-static void curved_inverse_keep(curved_inverse_t *self)
-{
+static void curved_inverse_keep(curved_inverse_t *self) {
     self->undo = self->here;
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
 /* The actuator is at drive v; the direction is that of its move. Returns the input of the plays. */
-CURVED_APART int32_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v)
-{
+CURVED_APART int32_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return curved_front_forward(v, self->ascending);
@@ -501,8 +475,7 @@ CURVED_APART int32_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
-curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
-{
+curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
     curved_inverse_keep(self);
     if (!self->repeat || u != self->reference) {
         const curved_real_t level = curved_inverse_clamp(u);
@@ -530,8 +503,7 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u)
     return self->drive;
 }
 
-void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied)
-{
+void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
     const curved_real_t v = curved_clamp_drive(applied);
     if (v != applied) {
         self->status |= CURVED_STATUS_INPUT_CLAMPED;
@@ -546,8 +518,7 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied)
 }
 
 static void curved_inverse_begin(curved_inverse_t *self, const int32_t *play, unsigned int step,
-                                 const curved_drive_t *first)
-{
+                                 const curved_drive_t *first) {
     unsigned int status = 0; /* of what no step has answered */
     curved_start(&curved_model_curve, &self->here, self->corner, play, step);
     self->drive = (curved_real_t)first->drive;
@@ -561,19 +532,16 @@ static void curved_inverse_begin(curved_inverse_t *self, const int32_t *play, un
     self->status = 0;
 }
 
-void curved_inverse_init(curved_inverse_t *self)
-{
+void curved_inverse_init(curved_inverse_t *self) {
     curved_inverse_begin(self, curved_model_start, CURVED_START_STEP, &curved_inverse_drive[0]);
 }
 
-void curved_inverse_reset(curved_inverse_t *self, curved_real_t u)
-{
+void curved_inverse_reset(curved_inverse_t *self, curved_real_t u) {
     curved_inverse_begin(self, curved_model_zero, 0, &curved_inverse_drive[1]);
     (void)curved_inverse_step(self, u);
 }
 
-unsigned int curved_inverse_status(curved_inverse_t *self)
-{
+unsigned int curved_inverse_status(curved_inverse_t *self) {
     const unsigned int status = self->status;
     self->status = 0;
     return status;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 800a8172986da613544b4b82923ed641f4f5aa9def366b54e9ec9009fa63178d, without this line
+ * Text: sha256 c9e686b42e0ca62d2314a93d2b40f46513df262924b980426663fbcb9efa6753, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved_selftest.h"
@@ -24,8 +24,7 @@ typedef struct {
 /* Too large for some stacks. */
 static curved_inverse_t curved_selftest_instance;
 
-static bool curved_selftest_same(curved_real_t a, curved_real_t b)
-{
+static bool curved_selftest_same(curved_real_t a, curved_real_t b) {
     const unsigned char *x = (const unsigned char *)&a;
     const unsigned char *y = (const unsigned char *)&b;
     unsigned int i;
@@ -225,8 +224,7 @@ static const curved_selftest_sample_t curved_selftest_inverse[185] = {
     {'s', -3548, -2012, 0u},
 };
 
-int curved_selftest(void)
-{
+int curved_selftest(void) {
     int index = 0;
     unsigned int i;
     curved_inverse_init(&curved_selftest_instance);

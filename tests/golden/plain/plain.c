@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 98b7d9329b52b6346295e22edcee0056257b23ad1d791baec398e55a32e6133a, without this line
+ * Text: sha256 bf053ff2985301f58de430c4c636b23a2c55fb977cdd25aa7e42a2ebdbb273a6, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -55,8 +55,7 @@ typedef struct {
 } plain_start_t;
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
-static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x)
-{
+static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 #ifdef PLAIN_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
@@ -65,8 +64,7 @@ static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x)
 }
 
 /* There is no line to go on along: the next sample searches. */
-static void plain_forget_line(plain_plays_t *m)
-{
+static void plain_forget_line(plain_plays_t *m) {
     m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
@@ -75,8 +73,7 @@ static void plain_forget_line(plain_plays_t *m)
 
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
 PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
-                                    plain_corner_t *corner)
-{
+                                    plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
     const plain_real_t room = t->limit[!m->here.rising] + plain_along(m, m->here.output);
     plain_corner_t *c = &corner[m->here.depth];
@@ -88,8 +85,7 @@ PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
     m->here.depth = (uint_least16_t)(m->here.depth + 1u);
 }
 
-static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner)
-{
+static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner) {
     if (m->here.k > 0) {
         plain_leave_corner(t, m, corner);
         m->here.k = 0;
@@ -101,11 +97,11 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
 
 /* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
-                                       unsigned int last, plain_real_t x)
-{
+                                       unsigned int last, plain_real_t x) {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const bool before = x > step[4u * middle];
+        const unsigned int at = 4u * middle;
+        const bool before = x > step[at];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -115,8 +111,7 @@ static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
 /* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
                                      const plain_corner_t *corner, plain_real_t output,
-                                     plain_real_t input)
-{
+                                     plain_real_t input) {
     const plain_corner_t *c = &corner[m->here.depth - 1u];
     plain_real_t reach = plain_along(m, output - c->output);
     plain_real_t x = c->pass[m->here.rising];
@@ -135,8 +130,7 @@ PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
 
 /* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
 PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
-                                      plain_corner_t *corner, plain_real_t output)
-{
+                                      plain_corner_t *corner, plain_real_t output) {
     if (plain_along(m, output) < plain_along(m, m->here.output)) {
         plain_turn_back(t, m, corner);
     }
@@ -156,8 +150,7 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
 
 /* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
-                                     plain_corner_t *corner, plain_real_t input)
-{
+                                     plain_corner_t *corner, plain_real_t input) {
     if (plain_along(m, input) < plain_along(m, m->here.input)) {
         plain_turn_back(t, m, corner);
     }
@@ -222,8 +215,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
 }
 
 /* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
-PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input)
-{
+PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
     const plain_real_t way = plain_along(m, input - m->from);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
@@ -248,8 +240,7 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
 
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
-                             plain_corner_t *corner, const plain_start_t *start)
-{
+                             plain_corner_t *corner, const plain_start_t *start) {
     unsigned int k;
     corner[0] = start->bottom;
     m->here.depth = 1;
@@ -286,15 +277,13 @@ static const plain_start_t plain_inverse_start[2] = {
 
 #define PLAIN_OFFSET 0.0f /* part of every output */
 
-static plain_real_t plain_clamp_drive(plain_real_t v)
-{
+static plain_real_t plain_clamp_drive(plain_real_t v) {
     const plain_real_t least = v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v;
     return (plain_real_t)(least > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX : least);
 }
 
 /* Any other sample than a usual one. */
-PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_t u)
-{
+PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
     const plain_curve_t *t = &plain_inverse_curve;
     plain_plays_t *m = &self->plays;
     plain_real_t x = u - PLAIN_OFFSET;
@@ -333,8 +322,7 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
    no       yes        the committed drive  the committed drive  the committed drive
    yes      no         the last answer      the last answer      the last answer
    yes      yes        the committed drive  the committed drive  the last answer, `returned` */
-plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
-{
+plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;
     const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
@@ -357,8 +345,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
     return plain_inverse_search(self, u);
 }
 
-void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
-{
+void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
     plain_plays_t *m = &self->plays;
     const plain_real_t v = plain_clamp_drive(applied) + 0; /* no drive is -0 */
     if (!(applied >= -FLT_MAX && applied <= FLT_MAX)) {
@@ -382,8 +369,7 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
     self->before = m->here.input;
 }
 
-PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, const plain_start_t *start)
-{
+PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, const plain_start_t *start) {
     plain_start(&plain_inverse_curve, &self->plays, self->corner, start);
     plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
                          plain_clamp_drive(self->plays.here.output));
@@ -394,19 +380,16 @@ PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, const plain_start_t 
     self->status = 0;
 }
 
-void plain_inverse_init(plain_inverse_t *self)
-{
+void plain_inverse_init(plain_inverse_t *self) {
     plain_inverse_begin(self, &plain_inverse_start[0]);
 }
 
-void plain_inverse_reset(plain_inverse_t *self, plain_real_t u)
-{
+void plain_inverse_reset(plain_inverse_t *self, plain_real_t u) {
     plain_inverse_begin(self, &plain_inverse_start[1]);
     (void)plain_inverse_step(self, u);
 }
 
-unsigned int plain_inverse_status(plain_inverse_t *self)
-{
+unsigned int plain_inverse_status(plain_inverse_t *self) {
     const unsigned int status = self->status;
     self->status = 0;
     return status;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 19e6b3f3e0ebb3cee360a274f023d5f2c2e8724e34293e43de133ef0cda0f38d, without this line
+ * Text: sha256 21b0e843fed51513fa7b00bd17cd58458a4efea33436f833e26ebddd899bec77, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -267,8 +267,7 @@ static const two_branches_real_t two_branches_tanh_row[8][7] = {
     {0.9999995f, 9.619075e-07f, -9.4929607e-07f, 5.922104e-07f, -3.1420487e-07f, 1.713307e-07f,
      -5.0430643e-08f}};
 
-static two_branches_real_t two_branches_tanh(two_branches_real_t x)
-{
+static two_branches_real_t two_branches_tanh(two_branches_real_t x) {
     const two_branches_real_t a = x < 0.0f ? -x : x;
     if (a < 0.00024414062f) {
         return x;
@@ -323,13 +322,11 @@ static const two_branches_real_t two_branches_atanh_row[8][5] = {
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
 /* The piece of [1, 2) that m lies in, a whole number of 2^24 to [1, 2). */
-static inline unsigned int two_branches_atanh_piece(uint_least32_t m)
-{
+static inline unsigned int two_branches_atanh_piece(uint_least32_t m) {
     return (unsigned int)(m >> 21) & 7u;
 }
 
-static two_branches_real_t two_branches_atanh(two_branches_real_t x)
-{
+static two_branches_real_t two_branches_atanh(two_branches_real_t x) {
     two_branches_real_t a = x < 0.0f ? -x : x;
     unsigned int step;
     if (a <= 0.5f) {
@@ -368,16 +365,14 @@ static two_branches_real_t two_branches_atanh(two_branches_real_t x)
 
 /* a0 tanh(a1 x + a2) + a3 */
 static two_branches_real_t two_branches_envelope_forward(const two_branches_envelope_t *e,
-                                                         two_branches_real_t x)
-{
+                                                         two_branches_real_t x) {
     return e->a0 * two_branches_tanh(e->a1 * x + e->a2) + e->a3;
 }
 
 /* (atanh((y - a3) / a0) - a2) / a1; an argument that no x can reach is limited, and `limited` set.
  */
 static two_branches_real_t two_branches_envelope_inverse(const two_branches_envelope_t *e,
-                                                         two_branches_real_t y, bool *limited)
-{
+                                                         two_branches_real_t y, bool *limited) {
     two_branches_real_t argument = (y - e->a3) * e->inverse_a0;
     if (argument > e->limit) {
         argument = e->limit;
@@ -391,8 +386,7 @@ static two_branches_real_t two_branches_envelope_inverse(const two_branches_enve
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
-                                                     two_branches_real_t x)
-{
+                                                     two_branches_real_t x) {
 #ifdef TWO_BRANCHES_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
@@ -401,8 +395,7 @@ static inline two_branches_real_t two_branches_along(const two_branches_plays_t 
 }
 
 /* There is no line to go on along: the next sample searches. */
-static void two_branches_forget_line(two_branches_plays_t *m)
-{
+static void two_branches_forget_line(two_branches_plays_t *m) {
     m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
     m->cap = m->here.input;
@@ -412,8 +405,7 @@ static void two_branches_forget_line(two_branches_plays_t *m)
 /* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
 TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
                                                   two_branches_plays_t *m,
-                                                  two_branches_corner_t *corner)
-{
+                                                  two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
     const two_branches_real_t room =
         t->limit[!m->here.rising] + two_branches_along(m, m->here.output);
@@ -427,8 +419,7 @@ TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
 }
 
 static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_plays_t *m,
-                                   two_branches_corner_t *corner)
-{
+                                   two_branches_corner_t *corner) {
     if (m->here.k > 0) {
         two_branches_leave_corner(t, m, corner);
         m->here.k = 0;
@@ -440,11 +431,11 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
 
 /* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
 static unsigned int two_branches_find_segment(const two_branches_real_t *step, unsigned int k,
-                                              unsigned int last, two_branches_real_t x)
-{
+                                              unsigned int last, two_branches_real_t x) {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const bool before = x > step[4u * middle];
+        const unsigned int at = 4u * middle;
+        const bool before = x > step[at];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -456,8 +447,7 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
                                                    two_branches_plays_t *m,
                                                    const two_branches_corner_t *corner,
                                                    two_branches_real_t output,
-                                                   two_branches_real_t input)
-{
+                                                   two_branches_real_t input) {
     const two_branches_corner_t *c = &corner[m->here.depth - 1u];
     two_branches_real_t reach = two_branches_along(m, output - c->output);
     two_branches_real_t x = c->pass[m->here.rising];
@@ -478,8 +468,7 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
                                                     two_branches_plays_t *m,
                                                     two_branches_corner_t *corner,
-                                                    two_branches_real_t output)
-{
+                                                    two_branches_real_t output) {
     if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
         two_branches_turn_back(t, m, corner);
     }
@@ -501,8 +490,7 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_corner_t *corner,
-                                                   two_branches_real_t input)
-{
+                                                   two_branches_real_t input) {
     if (two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
         two_branches_turn_back(t, m, corner);
     }
@@ -569,8 +557,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
 /* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
 TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
-                                                   two_branches_real_t input)
-{
+                                                   two_branches_real_t input) {
     const two_branches_real_t way = two_branches_along(m, input - m->from);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
@@ -597,8 +584,7 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
 static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_corner_t *corner,
-                                                   two_branches_real_t input)
-{
+                                                   two_branches_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
     if (on ? (m->here.rising ? input < m->next : input > m->next)
         : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
@@ -619,8 +605,7 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_branches_plays_t *m,
                                            two_branches_corner_t *corner,
-                                           const two_branches_start_t *start)
-{
+                                           const two_branches_start_t *start) {
     unsigned int k;
     corner[0] = start->bottom;
     m->here.depth = 1;
@@ -670,8 +655,7 @@ static const two_branches_envelope_t two_branches_stage_1_descending = {
 #define TWO_BRANCHES_HOLD 0.0030799445f /* a drive that is stepped back by no more is held */
 
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
-static two_branches_real_t two_branches_front_forward(two_branches_real_t v, bool ascending)
-{
+static two_branches_real_t two_branches_front_forward(two_branches_real_t v, bool ascending) {
     two_branches_real_t w = v;
     w = two_branches_envelope_forward(ascending ? &two_branches_stage_1_ascending
                                       : &two_branches_stage_1_descending, w);
@@ -681,8 +665,7 @@ static two_branches_real_t two_branches_front_forward(two_branches_real_t v, boo
 /* v = G^-1[w]; `limited` tells whether no drive at all gives w, on the branch of the drive's
    direction. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
-                                                      bool *limited)
-{
+                                                      bool *limited) {
     two_branches_real_t v = w;
     *limited = false;
     v = two_branches_envelope_inverse(ascending ? &two_branches_stage_1_ascending
@@ -690,16 +673,14 @@ static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, boo
     return v;
 }
 
-static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v)
-{
+static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v) {
     const two_branches_real_t least = v < TWO_BRANCHES_DRIVE_MIN ? TWO_BRANCHES_DRIVE_MIN : v;
     return (two_branches_real_t)(least > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX : least);
 }
 
 /* Whether going to v is a move of the branch that v was computed on. */
 static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_branches_real_t v,
-                                      bool ascending)
-{
+                                      bool ascending) {
     const two_branches_real_t inside = two_branches_clamp_drive(v);
     return inside > self->drive ? ascending : inside < self->drive ? !ascending
         : self->ascending == ascending;
@@ -710,8 +691,7 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
    drive at all gives w. */
 TWO_BRANCHES_APART two_branches_real_t
     two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
-                                two_branches_real_t w, bool *limited)
-{
+                                two_branches_real_t w, bool *limited) {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
     two_branches_real_t v = two_branches_front_inverse(w, up, limited);
     if (!two_branches_inverse_fits(self, v, up)) {
@@ -728,24 +708,21 @@ TWO_BRANCHES_APART two_branches_real_t
 }
 
 /* The next step begins here. */
-static void two_branches_inverse_keep(two_branches_inverse_t *self)
-{
+static void two_branches_inverse_keep(two_branches_inverse_t *self) {
     self->undo = self->plays.here;
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
 /* The actuator is at drive v; the direction is that of its move. */
-static void two_branches_inverse_arrive(two_branches_inverse_t *self, two_branches_real_t v)
-{
+static void two_branches_inverse_arrive(two_branches_inverse_t *self, two_branches_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
 }
 
 /* The actuator has gone to v in place of where the last step led. */
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
-                                                     two_branches_real_t v)
-{
+                                                     two_branches_real_t v) {
     self->plays.here = self->undo;
     two_branches_forget_line(&self->plays);
     self->drive = self->undo_drive;
@@ -758,8 +735,7 @@ TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *sel
 }
 
 /* A sample that is no number: the last answer once more. */
-static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *self)
-{
+static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *self) {
     two_branches_inverse_keep(self);
     two_branches_inverse_replace(self,
                                  self->stepped && self->committed ? self->returned : self->drive);
@@ -777,8 +753,7 @@ static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *sel
    no       yes        the committed drive  the committed drive  the committed drive
    yes      no         the last answer      the last answer      the last answer
    yes      yes        the committed drive  the committed drive  the last answer, `returned` */
-two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u)
-{
+two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u) {
     if (!(u >= -FLT_MAX && u <= FLT_MAX)) {
         return two_branches_inverse_hold(self);
     }
@@ -811,8 +786,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
     return self->drive;
 }
 
-void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real_t applied)
-{
+void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real_t applied) {
     const two_branches_real_t v = two_branches_clamp_drive(applied) + 0; /* no drive is -0 */
     if (!(applied >= -FLT_MAX && applied <= FLT_MAX)) {
         self->status |= TWO_BRANCHES_STATUS_HELD;
@@ -831,8 +805,7 @@ void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real
 
 TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self,
                                                    const two_branches_start_t *start,
-                                                   const two_branches_drive_t *first)
-{
+                                                   const two_branches_drive_t *first) {
     two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner, start);
     self->level = self->plays.here.input + TWO_BRANCHES_OFFSET;
     two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner, first->w);
@@ -848,21 +821,18 @@ TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self,
     self->status = 0;
 }
 
-void two_branches_inverse_init(two_branches_inverse_t *self)
-{
+void two_branches_inverse_init(two_branches_inverse_t *self) {
     two_branches_inverse_begin(self, &two_branches_inverse_start[0],
                                &two_branches_inverse_drive[0]);
 }
 
-void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t u)
-{
+void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t u) {
     two_branches_inverse_begin(self, &two_branches_inverse_start[1],
                                &two_branches_inverse_drive[1]);
     (void)two_branches_inverse_step(self, u);
 }
 
-unsigned int two_branches_inverse_status(two_branches_inverse_t *self)
-{
+unsigned int two_branches_inverse_status(two_branches_inverse_t *self) {
     const unsigned int status = self->status;
     self->status = 0;
     return status;

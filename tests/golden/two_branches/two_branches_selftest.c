@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 b9995da8d0521d86dc4efaa0a570c2d44e4ee568235357ff6ef4e3e27b09516a, without this line
+ * Text: sha256 d5b609737ad2f8db47315e54cc3a3ee4b973b676ee22d152110653da989e8950, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "two_branches_selftest.h"
@@ -24,8 +24,7 @@ typedef struct {
 /* Too large for some stacks. */
 static two_branches_inverse_t two_branches_selftest_instance;
 
-static bool two_branches_selftest_same(two_branches_real_t a, two_branches_real_t b)
-{
+static bool two_branches_selftest_same(two_branches_real_t a, two_branches_real_t b) {
     const unsigned char *x = (const unsigned char *)&a;
     const unsigned char *y = (const unsigned char *)&b;
     unsigned int i;
@@ -225,8 +224,7 @@ static const two_branches_selftest_sample_t two_branches_selftest_inverse[185] =
     {'s', -1.0725222f, -0.1939407f, 0u},
 };
 
-int two_branches_selftest(void)
-{
+int two_branches_selftest(void) {
     int index = 0;
     unsigned int i;
     two_branches_inverse_init(&two_branches_selftest_instance);
