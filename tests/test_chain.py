@@ -66,7 +66,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["everything", "viscous", "aged"])
+@pytest.mark.parametrize("name", ["everything", "viscous", "aged", "drifting_late", "heated"])
 def test_cores_give_the_same_bits(name: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]
     known = [core for core in cores if core in hystgen.verification.targets.NAMES]
