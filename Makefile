@@ -62,7 +62,7 @@ blind: $(VENV)/ready
 
 # Blind plants behind compensators made from their records, four an effect
 track: $(VENV)/ready
-	$(BIN)/python -m tests.plants track --seeds 0:4 --jobs $(JOBS)
+	$(BIN)/python -m tests.plants track --seeds 0:5 --jobs $(JOBS)
 
 clean:
 	rm -rf $(VENV) build dist

@@ -2,10 +2,10 @@
 
     python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f]
 
-Code is that of a module at -O2, of zig and gcc the larger one; instructions are the mean of the inverse, strict -O2
-build of zig, over a slow sine. `any` is what any effect at all adds, a gain among it, which is the least of them; the
-others are more than that, or less. Plays that a search finds have that in common, `dilated`, and more than that.
-`effect_sizes.csv`, which the banner of emitted files is made from, has the code on both cores that
+Code is that of a module at -O2, of zig and gcc the larger one (RISC-V: zig); instructions are the mean of the inverse,
+strict -O2 build of zig, over a slow sine. `any` is what any effect at all adds, a gain among it, which is the least of
+them; the others are more than that, or less. Plays that a search finds have that in common, `dilated`, and more than
+that. `effect_sizes.csv`, which the banner of emitted files is made from, has the code on both cores that
 `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
 """
 
@@ -30,9 +30,10 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import comparison, emulator, sources, targets
 
-MOVED = ("polynomial", "centre")
+MOVED = ("dashpot", "polynomial", "centre")
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FLOATS = ("float32", "float64")
+FLOAT_ALONE = ("dilated", "polynomial", "centre")
+"""Plays that fixed point does not have."""
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
     "weights: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]",
@@ -48,6 +49,7 @@ EFFECTS = {
     "dead_zone": "name: saturation, shape: stops, lower: -900, upper: 900, give: 0.1",
     "relaxing": "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
     "dilated": "name: rate_dependence, betas: [1.0e-4, 0, 0, 0, 0, 0, 0, 0, 0, 0]",
+    "dashpot": "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2",
     "polynomial": "name: noncongruent, coefficients: [[0.02, 0.01], [0.02], [0.02], [0.02], [0.02], [0.02], [0.02], "
     "[0.02], [0.02], [0.02]]",
     "centre": "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
@@ -78,7 +80,8 @@ def measured(folder: Path, effect: str, arithmetic: str, cores: list[str]) -> tu
     record = comparison.expected_record(numbers, real, True, ("sine", np.zeros(len(u), np.uint8), u))
     code, counts = {}, {}
     for core in cores:
-        built = {name: _program(files, folder / f"{core}-{name}", core, name) for name in ("zig", "gcc")}
+        names = ("zig",) if core.startswith("rv32") else ("zig", "gcc")
+        built = {name: _program(files, folder / f"{core}-{name}", core, name) for name in names}
         images = {name: emulator.Image.load(path) for name, path in built.items()}
         code[core] = max(image.sections[".module"] for image in images.values()) - constants
         machine = emulator.Core(targets.find(core), images["zig"])
@@ -97,11 +100,12 @@ def main() -> None:
     cores = given.cores.split(",")
     sizes, costs = [], []
     with tempfile.TemporaryDirectory(prefix="hystgen-effects-") as place:
-        for arithmetic in FLOATS:
+        for arithmetic, about in ARITHMETICS.items():
             base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
             least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
-            moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
-            for effect in ("any", *EFFECTS):
+            if not about.fixed:
+                moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
+            for effect in ("any", *(each for each in EFFECTS if not (about.fixed and each in FLOAT_ALONE))):
                 folder = Path(place) / f"{effect}-{arithmetic}"
                 code, counts = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores)
                 before = base if effect == "any" else moved if effect in MOVED else least

@@ -13,15 +13,13 @@
 
    moving   false  no drive has been applied yet: the first one finds everything at rest there
             true   every block has seen the sample before
-   A step leaves its answer pending. The next step or settle takes it, or what was committed. */
+   A step leaves its answer pending. The next step or settle takes it, or what was committed.
 
-static bool hystgen_finite(hystgen_real_t x)
-{
-    return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
-}
+   Between the blocks a signal has a type of its own; what codes are as signals says chain_float.c
+   or chain_fixed.c. */
 
 /* An offset that is set, kept to what the displacement spans. */
-static hystgen_real_t hystgen_inside_offset(hystgen_real_t d)
+static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d)
 {
     return d > HYSTGEN_FARTHEST_OFFSET    ? HYSTGEN_FARTHEST_OFFSET
            : d < -HYSTGEN_FARTHEST_OFFSET ? -HYSTGEN_FARTHEST_OFFSET
@@ -35,9 +33,10 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v)
     if (moving) {
         hystgen_forward_travelled(self, v);
     }
-    const hystgen_real_t a = moving ? hystgen_forward_drive_side_absorb(self, v)
-                                    : hystgen_forward_drive_side_rest(self, v);
-    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, a));
+    const hystgen_signal_t x = hystgen_entered_drive(v);
+    const hystgen_signal_t a = moving ? hystgen_forward_drive_side_absorb(self, x)
+                                      : hystgen_forward_drive_side_rest(self, x);
+    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
     self->output = moving ? hystgen_forward_output_side_absorb(self, self->level)
                           : hystgen_forward_output_side_rest(self, self->level);
     self->applied = v;
@@ -51,9 +50,10 @@ static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v)
     if (moving) {
         hystgen_inverse_travelled(self, v);
     }
-    const hystgen_real_t a = moving ? hystgen_inverse_drive_side_absorb(self, v)
-                                    : hystgen_inverse_drive_side_rest(self, v);
-    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, a));
+    const hystgen_signal_t x = hystgen_entered_drive(v);
+    const hystgen_signal_t a = moving ? hystgen_inverse_drive_side_absorb(self, x)
+                                      : hystgen_inverse_drive_side_rest(self, x);
+    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
     self->output = moving ? hystgen_inverse_output_side_absorb(self, self->level)
                           : hystgen_inverse_output_side_rest(self, self->level);
     self->applied = v;
@@ -82,14 +82,17 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 /* What init and reset have in common once the plays are set; they stand for this drive. */
 static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending)
 {
-    self->drive = drive;
+    self->applied = drive;
+    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
     self->level = hystgen_forward_started(self);
-    self->applied = hystgen_forward_drive_side_rest(self, drive);
+    (void)hystgen_forward_drive_side_rest(self, hystgen_entered_drive(drive));
     self->output = hystgen_forward_output_side_rest(self, self->level);
-    self->answer = hystgen_forward_displaced(self, self->output);
+    self->answer =
+        hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
+    self->status = 0;
 }
 
 /* What init and reset have in common once the plays are set; they stand for this drive. */
@@ -101,12 +104,13 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
     self->stepped = false;
     self->filled = false;
     self->bits = 0;
-    self->drive = drive;
+    self->applied = drive;
+    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
     self->level = hystgen_inverse_started(self);
-    self->applied = hystgen_inverse_drive_side_rest(self, drive);
+    (void)hystgen_inverse_drive_side_rest(self, hystgen_entered_drive(drive));
     self->output = hystgen_inverse_output_side_rest(self, self->level);
 }
 
@@ -144,7 +148,7 @@ void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v)
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_real_t inside = hystgen_clamp_drive(v) + 0; /* no drive is -0 */
+    const hystgen_real_t inside = hystgen_applied_drive(v);
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
@@ -162,7 +166,7 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_real_t inside = hystgen_clamp_drive(v) + 0; /* no drive is -0 */
+    const hystgen_real_t inside = hystgen_applied_drive(v);
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
@@ -173,28 +177,37 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v)
     hystgen_inverse_absorb(self, inside);
 }
 
-void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
+/* The offset from the next step on, within its limits. */
+static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d)
 {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_real_t inside = hystgen_inside_offset(d);
+    const hystgen_signal_t inside = hystgen_inside_offset(d);
     if (inside < d || inside > d) {
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
     }
     self->offset = inside;
-    hystgen_forward_clock_start(self);
+}
+
+void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d)
+{
+    const hystgen_signal_t level = hystgen_entered_level(d);
+    hystgen_forward_put_offset(self, level);
+    if (hystgen_finite(level)) {
+        hystgen_forward_clock_start(self);
+    }
 }
 
 /* The offset from the next step on, within its limits. */
-static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_real_t d)
+static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d)
 {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_real_t inside = hystgen_inside_offset(d);
+    const hystgen_signal_t inside = hystgen_inside_offset(d);
     if (inside < d || inside > d) {
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
     }
@@ -203,8 +216,9 @@ static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_real_t d
 
 void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d)
 {
-    hystgen_inverse_put_offset(self, d);
-    if (hystgen_finite(d)) {
+    const hystgen_signal_t level = hystgen_entered_level(d);
+    hystgen_inverse_put_offset(self, level);
+    if (hystgen_finite(level)) {
         hystgen_inverse_clock_start(self);
     }
 }
@@ -237,24 +251,26 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v)
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    const hystgen_real_t reached = hystgen_forward_slewed(self, inside);
+    const hystgen_reach_t reached = hystgen_forward_slewed(self, inside);
     if (reached < inside || reached > inside) {
         self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
     }
-    hystgen_forward_absorb(self, reached);
-    self->answer = hystgen_forward_displaced(self, self->output);
+    hystgen_forward_absorb(self, (hystgen_real_t)reached);
+    self->answer =
+        hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
     return self->answer;
 }
 
 /* The next reference. Returns what the output side has to give at this sample. */
-static hystgen_real_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_real_t u)
+static hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_real_t u)
 {
     bool limited = false;
     const hystgen_real_t level = hystgen_inverse_clamp(u);
     if (level < u || level > u) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    const hystgen_real_t wanted = hystgen_inverse_undisplaced(self, level, &limited);
+    const hystgen_signal_t wanted =
+        hystgen_inverse_undisplaced(self, hystgen_entered_level(level), &limited);
     if (limited) {
         self->status |= HYSTGEN_STATUS_DOMAIN;
     }
@@ -279,14 +295,16 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u)
         hystgen_inverse_repeat(self);
         return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
     }
-    const hystgen_real_t y = hystgen_inverse_put(self, u);
+    const hystgen_signal_t y = hystgen_inverse_put(self, u);
     const bool moving = self->moving;
-    const hystgen_real_t h = moving ? hystgen_inverse_output_side_solve(self, y)
-                                    : hystgen_inverse_output_side_resting(self, y);
+    const hystgen_signal_t h = moving ? hystgen_inverse_output_side_solve(self, y)
+                                      : hystgen_inverse_output_side_resting(self, y);
     self->bits = 0;
-    const hystgen_real_t a = hystgen_inverse_drive(self, h, hystgen_inverse_input(self, h));
-    const hystgen_real_t v = moving ? hystgen_inverse_drive_side_solve(self, a) : a;
-    const hystgen_real_t reached = hystgen_inverse_slewed(self, v);
+    const hystgen_reach_t w = hystgen_inverse_input(self, h);
+    const hystgen_signal_t a = hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, h, w));
+    const hystgen_reach_t v =
+        hystgen_drive_code(moving ? hystgen_inverse_drive_side_solve(self, a) : a);
+    const hystgen_reach_t reached = hystgen_inverse_slewed(self, v);
     if (reached < v || reached > v) {
         self->bits |= HYSTGEN_STATUS_SLEW_LIMITED;
     }
@@ -304,7 +322,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_real_t inside = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
+    const hystgen_real_t inside = hystgen_applied_drive(applied);
     if (inside < applied || inside > applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
@@ -314,11 +332,13 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied)
 
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self)
 {
-    return hystgen_inverse_displaced(self, self->output);
+    unsigned int status = 0; /* of what is asked beside the steps */
+    return hystgen_output_code(hystgen_inverse_displaced(self, self->output), &status);
 }
 
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured, hystgen_real_t share)
 {
-    const hystgen_real_t more = share * (measured - hystgen_inverse_expected(self));
-    hystgen_inverse_put_offset(self, self->offset + more);
+    const hystgen_signal_t more =
+        hystgen_entered_level(measured) - hystgen_inverse_displaced(self, self->output);
+    hystgen_inverse_put_offset(self, self->offset + hystgen_shared(share, more));
 }

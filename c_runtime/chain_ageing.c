@@ -2,17 +2,17 @@
 
 /* Operators of a model with effects: the travel that its gain follows. */
 
-hystgen_real_t hystgen_forward_travel(const hystgen_forward_t *self)
+hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self)
 {
     return self->ageing_1.high;
 }
 
-hystgen_real_t hystgen_inverse_travel(const hystgen_inverse_t *self)
+hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self)
 {
     return self->ageing_1.high;
 }
 
-void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_real_t travel)
+void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel)
 {
     if (!hystgen_finite(travel)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -21,7 +21,7 @@ void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_real_t travel)
     }
 }
 
-void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_real_t travel)
+void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel)
 {
     if (!hystgen_finite(travel)) {
         self->status |= HYSTGEN_STATUS_HELD;

@@ -1,14 +1,14 @@
 #include "hystgen_runtime.h"
 
 /* The drive may go anywhere in one step. */
-static hystgen_real_t hystgen_forward_slewed(const hystgen_forward_t *self, hystgen_real_t v)
+static hystgen_reach_t hystgen_forward_slewed(const hystgen_forward_t *self, hystgen_reach_t v)
 {
     (void)self;
     return v;
 }
 
 /* The drive may go anywhere in one step. */
-static hystgen_real_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_real_t v)
+static hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_reach_t v)
 {
     (void)self;
     return v;

@@ -10,7 +10,7 @@ static hystgen_real_t hystgen_moved_sum(const hystgen_real_t *play, const hystge
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_real_t z = hystgen_moved(i, play[i], play[0], w);
+        const hystgen_real_t z = hystgen_moved(i, play, w);
         const bool rests = z >= play[i] && z <= play[i];
         sum = sum + hystgen_play.weight[i] * (rests ? bent[i] : hystgen_bent(i, z));
     }
@@ -24,13 +24,13 @@ static hystgen_real_t hystgen_moved_follow(hystgen_real_t *play, hystgen_real_t 
     hystgen_real_t sum = hystgen_play.weight[0] * w;
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_real_t z = hystgen_moved(i, play[i], play[0], w);
+        const hystgen_real_t z = hystgen_moved(i, play, w);
         const hystgen_real_t rest = hystgen_left(i, z, w);
         const bool rests = z >= play[i] && z <= play[i];
         const hystgen_real_t value = rests ? bent[i] : hystgen_bent(i, z);
         sum = sum + hystgen_play.weight[i] * value;
         bent[i] = rest >= z && rest <= z ? value : hystgen_bent(i, rest);
-        play[i] = rest;
+        hystgen_keep(i, play, w, rest);
     }
     play[0] = w;
     return sum;
@@ -46,7 +46,7 @@ static hystgen_real_t hystgen_moved_rest(hystgen_real_t *play, hystgen_real_t *b
         const hystgen_real_t low = w - hystgen_play.threshold[i];
         const hystgen_real_t high = w + hystgen_play.threshold[i];
         const hystgen_real_t upper = play[i] > high ? high : play[i];
-        play[i] = upper < low ? low : upper;
+        hystgen_put(i, play, upper < low ? low : upper);
         bent[i] = hystgen_bent(i, play[i]);
         sum = sum + hystgen_play.weight[i] * bent[i];
     }

@@ -1,17 +1,17 @@
 #include "hystgen_runtime.h"
 
 /* The drive nearest to v that the amplifier reaches in one step; any, before the first one. */
-static hystgen_real_t hystgen_forward_slewed(const hystgen_forward_t *self, hystgen_real_t v)
+static hystgen_reach_t hystgen_forward_slewed(const hystgen_forward_t *self, hystgen_reach_t v)
 {
-    const hystgen_real_t highest = self->applied + HYSTGEN_SLEW_RISING;
-    const hystgen_real_t lowest = self->applied - HYSTGEN_SLEW_FALLING;
+    const hystgen_reach_t highest = (hystgen_reach_t)self->applied + HYSTGEN_SLEW_RISING;
+    const hystgen_reach_t lowest = (hystgen_reach_t)self->applied - HYSTGEN_SLEW_FALLING;
     return !self->moving ? v : v > highest ? highest : v < lowest ? lowest : v;
 }
 
 /* The drive nearest to v that the amplifier reaches in one step; any, before the first one. */
-static hystgen_real_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_real_t v)
+static hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_reach_t v)
 {
-    const hystgen_real_t highest = self->applied + HYSTGEN_SLEW_RISING;
-    const hystgen_real_t lowest = self->applied - HYSTGEN_SLEW_FALLING;
+    const hystgen_reach_t highest = (hystgen_reach_t)self->applied + HYSTGEN_SLEW_RISING;
+    const hystgen_reach_t lowest = (hystgen_reach_t)self->applied - HYSTGEN_SLEW_FALLING;
     return !self->moving ? v : v > highest ? highest : v < lowest ? lowest : v;
 }

@@ -2,16 +2,6 @@
 
 #define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's output, in sums */
 
-/* Field by field: for a whole structure a compiler may call memcpy. */
-HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
-{
-    to->output = from->output;
-    to->input = from->input;
-    to->k = from->k;
-    to->depth = from->depth;
-    to->rising = from->rising;
-}
-
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x)
 {
@@ -29,8 +19,7 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where the play of a segment, of a corner's block, begins to follow, as the present move sees it.
- */
+/* Where the play of a segment of a corner's block begins to follow, as the move sees it. */
 static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
                                      const hystgen_segment_t *s, bool by_output)
 {
@@ -48,14 +37,6 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
         here->k = 0;
     }
     here->rising = !here->rising;
-}
-
-/* Puts a kink where the play of a segment began to follow that corner c held. */
-HYSTGEN_APART void hystgen_count_from(const hystgen_place_t *here, const hystgen_corner_t *c,
-                                      const hystgen_segment_t *s, hystgen_kink_t *kink)
-{
-    kink->input = hystgen_begins(here, c, s, false);
-    kink->output = hystgen_begins(here, c, s, true);
 }
 
 /* The last place where another play begins to follow before the output, or input, `to`; or here. */
@@ -97,7 +78,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        hystgen_count_from(here, c, &t->segment[k], kink);
+        kink->input = hystgen_begins(here, c, &t->segment[k], false);
+        kink->output = hystgen_begins(here, c, &t->segment[k], true);
     }
 }
 
@@ -170,8 +152,7 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input, near the range, that gives an output behind a kink, `to` as the present move sees it.
- */
+/* The input, near the range, that gives an output behind a kink, `to` as the move sees it. */
 HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int64_t to)
 {

@@ -10,16 +10,6 @@ static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_rea
 #endif
 }
 
-/* Field by field: for a whole structure a compiler may call memcpy. */
-HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from)
-{
-    to->input = from->input;
-    to->output = from->output;
-    to->k = from->k;
-    to->depth = from->depth;
-    to->rising = from->rising;
-}
-
 /* There is no line to go on along: the next sample searches. */
 HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m)
 {
@@ -63,8 +53,7 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
+        const bool before = x > step[4u * middle];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -150,7 +139,6 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        cap = t->segment[c->top].way - from;
         if (t->segment[c->top].reach > room) {
             /* gains fall from segment to segment: the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
@@ -233,20 +221,15 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start)
 {
     unsigned int k;
-    corner[0].output = start->bottom.output;
-    corner[0].pass[0] = start->bottom.pass[0];
-    corner[0].pass[1] = start->bottom.pass[1];
-    corner[0].top = start->bottom.top;
-    corner[0].rose = start->bottom.rose;
+    corner[0] = start->bottom;
     m->here.depth = 1;
     for (k = start->bottom.top - 1u; k > 0; --k) {
+        const hystgen_real_t *center = start->center[start->step > 0 ? k : 0u];
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = start->center[start->step > 0 ? k : 0u][0] +
-                        hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
-        m->here.output = start->center[start->step > 0 ? k : 0u][1] +
-                         hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
+        m->here.input = center[0] + hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
+        m->here.output = center[1] + hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
         hystgen_leave_corner(t, m, corner);
     }
     m->here.k = 0;

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Input of the plays: w = G[v]. */
-HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_real_t v, bool ascending)
+HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending)
 {
     (void)ascending;
     return (hystgen_play_t)hystgen_curve(hystgen_front_knot, hystgen_front_scale,
@@ -17,7 +17,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool asce
     int64_t v;
     (void)ascending;
     if (w < ends->first || w > ends->last) {
-        return hystgen_beyond(ends, w, HYSTGEN_DRIVE_MIN, HYSTGEN_DRIVE_MAX, limited);
+        return hystgen_beyond(ends, w, HYSTGEN_FINE_MIN, HYSTGEN_FINE_MAX, limited);
     }
     *limited = false;
     v = hystgen_curve(hystgen_back_knot, hystgen_back_scale, hystgen_back_coefficient,

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Input of the plays: the drive itself. */
-static inline hystgen_play_t hystgen_front_forward(hystgen_real_t v)
+static inline hystgen_play_t hystgen_front_forward(hystgen_fine_t v)
 {
     return v;
 }

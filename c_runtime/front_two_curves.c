@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
-HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_real_t v, bool ascending)
+HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending)
 {
     if (ascending) {
         return (hystgen_play_t)hystgen_curve(
@@ -21,7 +21,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool asce
         ascending ? &hystgen_back_ascending_ends : &hystgen_back_descending_ends;
     int64_t v;
     if (w < ends->first || w > ends->last) {
-        return hystgen_beyond(ends, w, HYSTGEN_DRIVE_MIN, HYSTGEN_DRIVE_MAX, limited);
+        return hystgen_beyond(ends, w, HYSTGEN_FINE_MIN, HYSTGEN_FINE_MAX, limited);
     }
     *limited = false;
     if (ascending) {

@@ -11,7 +11,7 @@ void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t tem
 /* A gain in place of that of the travel, from the next step on, until a travel is set. */
 void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain);
 /* Distance that the drive has travelled: keep it where it survives, and set it behind init. */
-hystgen_real_t hystgen_forward_travel(const hystgen_forward_t *self);
-void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_real_t travel);
+hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self);
+void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel);
 
 #endif

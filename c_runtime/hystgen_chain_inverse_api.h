@@ -14,8 +14,8 @@ void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t tem
 /* A gain in place of that of the travel, from the next step on, until a travel is set. */
 void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain);
 /* Distance that the drive has travelled: keep it where it survives, and set it behind init. */
-hystgen_real_t hystgen_inverse_travel(const hystgen_inverse_t *self);
-void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_real_t travel);
+hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self);
+void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel);
 /* The displacement that the model expects of the drive that was applied last. */
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self);
 /* Trim the offset by this share, 0 to 1, of what a sensor measures beyond the expected

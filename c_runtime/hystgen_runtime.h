@@ -48,6 +48,22 @@ typedef hystgen_real_t hystgen_reach_t;
 typedef hystgen_real_t hystgen_sum_t;
 #endif
 
+/* In a model with effects, signals between its blocks, in fixed point wider than codes; a drive in
+   front of its plays, in fixed point with bits below a code; and the distance it has travelled.
+   Without effects, and in floating point, all of them are what the caller has. */
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
+typedef hystgen_sum_t hystgen_signal_t;
+typedef hystgen_play_t hystgen_fine_t;
+typedef hystgen_sum_t hystgen_travel_t;
+#else
+typedef hystgen_real_t hystgen_signal_t;
+typedef hystgen_real_t hystgen_fine_t;
+typedef hystgen_real_t hystgen_travel_t;
+#define HYSTGEN_FINE_MIN HYSTGEN_DRIVE_MIN
+#define HYSTGEN_FINE_MAX HYSTGEN_DRIVE_MAX
+#define hystgen_clamp_fine hystgen_clamp_drive
+#endif
+
 /* How functions appear in emitted files: kernels are static where a model carries them as its own;
    some are kept apart there, so that less is on the stack. */
 #include "apart.h"

@@ -3,7 +3,7 @@
 /* Whether going to v is a move of the branch that v was computed on. */
 static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending)
 {
-    const hystgen_real_t inside = hystgen_clamp_drive(v);
+    const hystgen_fine_t inside = hystgen_clamp_fine(v);
     return inside > self->drive   ? ascending
            : inside < self->drive ? !ascending
                                   : self->ascending == ascending;
@@ -13,14 +13,14 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
    first, then the other one, and where neither fits the drive holds; `limited` tells whether no
    drive at all gives w. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
-                                                                      hystgen_real_t level,
+                                                                      hystgen_signal_t level,
                                                                       hystgen_reach_t w,
                                                                       bool *limited)
 {
     const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
     hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
     if (!hystgen_inverse_fits(self, v, up)) {
-        const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_drive(v) - self->drive;
+        const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_fine(v) - self->drive;
         if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) {
             /* back by rounding alone */
             v = self->drive;

@@ -3,7 +3,7 @@
 /* Operators of engine loop: plays behind a memoryless part of two branches. */
 
 /* The actuator is at drive v, whose own move picks the branch. Returns the input of the plays. */
-static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_real_t v)
+static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_fine_t v)
 {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
@@ -11,7 +11,7 @@ static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_re
 }
 
 /* The actuator is at drive v, whose own move picks the branch. Returns the input of the plays. */
-static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
+static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fine_t v)
 {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
@@ -19,7 +19,7 @@ static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_re
 }
 
 /* The drive that gives w on the branch of its own move. */
-static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
+static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_signal_t level,
                                              hystgen_reach_t w)
 {
     bool limited;

@@ -3,21 +3,21 @@
 /* Operators of engine loop: plays alone. */
 
 /* The actuator is at drive v. Returns the input of the plays. */
-static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_real_t v)
+static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_fine_t v)
 {
     (void)self;
     return hystgen_front_forward(v);
 }
 
 /* The actuator is at drive v. Returns the input of the plays. */
-static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v)
+static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fine_t v)
 {
     self->drive = v;
     return hystgen_front_forward(v);
 }
 
 /* The drive that gives w. */
-static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
+static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_signal_t level,
                                              hystgen_reach_t w)
 {
     (void)self;

@@ -1,15 +1,13 @@
 #include "hystgen_runtime.h"
 
-/* Play i that rests at q, once its input has gone from `before` to w; the threshold grows with the
-   way of the step. */
-static hystgen_real_t hystgen_moved(unsigned int i, hystgen_real_t q, hystgen_real_t before,
-                                    hystgen_real_t w)
+/* Play i once the input of the plays has gone to w; thresholds grow with the way of the step. */
+static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, hystgen_real_t w)
 {
-    const hystgen_real_t way = w > before ? w - before : before - w;
+    const hystgen_real_t way = w > play[0] ? w - play[0] : play[0] - w;
     const hystgen_real_t threshold = hystgen_play.threshold[i] + hystgen_wider[i] * way;
     const hystgen_real_t low = w - threshold;
     const hystgen_real_t high = w + threshold;
-    const hystgen_real_t upper = q > high ? high : q;
+    const hystgen_real_t upper = play[i] > high ? high : play[i];
     return upper < low ? low : upper;
 }
 

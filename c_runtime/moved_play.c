@@ -1,13 +1,11 @@
 #include "hystgen_runtime.h"
 
-/* Play i that rests at q, once its input has gone from `before` to w. */
-static hystgen_real_t hystgen_moved(unsigned int i, hystgen_real_t q, hystgen_real_t before,
-                                    hystgen_real_t w)
+/* Play i once the input of the plays has gone to w. */
+static hystgen_real_t hystgen_moved(unsigned int i, const hystgen_real_t *play, hystgen_real_t w)
 {
     const hystgen_real_t low = w - hystgen_play.threshold[i];
     const hystgen_real_t high = w + hystgen_play.threshold[i];
-    const hystgen_real_t upper = q > high ? high : q;
-    (void)before;
+    const hystgen_real_t upper = play[i] > high ? high : play[i];
     return upper < low ? low : upper;
 }
 

@@ -1,7 +1,6 @@
 #define HYSTGEN_HALF 0.5f
 
 /* Whether each operation of a number is a call of a library. */
-#if (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) ||    \
-    defined(__AVR__)
+#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
 #define HYSTGEN_SOFT_FLOAT
 #endif

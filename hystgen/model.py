@@ -23,13 +23,18 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, load_parameters
+from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.chain.chain import Chain
-    from hystgen.compensator.chain.tables import ChainTables
+    from hystgen.compensator.chain.layout import ChainTables
     from hystgen.compensator.chained import Compensator
     from hystgen.compensator.layout import FixedTables, Tables
     from hystgen.effects import Effect, Run
+
+
+MOST_A_CODE = 0.01
+"""Share of its range by which the drive of fixed point may move for one code of the reference: more is noise."""
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -95,11 +100,7 @@ class Model:
         names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
         if self.parameters.sample_time is None:
             raise EffectsError(f"C for a model with effects ({names}) needs sample_time in the parameter file")
-        if ARITHMETICS[arithmetic].fixed:
-            raise UnsupportedEffectsError(
-                f"effects ({names}) are compensated in float32 and float64, not in {arithmetic}"
-            )
-        if refused := self.refusals(operator):
+        if refused := self.refusals(operator, arithmetic):
             raise UnsupportedEffectsError(
                 "not in the C: " + "; ".join(f"{effect.name}: {reason}" for effect, reason in refused)
                 + "; remove it from model.effects, or leave it out with --allow-partial"
@@ -113,23 +114,34 @@ class Model:
         from hystgen.compensator.chain import tables as chain_tables
 
         how, seconds = self.parameters.emit.compensation, self.parameters.sample_time
-        if how.noise_gain is None or seconds is None:
+        fixed = ARITHMETICS[arithmetic].fixed
+        if seconds is None or (how.noise_gain is None and not fixed):
             return
-        gain = chain_tables.build(self.chain, arithmetic, seconds, how).noise_gain
+        compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
+        gain = compiled.noise_gain
+        if how.noise_gain is None:
+            low, high = (int(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+            if gain > MOST_A_CODE * (high - low):
+                raise UnsupportedEffectsError(
+                    f"with a noise gain of {gain:.4g} one of the {high - low} codes of a reference in {arithmetic} "
+                    f"moves the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
+                    f"{ARITHMETICS[arithmetic].finer}, or allow it with emit.compensation.noise_gain"
+                )
+            return
         if gain > how.noise_gain:
             raise UnsupportedEffectsError(
                 f"the inverse has a noise gain of {gain:.4g}, more than emit.compensation.noise_gain = "
                 f"{how.noise_gain:g}; round corners of the reference (corner), or allow more"
             )
 
-    def refusals(self, operator: str) -> list[tuple[Effect, str]]:
+    def refusals(self, operator: str, arithmetic: str) -> list[tuple[Effect, str]]:
         """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""
         if not self.effects or self.parameters.sample_time is None:
             return []
         from hystgen.compensator.chain import tables as chain_tables
 
         how = self.parameters.emit.compensation
-        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, how))
+        return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, arithmetic, how))
 
     def without(self, effects: Sequence[Effect]) -> Model:
         """The model with these of its effects left out."""
@@ -161,7 +173,7 @@ class Model:
             self.need_compensated(arithmetic, self.parameters.emit.operator)
             assert self.parameters.sample_time is not None
             how = self.parameters.emit.compensation
-            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time, how).tables
+            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time, how, self._lsb).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
 
     @property
@@ -231,7 +243,7 @@ class Model:
                 f"drift is counted from the first sample, and t begins at {float(record.t[0]):g} s; give t from 0 on"
             )
         how = self.parameters.emit.compensation
-        return run.answers(tables.build(self.chain, arithmetic, seconds, how), record, inverse)
+        return run.answers(tables.build(self.chain, arithmetic, seconds, how, self._lsb), record, inverse)
 
     def run(
         self,

@@ -79,6 +79,10 @@ CHAINS = {
     "worn": chain("worn", "name: ageing, shape: exponentials, losses: [0.02, 0.03], travels: [10, 200]", CREEP),
     "viscous": chain("viscous", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
                      "name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]"),
+    "dashpot": chain("dashpot", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2.5"),
+    "soft_dashpot": chain("soft_dashpot", "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, "
+                          "exponent: 0.5", "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
+                          CREEP, front=TANH),
     "relaxing": chain("relaxing", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", front=BRANCHES),
     "dilated": chain("dilated", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
@@ -101,3 +105,9 @@ CHAINS = {
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
 INVERSE_ALONE = ("straight", "viscous_twin", "late", "drifting_late", "everything")
+
+FLOAT_ALONE = (
+    "drifting", "drifting_late", "heated", "viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot",
+)  # fmt: skip
+"""Those with a clock or own heat, or whose plays are bent, have a nonlinear dashpot or do not all relax with one time
+constant, which fixed point does not have."""

@@ -52,6 +52,9 @@ MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("linear", "both", "q15", "corners", "shared-runtime"),
     ("everything", "inverse", "float32", "loop", "self-contained"),
     ("viscous", "both", "float64", "loop", "shared-runtime"),
+    ("everything", "inverse", "q31", "loop", "self-contained"),
+    ("relaxing", "both", "q15", "loop", "shared-runtime"),
+    ("worn", "both", "q15", "loop", "single-header"),
 )
 
 # cppcheck reads no system header; these are what <float.h> says on every target, and the core whose code has most to

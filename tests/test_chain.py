@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, CREEP, FILES, INVERSE_ALONE, chain
+from modelfiles import CHAINS, CREEP, FILES, FLOAT_ALONE, INVERSE_ALONE, chain
+from scipy.integrate import solve_ivp
 
 import hystgen
 from hystgen.basics import jit
@@ -24,6 +25,8 @@ from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.drift import compensator as drift
+from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -36,6 +39,17 @@ T, N = 1e-3, 1500
 
 def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
+
+
+FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
+EVERY = [(name, arithmetic) for name in CHAINS for arithmetic in ("float32", "float64")] + [
+    (name, arithmetic) for name in FIXED for arithmetic in ("q31", "q15")
+]
+
+
+def noisy(name: str) -> Model:
+    """A model of which fixed point may make any noise."""
+    return with_options(name, noise_gain=1e9)
 
 
 def operator(name: str) -> str:
@@ -57,32 +71,38 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
     return Run(np.arange(n) * T, np.clip(np.float32(u).astype(float), low, high), {"temperature": 20.0 + u})
 
 
-@pytest.mark.parametrize("name", CHAINS)
-@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize(("name", "arithmetic"), EVERY)
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
-    report = hystgen.verify(model(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["everything", "viscous", "aged", "drifting_late", "heated"])
-def test_cores_give_the_same_bits(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [("everything", "float32"), ("viscous", "float32"), ("aged", "float32"),
+     ("drifting_late", "float32"), ("heated", "float32"), ("everything", "q31"), ("everything", "q15"),
+     ("worn", "q15"), ("quick", "q15")],
+)  # fmt: skip
+def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]
     known = [core for core in cores if core in hystgen.verification.targets.NAMES]
-    report = hystgen.verify(model(name), operator=operator(name), targets=known, target_length=150)
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), targets=known, target_length=150)
     assert report.ok, report.table()
 
 
 EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy", "drifting"), 1e-12) | {
-    "viscous": 2e-4, "relaxing": 2e-4,
+    "viscous": 2e-4, "relaxing": 2e-4, "dashpot": 1e-4, "soft_dashpot": 2e-3,
 }  # fmt: skip
+"""Of the output range. Viscous plays: contacts inside a step. Dashpots: where on its way in a step an input counts as
+standing still, which matters where plays catch up within one."""
 
 
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: int) -> None:
-    """Of the output range at every sample that no limit acts on; viscous plays but for contacts inside a step."""
+    """At every sample that no limit acts on."""
     one = model(name)
     numbers = compiled(one, "float64")
     run = record(numbers, seed, share=0.6)
@@ -222,6 +242,42 @@ def test_slow_states_neither_stall_nor_drift() -> None:
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 0.02 * abs(moved) + 2 * float(np.spacing(np.float32(y[-1])))
 
 
+def test_a_play_with_a_dashpot_creeps_on_to_where_it_would_go_without_rounding() -> None:
+    """In single precision its last moves are 1e-4 of its last bit: the drive stands still for 1e6 samples."""
+    one = model("dashpot")
+    n = 1_000_000
+    calls = np.full(n, slots.OP_STEP, dtype=np.uint8)
+    v = np.full(n, 3.0)
+    v[:100] = np.linspace(-3.0, 3.0, 100)
+    y, _ = reference.answers(compiled(one, "float32").tables, False, calls, v)
+    t = np.append(np.arange(100) * T, (n - 1) * T)
+    wanted = one.simulate(np.append(v[:100], 3.0), t=t)
+    crept = float(wanted[-1] - wanted[-2])
+    assert crept > 0.1
+    assert abs(float(y[-1]) - float(wanted[-1])) <= 1e-3 * crept
+    assert abs(float(y[-1]) - float(y[n // 2])) > 10.0 * float(np.spacing(y[-1]))
+
+
+@pytest.mark.parametrize("exponent", [0.1, 0.25, 0.5, 0.95, 1.05, 2.0, 4.0, 10.0])
+@pytest.mark.parametrize("tau", [1e-4, 3e-3, 0.2])
+def test_what_a_dashpot_yields_in_a_step(exponent: float, tau: float) -> None:
+    """Against an integrator that does not know the solution; few pieces, which meet and rise."""
+    scale, top = 3.0, 30.0
+    effect = RelaxingPlays(name="rate_dependence", shape="relaxation", time_constant=tau, exponent=exponent)
+    rows = dashpot.pieces(effect, scale, T, top)
+    assert len(rows) <= 64
+    assert np.all(np.diff(rows[:, dashpot.BEGIN]) > 0.0)
+
+    def law(_: float, e: Any) -> Any:
+        return -scale / tau * (np.maximum(e, 0.0) / scale) ** exponent
+
+    for x in np.geomspace(1e-3, top, 23):
+        left = solve_ivp(law, (0.0, T), [x], method="LSODA", rtol=1e-10, atol=1e-12 * scale).y[0, -1]
+        begin, *c = rows[np.searchsorted(rows[:, dashpot.BEGIN], x, side="right") - 1]
+        yields = np.polynomial.polynomial.polyval(x - begin, c)
+        assert yields == pytest.approx(x - max(left, 0.0), rel=1.1 * dashpot.YIELD_ERROR, abs=1e-9)
+
+
 def run_calls(one: Model, calls: list[tuple[int, float]], arithmetic: str = "float64") -> tuple[Any, Any]:
     numbers = compiled(one, arithmetic)
     op, x = zip(*calls, strict=True)
@@ -312,7 +368,7 @@ def test_preview_reads_ahead_what_is_late() -> None:
 
 def with_options(name: str, **options: Any) -> Model:
     one = model(name).parameters
-    how = Compensation(**options)
+    how = one.emit.compensation.model_copy(update=Compensation(**options).model_dump(exclude_unset=True))
     return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
 
 
@@ -430,12 +486,12 @@ def test_only_what_the_model_has_is_emitted() -> None:
     assert {"travel", "set_travel", "set_gain"} <= calls
 
 
-@pytest.mark.parametrize("name", CHAINS)
-def test_memory_in_the_banner_is_that_of_the_compiler(name: str, tmp_path: Path) -> None:
-    one = model(name)
-    options = emit_options(one, operator=operator(name))
+@pytest.mark.parametrize(("name", "arithmetic"), [pair for pair in EVERY if pair[1] != "float64"])
+def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
+    one = noisy(name)
+    options = emit_options(one, operator(name), arithmetic)
     cost = module.cost_of(one.parameters, one.cascade, options)
-    hystgen.emit(one, tmp_path, operator=operator(name))
+    hystgen.emit(one, tmp_path, operator=operator(name), arithmetic=arithmetic)
     sizes = "".join(f'    printf("%u ", (unsigned)sizeof({name}_{op}_t));\n' for op, _ in cost.memory.instances)
     main = f"int main(void)\n{{\n{sizes}    return 0;\n}}\n"
     (tmp_path / "size.c").write_text(f'#include "{name}.h"\n#include <stdio.h>\n{main}')
@@ -447,7 +503,6 @@ def test_memory_in_the_banner_is_that_of_the_compiler(name: str, tmp_path: Path)
 REFUSED = {
     "name: drift, rate: 0.1": "a clock that runs alone",
     "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001": "own heat",
-    "name: rate_dependence, shape: relaxation, time_constant: 0.01, exponent: 2": "exponent other than 1",
     "name: noncongruent, coefficients: [[9], [9], [9], [9], [9], [9]]": "there is no inverse",
 }
 
@@ -468,12 +523,20 @@ def test_what_has_no_inverse_is_refused_or_left_out_and_named(effect: str, reaso
     assert "part_creep" in emitted_files(one, allow_partial=True)["part.c"], "what there is stays"
 
 
-def test_needs_a_sample_time_and_floating_point(tmp_path: Path) -> None:
+def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
-    with pytest.raises(UnsupportedEffectsError, match="not in q15"):
-        emit_options(model("creeping"), arithmetic="q15")
+    for name in FLOAT_ALONE:
+        with pytest.raises(UnsupportedEffectsError, match="in fixed point there is no C for plays that"):
+            emit_options(model(name), arithmetic="q15", operator="inverse")
+    assert emit_options(model("viscous"), arithmetic="q31", allow_partial=True).left_out
+    with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
+        emit_options(model("straight"), arithmetic="q15")
+    with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes a sample are less than one"):
+        compiled(model("slow", chain("slow", "name: slew_limit, rate: 0.1")), "q15")
+    with pytest.raises(FormatError, match="a lag: its states and constants do not fit q31"):
+        compiled(model("slow", chain("slow", "name: lag, time_constant: 1.0e9")), "q31")
     with pytest.raises(UnsupportedEffectsError, match="only the inverse has it"):
         emit_options(model("late"), operator="both")
     with pytest.raises(FormatError, match="too large for float32"):

@@ -13,7 +13,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -167,6 +167,68 @@ class TestOneWrongSample:
         assert [(each["record"], each["channel"], each["count"]) for each in faulty] == [("r2", "v", 2), ("r2", "y", 2)]
 
 
+class TestOneWrongRow:
+    """Drive and output wrong together: a lost packet, a row of another moment, exchanged cells, a doubled row."""
+
+    KINDS: ClassVar[dict[str, Callable[[Array, Array, int], tuple[float, float]]]] = {
+        "zeros": lambda _v, _y, _k: (0.0, 0.0),
+        "another's": lambda v, y, k: (v[k - 311], y[k - 311]),
+        "exchanged": lambda v, y, k: (y[k], v[k]),
+        "ends": lambda v, y, _k: (np.max(v), np.max(y)),
+        "beyond": lambda v, y, _k: (np.max(v) + 0.3 * np.ptp(v), np.max(y) + 0.3 * np.ptp(y)),
+    }
+
+    @pytest.mark.parametrize("name", ["lines", "fading"])
+    @pytest.mark.parametrize("kind", KINDS)
+    def test_the_fit_is_that_of_the_record_without_it(self, name: str, kind: str) -> None:
+        """Inside a record where a pulse of the drive would have left its memory, and at its end."""
+        v = DRIVES[name]
+        y = output(v)
+        rng = np.random.default_rng([len(name), len(kind)])
+        how = {"history": [0.0], "thresholds": THRESHOLDS}
+        n, tried = len(v), 0
+        for k in (n - 1, n - 2, *rng.integers(320, n - 100, 24)):
+            wrong_v, wrong_y = v.copy(), y.copy()
+            wrong_v[k], wrong_y[k] = self.KINDS[kind](v, y, k)
+            left = np.abs(output(wrong_v, 0.0) - output(v, 0.0))[k + 1 :]
+            stands_apart = abs(wrong_v[k] - v[k]) > 0.3 * np.ptp(v)
+            if not stands_apart or (k < n - 2 and np.count_nonzero(left > 10.0 * NOISE) < 20):
+                continue
+            tried += 1
+            fit = hystgen.identify(record(wrong_v, wrong_y), **how)
+            clean = hystgen.identify(less(record(v, y), [k]), **how)
+            assert apart(fit, clean) < 0.005, k
+            assert fit.parameters.input_range == pytest.approx(clean.parameters.input_range, abs=0.6), k
+            figures = [row(each, "all").rms_percent for each in (fit, clean)]
+            assert figures[0] == pytest.approx(figures[1], rel=0.15), k
+            assert any("of v that y does not bear out, bridged" in text for text in fit.warnings), k
+        assert tried > 2
+
+    @pytest.mark.parametrize("history", [(0.0,), None])
+    def test_at_the_end_it_hides_no_memory(self, history: tuple[float, ...] | None) -> None:
+        """The largest drive of a record, if real, would make the memory known in its last row only."""
+        v = DRIVES["fading"]
+        y = output(v)
+        clean = hystgen.identify(record(v[:-2], y[:-2]), history=history)
+        for k in (len(v) - 1, len(v) - 2):
+            wrong_v, wrong_y = v.copy(), y.copy()
+            wrong_v[k], wrong_y[k] = 140.0, 30.0
+            fit = hystgen.identify(record(wrong_v, wrong_y), history=history)
+            assert apart(fit, clean) < 0.005
+            assert fit.parameters.input_range == clean.parameters.input_range
+
+    @pytest.mark.parametrize("name", ["lines", "fading"])
+    def test_a_pulse_that_left_its_memory_stays(self, name: str) -> None:
+        rng = np.random.default_rng(len(name))
+        for k in rng.integers(320, len(DRIVES[name]) - 100, 6):
+            v = DRIVES[name].copy()
+            v[k] = rng.choice([0.0, 100.0, 125.0])
+            courses, _ = prepared.courses([record(v, output(v))], (0.0,), 0)
+            prepared.mask_outliers(courses, [], None, 0.05)
+            assert np.array_equal(courses[0].v, v), k
+            assert np.isfinite(courses[0].y).all(), k
+
+
 class TestNoneInCleanRecords:
     @pytest.mark.slow(one_in=3)
     @pytest.mark.parametrize("noise", [0.0, 0.003, 0.1])
@@ -216,6 +278,7 @@ class TestNoneInCleanRecords:
             made, reported = prepared.courses([given], (0.0,), 0)
             assert reported == [], path.name
             assert all(np.isfinite(each.y).all() for each in made), path.name
+            assert not any(faults.pulses(each.v) for each in made), path.name
             assert np.array_equal(np.concatenate([each.v for each in made]), given.v), path.name
 
 

@@ -453,6 +453,13 @@ def test_a_scheduler_that_is_not_there(
     assert not (tmp_path / "params").exists()
 
 
+def test_nothing_more_is_said_of_a_scheduler_when_the_program_ends(few: Path, tmp_path: Path) -> None:
+    words = ["identify", "--batch", str(few), "-o", str(tmp_path / "params"), "--scheduler", "tls://127.0.0.1:1"]
+    program = f"from hystgen.fleet import workers; from hystgen.cli import main; workers.PATIENCE = 0.5; main({words})"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+
+
 def test_a_scheduler_that_dies_is_one_message(units: Path, tmp_path: Path) -> None:
     """Without the tracebacks that Dask logs."""
     output = tmp_path / "params"

@@ -434,6 +434,19 @@ class TestStartMemory:
         spoilt = hystgen.identify(record(v, garbage), thresholds=THRESHOLDS, holdout=record(v, y))
         assert spoilt.parameters != fit.parameters
 
+    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize("noise", [0.0003, 0.01])
+    def test_noise_of_the_drive_does_not_choose_among_turns(self, seed: int, noise: float) -> None:
+        """A drive that begins and ends at its least value: its first rise makes the memory known."""
+        rng = np.random.default_rng(seed)
+        at = np.arange(3001)
+        v = 50.0 * (1.0 - np.cos(2.0 * np.pi * 3.0 * at / 3000)) * (1.0 - at / 6000)
+        y = noisy(brute_output(v, THRESHOLDS, WEIGHTS, 0.0), 0.02)
+        fit = hystgen.identify(record(v + rng.normal(0.0, noise, len(v)), y), thresholds=THRESHOLDS)
+        assert row(fit, "all").ignored == pytest.approx(first_exact(v, THRESHOLDS[-1]), abs=5)
+        known = hystgen.identify(record(v, y), thresholds=THRESHOLDS, history=(0.0,))
+        assert fitted(fit)[1] == pytest.approx(fitted(known)[1], abs=0.03 * sum(WEIGHTS))
+
     def test_until_both_ends_where_a_play_reaches_further(self) -> None:
         """A play that never moves once both ends are known counts as a constant, whatever its place."""
         v = np.interp(np.arange(1001) / 40.0, np.arange(26), [50.0, *([90.0, 10.0] * 12), 50.0])

@@ -176,11 +176,11 @@ FAULTS = [
     ("loop", ".c", r"(#define TWO_BRANCHES_FRACTION )\d+u", r"\g<1>40u", "signed overflow"),
     ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
     ("loop", ".c", r"(_front_ascending_scale\[\d+\] = \{\s*)\d+", r"\g<1>32", "shift"),
-    ("loop", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
+    ("loop", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*)[^}]*", r"\1return (two_branches_real_t)v;\n", "signed downcast"),
     ("loop", ".c", r"return \(two_branches_real_t\)\(code > [^;]*", r"return (two_branches_real_t)code", "downcast"),
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
     ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
-    ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*return )[^;]*", r"\1(two_branches_real_t)v", "signed downcast"),
+    ("corners", ".c", r"(_clamp_drive\(\w+ v\)\s*\{\s*)[^}]*", r"\1return (two_branches_real_t)v;\n", "signed downcast"),
     ("corners", ".c", r"(#define TWO_BRANCHES_HIGH_STEP \(\(int64_t\)1 << )\d+", r"\g<1>37", "signed overflow"),
     ("corners", ".c", r"(middle = \(low \+ left\)) / 2;", r"\1 / 2 + 1u;", "out of bounds"),
 ]

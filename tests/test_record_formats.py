@@ -10,6 +10,7 @@ import io
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 import time
@@ -41,6 +42,7 @@ from hystgen.records import (
     parquet,
     parse_columns,
     read_record,
+    reading,
 )
 from hystgen.records import headers as with_units
 from hystgen.records.columns import split_unit
@@ -535,6 +537,26 @@ def test_more_samples_than_memory(tmp_path: Path) -> None:
         for name in "tvy":
             file.create_dataset(name, shape=(1 << 50,), chunks=(1 << 20,), dtype="f8")
     assert problems(tmp_path / "a.h5") == ["needs more memory than there is; export fewer samples or columns"]
+
+
+@pytest.mark.parametrize("write", [write_h5, write_npz, write_mat])
+def test_more_samples_than_memory_of_a_system_that_promises_any(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write: Callable[[Path, Columns], None]
+) -> None:
+    """It gives as much as is asked for, and ends the process when that is used."""
+    path = tmp_path / write.__name__.replace("write_", "a.")
+    write(path, {"t": T, "v": V, "y": Y})
+    monkeypatch.setattr(reading, "_memory", lambda: 2.0 * 8.0 * 3.0 * len(T))
+    assert len(read_record(path)) == len(T)
+    monkeypatch.setattr(reading, "_memory", lambda: 2.0 * 8.0 * 3.0 * len(T) - 1.0)
+    assert problems(path) == ["needs more memory than there is; export fewer samples or columns"]
+
+
+@pytest.mark.skipif(not Path("/proc/meminfo").exists(), reason="the other account of the memory")
+def test_memory_of_this_machine() -> None:
+    said = re.search(r"MemTotal: +(\d+) kB", Path("/proc/meminfo").read_text())
+    assert said is not None
+    assert reading._memory() == pytest.approx(1024.0 * float(said[1]), rel=1e-3)
 
 
 def test_the_libraries_are_imported_late() -> None:

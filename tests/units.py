@@ -51,6 +51,12 @@ UNITS = (
     ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
     ("relaxing", "float32", "loop"),
+    ("lagging", "q15", "loop"),
+    ("quick", "q31", "loop"),
+    ("warm", "q31", "loop"),
+    ("worn", "q15", "loop"),
+    ("straight", "q31", "loop"),
+    ("relaxing", "q15", "loop"),
     ("drifting", "float32", "loop"),
     ("heated", "float64", "loop"),
 )
@@ -77,7 +83,7 @@ def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
 def _states(values: SimpleNamespace) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
     if values.variant.chain:
-        return ["hystgen_chain_state.h"]
+        return [values.family.chain_types[1]]
     return [values.variant.state(op) for op in ("forward", "inverse")]
 
 
@@ -85,7 +91,8 @@ def _blocks(values: SimpleNamespace) -> list[str]:
     """The files of blocks, that of the preview where there is one."""
     if not values.variant.chain:
         return []
-    return [file for file in runtime.CHAIN_BLOCKS if file != "preview.c" or len(values.numbers.tap)]
+    blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
+    return [file for file in blocks if not file.startswith("preview") or len(values.numbers.tap)]
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
@@ -95,11 +102,12 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     apis = [f"hystgen_{op}_api.h" for op in operators]
     headers = [*_states(values), *([] if values.variant.chain else apis)]
     types = [] if not values.variant.chain else [
-        '#include "hystgen_chain_tables.h"', *values.glue.states.values(),
+        f'#include "{values.family.chain_types[0]}"', *values.glue.states.values(),
         *(f'#include "{header}"' for header in (*apis, *(f"hystgen_chain_{op}_api.h" for op in operators))),
     ]  # fmt: skip
     text = "\n".join(
         [
+            *(["#define HYSTGEN_CHAIN"] if values.variant.chain else []),
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {values.corners}",
             *values.limits,

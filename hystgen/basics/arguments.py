@@ -170,6 +170,8 @@ def signal(name: str, value: object) -> NDArray[Any]:
             if any(x is None for x in found):
                 raise TypeError
             found = found.astype(np.float64)
+        except OverflowError:
+            raise ValueError(f"{name} has a whole number beyond the range of double precision") from None
         except (TypeError, ValueError):
             raise TypeError(f"{name} is an array of real numbers (N,), not {kind(value)}") from None
     if found.dtype.kind not in "fiub":

@@ -74,7 +74,8 @@ def build(
 
     Raises FormatError when a given LSB does not fit the type or the model degenerates in the format.
     """
-    return _Builder(cascade, arithmetic, engine, drive_lsb, output_lsb).build()
+    found = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
+    return Builder(cascade, arithmetic, engine, found, (drive_lsb is not None, output_lsb is not None)).build()
 
 
 def nearest(x: Fraction | float) -> int:
@@ -86,19 +87,35 @@ def nearest(x: Fraction | float) -> int:
     return whole if x >= 0 else -whole
 
 
+def reciprocal(slope: int) -> tuple[int, int]:
+    """`2^(32 + shift)/slope`, and the shift; of the slope 0 that nothing has, 0."""
+    if slope <= 0:
+        return 0, 1
+    shift = slope.bit_length() + 30
+    found = nearest(Fraction(2**shift, slope))
+    if found > TABLE_MAX:
+        shift, found = shift - 1, nearest(Fraction(2 ** (shift - 1), slope))
+    return found, shift - 32
+
+
 def lsbs(
-    cascade: StaticModel, arithmetic: str, drive_lsb: float | None = None, output_lsb: float | None = None
+    cascade: StaticModel,
+    arithmetic: str,
+    drive_lsb: float | None = None,
+    output_lsb: float | None = None,
+    output_range: tuple[float, float] | None = None,
 ) -> tuple[Fraction, Fraction]:
     """Physical units a drive code and an output code: those given, else the finest that reach the ends of the ranges.
 
-    Raises FormatError for one that is too small, and for an output that stays 0.
+    `output_range`: that of a model with effects. Raises FormatError for one that is too small, and for an output that
+    stays 0.
     """
     code_max = ARITHMETICS[arithmetic].code_max
     found: list[Fraction] = []
     refused: list[tuple[Path, str]] = []
     for given, ends, what, key in (
         (drive_lsb, cascade.input_range, "input_range", "drive_lsb"),
-        (output_lsb, cascade.output_range, "the output range", "output_lsb"),
+        (output_lsb, output_range or cascade.output_range, "the output range", "output_lsb"),
     ):
         largest = max(abs(decimal(end)) for end in ends)
         finest = largest / code_max
@@ -129,17 +146,29 @@ def decimal(x: float) -> Fraction:
     return Fraction(repr(float(x)))
 
 
-class _Builder:
-    """The steps of `build`, each with what the ones before it found."""
+class Builder:
+    """The steps of `build`, each with what the ones before it found.
+
+    `given`: which LSB was asked for; `beyond`: spans of their input by which plays may be asked for more than the drive
+    gives, and `led`: whether what arrives in front of the memoryless part has bits below a drive code, as behind a lag.
+    """
 
     def __init__(
-        self, cascade: StaticModel, arithmetic: str, engine: str, drive_lsb: float | None, output_lsb: float | None
+        self,
+        cascade: StaticModel,
+        arithmetic: str,
+        engine: str,
+        lsb: tuple[Fraction, Fraction],
+        given: tuple[bool, bool],
+        beyond: int = 0,
+        led: bool = False,
     ) -> None:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
         self.code_max = ARITHMETICS[arithmetic].code_max
         self.play_bits = ARITHMETICS[arithmetic].play_bits
-        self.drive_lsb, self.output_lsb = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
-        self.given = {"drive_lsb": drive_lsb is not None, "output_lsb": output_lsb is not None}
+        self.drive_lsb, self.output_lsb = lsb
+        self.given = dict(zip(("drive_lsb", "output_lsb"), given, strict=True))
+        self.beyond, self.led = beyond, led
         self.invertible = not cascade.inverse_problems()
         self.refused: list[tuple[Path, str]] = []
 
@@ -148,6 +177,21 @@ class _Builder:
         self._plays()
         self._weights()
         return self._tables(), self._format()
+
+    def gain(self) -> Fraction:
+        """Largest change of the drive in front of the memoryless part for one of what the plays are to give."""
+        return (2 / Fraction(self.cascade.pi.weights[0]) - 1 / Fraction(self.cascade.pi.slopes[-1])) / Fraction(
+            self.cascade.front_slopes[0]
+        )
+
+    def solved(self) -> Fraction:
+        """Rounding of the input of the plays that is solved for, in physical units."""
+        travel = self.hull[1] - self.hull[0]
+        return self.step * (Fraction(1, 2) + Fraction(travel, 2**31) + Fraction(1, 2**8))
+
+    def back(self) -> Fraction:
+        """Error of the way back through the memoryless part, in units of what arrives in front of it."""
+        return Fraction(max((curve.error / 2**curve.below for curve in self.front[2:]), default=0.0))
 
     # ------------------------------------------------------------ codes
 
@@ -189,12 +233,15 @@ class _Builder:
         high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
         self.span = high - low
         reach = max(abs(low), abs(high)) + 2 * min(self.span, Fraction(pi.thresholds[-1]))
+        below = ARITHMETICS[self.arithmetic].finer_plays
         if c.stages:
             self.fine = 0
+            if below and self.led:
+                self.fine = max(0, self.play_bits - max(map(abs, self.drive)).bit_length())
             self.step = Fraction(2) ** (math.ceil(math.log2(reach)) - self.play_bits)
         else:
             self.fine = 0
-            if ARITHMETICS[self.arithmetic].finer_plays:
+            if below:
                 self.fine = max(0, math.floor(math.log2((1 << self.play_bits) / (reach / self.drive_lsb))))
             self.step = self.drive_lsb / 2**self.fine
 
@@ -258,13 +305,14 @@ class _Builder:
 
     def _curves(self) -> None:
         c = self.cascade
-        self.front: list[_Curve] = []
+        self.front: list[FixedCurve] = []
         self.arguments: list[tuple[int, int]] = []
+        arriving = (self.drive[0] << self.fine, self.drive[1] << self.fine)
         if not c.stages:
-            self.play = (self.drive[0] << self.fine, self.drive[1] << self.fine)
-            self.margin = 1 << self.fine
+            self.play = arriving
+            self.margin = max(1 << self.fine, self.beyond * (self.play[1] - self.play[0]))
             return
-        lsb, step = float(self.drive_lsb), float(self.step)
+        lsb, step = float(self.drive_lsb / 2**self.fine), float(self.step)
         degree = ARITHMETICS[self.arithmetic].degree
         # a curve's own error: a 64th of a code, or rounding where codes are as fine as that
         allowed = max(0.5 * step, lsb * c.front_slopes[0] / 64)
@@ -272,9 +320,9 @@ class _Builder:
         for ascending in (True, False):
             corners = [b / lsb for b in breaks[ascending]]
             self.front.append(
-                _Curve(partial(_forward, c, ascending, lsb, step), self.drive, corners, degree, allowed / step)
+                FixedCurve(partial(_forward, c, ascending, lsb, step), arriving, corners, degree, allowed / step)
             )
-        ends = [(curve.at(self.drive[0]), curve.at(self.drive[1])) for curve in self.front]
+        ends = [(curve.at(arriving[0]), curve.at(arriving[1])) for curve in self.front]
         self.play = (min(e[0] for e in ends) - 8, max(e[1] for e in ends) + 8)
         self.margin = 8
         for up in (True, False):
@@ -285,20 +333,20 @@ class _Builder:
                 self.margin = max(self.margin, min(noticed, 1 << self.play_bits) + 2)
         self.arguments *= 2
         for forward, (low, high) in zip(self.front[:2], ends, strict=True):
-            self.margin = max(self.margin, 4 * (high - low) // max(1, self.drive[1] - self.drive[0]))
+            self.margin = max(self.margin, 4 * (high - low) // max(1, arriving[1] - arriving[0]))
             if not self.invertible:
                 continue
             ascending = len(self.front) == 2
-            below = max(0, self.play_bits - max(map(abs, self.drive)).bit_length())
+            below = max(0, self.play_bits - max(map(abs, arriving)).bit_length())
             corners = [float(c.front(float(b), ascending)) / step for b in breaks[ascending]]
             scale = lsb / 2**below
             edge = (
-                max(1, abs(forward.at(self.drive[0] + 1) - low) // 2),
-                max(1, abs(high - forward.at(self.drive[1] - 1)) // 2),
+                max(1, abs(forward.at(arriving[0] + 1) - low) // 2),
+                max(1, abs(high - forward.at(arriving[1] - 1)) // 2),
             )
             scale = lsb / 2**below
             back = partial(_backward, c, ascending, step, scale)
-            self.front.append(_Curve(back, (low, high), corners, degree, max(0.5, 2**below / 64), below, edge))
+            self.front.append(FixedCurve(back, (low, high), corners, degree, max(0.5, 2**below / 64), below, edge))
 
     # ------------------------------------------------------------ weights and sums
 
@@ -325,7 +373,7 @@ class _Builder:
             slope = [nearest(s * 2**bits) for s in sums]
             weight = [b - a for a, b in itertools.pairwise(slope)]
             lift = [0, *itertools.accumulate(p * r for p, r in zip(weight, self.threshold, strict=True))]
-            span = largest + 2 * self.threshold[-1]
+            span = largest + 2 * self.threshold[-1] + self.beyond * travel
             bound = slope[-1] * span + 2 * lift[-1] + abs(nearest(offset * 2**bits)) + ((self.code_max + 1) << bits)
             held = slope[-1] * (largest + self.threshold[-1]) + abs(nearest(offset * 2**bits))
             if slope[-1] <= TABLE_MAX and bound < 2**SUM_BITS and held < 2 ** (31 + low_bits):
@@ -340,18 +388,7 @@ class _Builder:
             raise FormatError((("model", "pi", "weights", 0), message + "; use a finer arithmetic"))
         self.slope_errors = [abs(Fraction(k, 2**bits) - s) for k, s in zip(slope, sums, strict=True)]
         self.offset_error = abs(Fraction(self.offset, 2**bits) - offset)
-        self.reciprocal, self.shift = [0], [1]
-        for k in slope[1:]:
-            if k <= 0:
-                self.reciprocal.append(0)
-                self.shift.append(1)
-                continue
-            shift = k.bit_length() + 30
-            r = nearest(Fraction(2**shift, k))
-            if r > TABLE_MAX:
-                shift, r = shift - 1, nearest(Fraction(2 ** (shift - 1), k))
-            self.reciprocal.append(r)
-            self.shift.append(shift - 32)
+        self.reciprocal, self.shift = map(list, zip(*map(reciprocal, slope), strict=True))
 
     # ------------------------------------------------------------ results
 
@@ -440,7 +477,7 @@ class _Builder:
                 errors.append(abs(self.start[i] * self.step - self.mean) + moved)
         return errors
 
-    def _sum_error(self) -> Fraction:
+    def sum_error(self) -> Fraction:
         """How far a sum can be from the exact model's output, in output codes, before it is rounded."""
         pi = self.cascade.pi
         plays = sum(Fraction(p) * e for p, e in zip(pi.weights, self._play_errors(), strict=True)) / self.output_lsb
@@ -455,31 +492,26 @@ class _Builder:
         own = error_bounds(self.cascade, "float64", "corners")
         return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
 
-    def _drive_short(self) -> Fraction:
+    def drive_short(self) -> Fraction:
         """How far the first and last drive codes can be inside the ends of the range, in drive units."""
         (first, last), (low, high) = self.drive, self.cascade.input_range
         return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
 
     def _forward_error(self) -> float:
         # a code beyond the range is limited to the last code inside, where the exact model goes to the range's end
-        limited = Fraction(self.cascade.pi.slopes[-1]) * Fraction(self.cascade.front_slopes[1]) * self._drive_short()
-        return _upward(
-            self._sum_error() + Fraction(1, 2) + (limited + self._own_error()[0]) / self.output_lsb
+        limited = Fraction(self.cascade.pi.slopes[-1]) * Fraction(self.cascade.front_slopes[1]) * self.drive_short()
+        return upward(
+            self.sum_error() + Fraction(1, 2) + (limited + self._own_error()[0]) / self.output_lsb
         )
 
     def _inverse_rounding(self) -> float | None:
         if not self.invertible:
             return None
         c, pi = self.cascade, self.cascade.pi
-        steepest, flattest = Fraction(c.front_slopes[1]), Fraction(c.front_slopes[0])
-        travel = self.hull[1] - self.hull[0]
+        steepest = Fraction(c.front_slopes[1])
         # rounding of the solution: its input of the plays, then the drive code
-        solved = self.step * (Fraction(1, 2) + Fraction(travel, 2**31) + Fraction(1, 2**8))
-        code = Fraction(1, 2)
-        if c.stages:
-            code += Fraction(max(curve.error / 2**curve.below for curve in self.front[2:]))
-        elif self.fine == 0:
-            code = Fraction(0)
+        solved = self.solved()
+        code = Fraction(1, 2) + self.back() if c.stages or self.fine else Fraction(0)
         outer = Fraction(pi.slopes[-1])
         output_short = max(
             Fraction(c.output_range[1]) - self.output[1] * self.output_lsb,
@@ -487,13 +519,12 @@ class _Builder:
             Fraction(0),
         )
         residual = (
-            self._sum_error() * self.output_lsb
-            + outer * (solved + steepest * (code * self.drive_lsb + self._drive_short()))
+            self.sum_error() * self.output_lsb
+            + outer * (solved + steepest * (code * self.drive_lsb + self.drive_short()))
             + output_short
         )
-        gain = (2 / Fraction(pi.weights[0]) - 1 / outer) / flattest
         whole = Fraction(self.drive[1] - self.drive[0])
-        return _upward(min((gain * residual + self._own_error()[1]) / self.drive_lsb, whole))
+        return upward(min((self.gain() * residual + self._own_error()[1]) / self.drive_lsb, whole))
 
     def _inverse_error(self) -> float | None:
         """With what another branch makes, as in `hystgen.compensator.bounds`."""
@@ -526,7 +557,7 @@ def _backward(cascade: StaticModel, ascending: bool, step: float, scale: float, 
     return float(cascade.front_inverse(w * step, ascending)) / scale
 
 
-def _upward(x: Fraction) -> float:
+def upward(x: Fraction) -> float:
     return math.nextafter(float(x) * 1.001, math.inf)
 
 
@@ -593,7 +624,7 @@ class _Piece:
     coefficients: tuple[int, ...]
 
 
-class _Curve:
+class FixedCurve:
     """A function on whole numbers as pieces of polynomials; `error`: how far its values can be from the function's.
 
     Interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.

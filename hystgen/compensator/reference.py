@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from hystgen.basics import jit
 from hystgen.compensator import step, step_fixed, step_float
 from hystgen.compensator.chain import step as chain_step
-from hystgen.compensator.chain.tables import ChainTables, OwnChainTables
+from hystgen.compensator.chain import step_fixed as chain_step_fixed
+from hystgen.compensator.chain import step_float as chain_step_float
+from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
@@ -25,6 +27,7 @@ from hystgen.compensator.corners import (
 )
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.compensator.step import Operations
+from hystgen.effects.kinds import OwnBlock
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
 from hystgen.plays.corners.memory import new_fixed_memory, new_memory
@@ -35,7 +38,7 @@ def operations(t: Tables | FixedTables | ChainTables) -> Operations:
     """What the bit reference is made of for the arithmetic and the engine of these tables."""
     if isinstance(t, ChainTables):
         drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-        return chain_step.operations(drives, outputs)
+        return _chain_operations(t.fixed, drives, outputs)
     return _operations(t.engine == LOOP, t.fixed, t.has_front)
 
 
@@ -48,6 +51,14 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
     if fixed:
         return run.made_of(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
     return run.made_of(forward_front, inverse_front, *ends) if front else run.made_of(forward, inverse, *ends)
+
+
+@functools.cache
+def _chain_operations(
+    fixed: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+) -> Operations:
+    own = chain_step_fixed if fixed else chain_step_float
+    return chain_step.made_of(own.BLOCKS, own.CODES, drives, outputs)
 
 
 def new_state(t: Tables | FixedTables | ChainTables) -> Any:

@@ -8,7 +8,7 @@ Every function has its counterpart of the same name in `c_runtime/`. What both o
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, Tables
@@ -71,8 +71,15 @@ def inverse_answer(s: State, v: Any) -> Any:
     return v
 
 
+class Limited(Protocol):
+    """The limits of drive and output, as `hystgen.compensator.layout.Tables` has them."""
+
+    @property
+    def limits(self) -> Reals: ...
+
+
 @jit(inline=True)
-def clamp_drive(t: Tables | FixedTables, v: Any) -> Any:
+def clamp_drive(t: Limited, v: Any) -> Any:
     """v inside the input range."""
     if v < t.limits[DRIVE_MIN]:
         return t.limits[DRIVE_MIN]
@@ -82,7 +89,7 @@ def clamp_drive(t: Tables | FixedTables, v: Any) -> Any:
 
 
 @jit(inline=True)
-def inverse_clamp(t: Tables | FixedTables, u: Any) -> Any:
+def inverse_clamp(t: Limited, u: Any) -> Any:
     """u inside the output range."""
     if u < t.limits[OUTPUT_MIN]:
         return t.limits[OUTPUT_MIN]

@@ -18,11 +18,14 @@ VERBS = ("rest", "resting", "solve", "absorb")
 
 @dataclass(frozen=True)
 class Rows:
-    """What a block has several of: what one is called, its real numbers, and those of its memory."""
+    """What a block has several of: what one is called, its real numbers, and those of its memory; in fixed point their
+    `letters` and those of its `memory`, as in `Kind`."""
 
     name: str
-    table: tuple[str, ...]
+    table: tuple[str, ...] = ()
     state: tuple[str, ...] = ()
+    letters: str = ""
+    memory: str = ""
 
 
 @dataclass(frozen=True)
@@ -33,16 +36,21 @@ class Kind:
     pointer to `rows` where it has these; `counts`: whole numbers behind them, the first of 16 bits, others of 8;
     `state`: real numbers of its memory; `flags`: booleans of it; `reading`: the verbs that take the table; `own`: those
     that it has; without `rest` it settles as it absorbs, without `resting` it rests as it solves.
+
+    In fixed point numbers are of several types: `letters` are those of the table, `memory` those of its memory, f for a
+    factor, which takes two numbers, w for 64 bits, i for 32, c for four of these in an array, and b for 8.
     """
 
     name: str
-    table: tuple[str, ...]
-    state: tuple[str, ...]
+    table: tuple[str, ...] = ()
+    state: tuple[str, ...] = ()
     rows: Rows | None = None
     counts: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
     reading: tuple[str, ...] = VERBS
     own: tuple[str, ...] = VERBS
+    letters: str = ""
+    memory: str = ""
 
     @property
     def file(self) -> str:

@@ -49,7 +49,7 @@ def emit_options(
     arguments.choice("optimize", optimize or "auto", engines.OPTIMIZE)
     arguments.choice("layout", layout, LAYOUTS)
     left_out: tuple[str, ...] = ()
-    if allow_partial and (refused := model.refusals(operator)):
+    if allow_partial and (refused := model.refusals(operator, arithmetic)):
         left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
         model = model.without([effect for effect, _ in refused])
     model.need_compensated(arithmetic, operator)
@@ -58,7 +58,9 @@ def emit_options(
 
 def emitted_model(model: Model, options: Options) -> Model:
     """The model that the C is of: without what `options` leave out."""
-    return model.without([effect for effect, _ in model.refusals(options.operator)]) if options.left_out else model
+    if not options.left_out:
+        return model
+    return model.without([effect for effect, _ in model.refusals(options.operator, options.arithmetic)])
 
 
 @arguments.taking(emit_options, "emit")

@@ -9,26 +9,38 @@ import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from hystgen.compensator.chain import blocks, moving
-from hystgen.compensator.chain.moving import MovingTables
-from hystgen.compensator.chain.tables import ChainTables, Compiled
+from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
+    LARGEST_LEVEL,
+    LEAST_CODE,
+    LEVEL_BITS,
+    LEVEL_DROP,
+    MOST_CODE,
+    SHARE_BITS,
+    ChainTables,
+    Compiled,
+)
+from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.emission.text import WIDTH, literal, operand, structure, table
+from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
 from hystgen.plays import slots
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of an instance: `kind` is real, flag, status, or of a block and then made of `reals` numbers and `flags`;
-    with a `count` it is an array."""
+    """A field of an instance: `kind` is that of a number, flag, status, or of a block and then made of `members`, real
+    numbers r or those of fixed point as in `Kind`, and `flags`; with a `count` it is an array."""
 
     kind: str
     name: str
     comment: str = ""
     count: int = 0
-    reals: int = 0
+    members: str = ""
     flags: int = 0
 
     def text(self) -> str:
@@ -59,10 +71,10 @@ class Block:
     def fields(self) -> list[Field]:
         """Its memory."""
         kind, rows = self.kind, self.kind.rows
-        found = [Field(kind.name, self.name, reals=len(kind.state), flags=len(kind.flags))]
-        if rows and rows.state:
-            count, reals = len(self.constants.rows), len(rows.state)
-            found.append(Field(f"{kind.name}_state", f"{self.name}_state", count=count, reals=reals))
+        found = [Field(kind.name, self.name, members=kind.memory or len(kind.state) * "r", flags=len(kind.flags))]
+        if rows and (rows.state or rows.memory):
+            count, members = len(self.constants.rows), rows.memory or len(rows.state) * "r"
+            found.append(Field(f"{kind.name}_state", f"{self.name}_state", count=count, members=members))
         return found
 
     def call(self, verb: str, x: str) -> str:
@@ -76,11 +88,12 @@ class Block:
     def arrays(self, prefix: str) -> list[str]:
         """Its table, behind that of its rows where it has any."""
         kind, constants, own = self.kind, self.constants, f"{prefix}_{self.name}"
-        numbers = [*map(literal, constants.table), *map(str, constants.counts)]
+        numbers = [_entries(constants.table, kind.letters)] * (len(constants.table) > 0)
+        numbers += map(str, constants.counts)
         if not kind.rows:
             return [_table(f"{prefix}_{kind.name}_table_t {own}", numbers)]
         rows, n = f"{own}_{kind.rows.name}", len(constants.rows)
-        lines = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in constants.rows)
+        lines = ",\n".join(f"    {{{_entries(row, kind.rows.letters)}}}" for row in constants.rows)
         return [
             f"static const {prefix}_{kind.name}_{kind.rows.name}_t {rows}[{n}] = {{\n{lines},\n}};\n",
             _table(f"{prefix}_{kind.name}_table_t {own}", [rows, *numbers]),
@@ -104,7 +117,44 @@ def sides(t: ChainTables) -> tuple[list[Block], list[Block]]:
     return found[0], found[1]
 
 
-MOVES = ("play", "dilated", "relaxing")
+def _entries(values: Any, letters: str = "") -> str:
+    """Numbers of a table as they stand in C; `letters` as in `Kind`."""
+    found, rest = [], iter(values)
+    for letter in letters or len(values) * "r":
+        if letter == "f":
+            found.append(f"{{{literal(next(rest))}, {next(rest)}}}")
+        elif letter == "c":
+            found.append(f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}")
+        else:
+            found.append(literal(next(rest)))
+    return ", ".join(found)
+
+
+def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]:
+    """What saturates in fixed point, as `numbers.stage` has it in floating point."""
+    behind, own = t.behind, f"{name}_behind_{j + 1}"
+    if behind.kind[j] == slots.DEAD_ZONE:
+        lower, upper, *over = behind.piece[j]
+        entries = f"{literal(lower)}, {literal(upper)}, {_entries(over, 'ff')}"
+        text = f"static const {prefix}_stops_t {own} = {{\n    {entries},\n}};\n"
+        return {"kind": "stops", "arrays": [text], "table": f"&hystgen_behind_{j + 1}", "limited": ""}
+    arrays, ends = [], []
+    for which, direction in ((2 * j, "there"), (2 * j + 1, "back")):
+        here = int(behind.first[which])
+        rows = slice(here, here + int(behind.pieces[which]))
+        arrays += [
+            table("int32_t", f"{own}_{direction}_knot", list(behind.knot[rows])),
+            table("uint8_t", f"{own}_{direction}_scale", list(behind.scale[rows])),
+            table("int32_t", f"{own}_{direction}_coefficient", list(behind.coefficient[rows].ravel())),
+        ]
+        pointers = ", ".join(f"{own}_{direction}_{part}" for part in ("knot", "scale", "coefficient"))
+        counts = (behind.domain[which, 1], behind.pieces[which], behind.coefficient.shape[1] - 1, *behind.scaled[which])
+        ends.append(f"    {{{pointers},\n     {_entries(counts)}}}")
+    arrays.append(f"static const {prefix}_bend_t {own} = {{\n" + ",\n".join(ends) + ",\n};\n")
+    return {"kind": "bend", "arrays": arrays, "table": f"&hystgen_behind_{j + 1}", "limited": ", limited"}
+
+
+MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
 """Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
 
@@ -132,7 +182,7 @@ def plays(t: ChainTables) -> tuple[str, str]:
 def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends."""
     real_t = f"{prefix}_real_t"
-    arrays = []
+    arrays: list[str] = []
     if t.scanned:
         members = [("share", list(t.share)), ("inverse", list(t.inverse))]
         numbers = [("LATE", operand(t.first[1]), "of a stretch, what a play gains at the end of a step"),
@@ -142,6 +192,10 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         arrays.append(table(real_t, f"{prefix}_wider", list(t.first)))
     if t.moves == moving.RELAXING:
         arrays += [table(real_t, f"{prefix}_late", list(t.first)), table(real_t, f"{prefix}_kept", list(t.second))]
+    if t.moves == moving.DASHPOT:
+        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.yields)
+        n, terms = t.yields.shape
+        arrays.append(f"static const {real_t} {prefix}_yields[{n}][{terms}] = {{\n{rows},\n}};\n")
     if t.bends == moving.POLYNOMIAL:
         n, terms = t.curve.shape
         rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in t.curve)
@@ -153,10 +207,23 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
         ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
         ("LARGEST_INPUT", moving.LARGEST_INPUT, ""), ("HALF", moving.HALF, ""),
+        ("SEEN", moving.SEEN, "share of a step's way at which the input counts as standing still"),
     )  # fmt: skip
     constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
-    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search")]
+    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search"),
+              ("YIELDS", f"{len(t.yields)}u", "pieces of what a dashpot yields")]  # fmt: skip
     return arrays, [*constants, *counts]
+
+
+def _relaxing(t: FixedMovingTables, prefix: str) -> list[str]:
+    """Tables of viscous plays in fixed point."""
+    return [
+        *(f"static const {prefix}_factor_t {prefix}_relaxing_{name} = {{{_entries(row, 'f')[1:-1]}}};\n"
+          for name, row in (("late", t.late), ("kept", t.kept))),
+        table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
+        table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
+        table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -173,7 +240,7 @@ class Glue:
     constants: list[tuple[str, str, str]]
 
 
-def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, str]]) -> Glue:
+def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
     before, after = sides(t)
@@ -190,7 +257,10 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     }
     arrays = [text for block in (*before, *after, *clocks) for text in block.arrays(prefix)]
     if len(t.tap):
-        arrays.append(table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap)))
+        arrays.append(
+            constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
+            if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
+        )  # fmt: skip
     number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
     words = {
         "OUTPUT_OFFSET": "part of every displacement",
@@ -201,12 +271,16 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
     constants += [("LEAD", operand(row[drift.MOST_AHEAD]), "samples that references come ahead") for row in t.clock]
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
-    if t.moving.used:
+    constants += _fixed_constants(t) if t.fixed else []
+    if isinstance(t.moving, FixedMovingTables):
+        arrays += _relaxing(t.moving, prefix) if t.moving.used else []
+    elif t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
     both, n = [*before, *after, *clocks], len(t.threshold) - 1
-    fields = {op: instance(op, both, len(t.tap), n, searched) for op in operators}
+    kept = n * (t.moving.moves == moving.DASHPOT)
+    fields = {op: instance(op, both, len(t.tap), n, kept, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
@@ -214,26 +288,47 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     )  # fmt: skip
 
 
-def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, moving: bool) -> list[Field]:
+def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
+    """Numbers that functions name in fixed point alone."""
+    low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
+    return [
+        ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
+        ("FINE_MAX", operand(high), ""),
+        ("LEAST_CODE", operand(t.number[LEAST_CODE]), "between which a drive is kept before it is limited"),
+        ("MOST_CODE", operand(t.number[MOST_CODE]), ""),
+        ("DRIVE_BITS", f"{t.number[DRIVE_BITS]}u", "bits of a signal in front of the plays below a drive code"),
+        ("ARRIVING_BITS", f"{t.number[ARRIVING_BITS]}u", "and below an input of the plays"),
+        ("LEVEL_BITS", f"{t.number[LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
+        ("LEVEL_DROP", f"{t.number[LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
+        ("LARGEST_LEVEL", operand(t.number[LARGEST_LEVEL]), "sum that is asked of the plays"),
+        ("SHARE_BITS", f"{t.number[SHARE_BITS]}u", "bits of a mantissa below a code"),
+    ]
+
+
+_PLAYS = "play 0 is the input of the plays"
+_KEPT = "; behind them what each has lost"
+
+
+def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse = op == "inverse"
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
-        Field("real", "drive", "what arrived of it in front of the plays"),
-        Field("real", "level", "sum of the plays"),
-        Field("real", "output", "what the output side made of it"),
+        Field("fine", "drive", "what arrived of it in front of the plays"),
+        Field("signal", "level", "sum of the plays"),
+        Field("signal", "output", "what the output side made of it"),
         Field("real", "answer", f"{'drive' if inverse else 'displacement'} returned last"),
-        Field("real", "offset", "set beside that of the model"),
+        Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
-        *([Field("real", "line", "references, the newest one last", taps)] if inverse and taps else []),
+        *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
         Field("flag", "ascending", "direction of the drive's last move"),
         Field("flag", "moving", "a drive was applied"),
         *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),
         *([Field("flag", "filled", "there are references"), Field("status", "bits", "of the last step")] if inverse
           else []),
         Field("status", "status"),
-        Field("play", "play", "play 0 is the input of the plays", plays + 1),
+        Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept),
         *([Field("real", "bent", "what each contributes", plays + 1)] if moving else []),
     ]  # fmt: skip
 
@@ -255,7 +350,7 @@ def _functions(
     op: str,
     before: Sequence[Block],
     after: Sequence[Block],
-    behind: Sequence[dict[str, str]],
+    behind: Sequence[dict[str, Any]],
     ahead: bool,
     clocks: Sequence[Block],
 ) -> Iterator[str]:
@@ -267,7 +362,7 @@ def _functions(
         lines = [f"{x} = {block.call(verb, x)};" for block in blocks] or ["(void)self;"]
         if verb == "resting" and not any("self" in line for line in lines):
             lines = ["(void)self;", *lines]
-        head = f"static hystgen_real_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_real_t {x})"
+        head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
         return _function(comment, head, [*lines, f"return {x};"])
 
     yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.")
@@ -279,7 +374,7 @@ def _functions(
         yield through(back[0], "solve", "a", "drive_side", "The drive that leads to a in front of the plays.")
         yield through(back[1], "solve", "y", "output_side", "The sum of the plays that gives y at this sample.")
         yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
-    lines = ["hystgen_real_t x = y;"] if behind else []
+    lines = ["hystgen_signal_t x = y;"] if behind else []
     x = "x" if behind else "y"
     lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
     offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset"
@@ -289,20 +384,20 @@ def _functions(
 
     yield _function(
         "The displacement for an output y of the chain.",
-        f"static hystgen_real_t hystgen_{op}_displaced(const {self_t}, hystgen_real_t y)",
+        f"static hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
         [*lines, f"return {x} + ({offsets}{drifts('0')});"],
     )
     if inverse:
         lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
         lines = [f"const hystgen_real_t lead = {lead};"] * len(clocks)
-        lines.append(f"hystgen_real_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
+        lines.append(f"hystgen_signal_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
         lines += [
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
         ]
         unused = [] if any(stage["limited"] for stage in behind) else ["(void)limited;"]
         yield _function(
             "The output of the chain that gives the displacement u; `limited` tells whether none does.",
-            f"static hystgen_real_t hystgen_inverse_undisplaced(const {self_t}, hystgen_real_t u, bool *limited)",
+            f"static hystgen_signal_t hystgen_inverse_undisplaced(const {self_t}, hystgen_signal_t u, bool *limited)",
             [*lines, *unused, "return y;"],
         )
         put = [
@@ -313,7 +408,7 @@ def _functions(
         put.append("hystgen_preview_put(self->line, &self->filled, y);")
         yield _function(
             "What has to be given now for the newest reference, y once it is undisplaced.",
-            f"static hystgen_real_t hystgen_inverse_ahead({self_t}, hystgen_real_t y)",
+            f"static hystgen_signal_t hystgen_inverse_ahead({self_t}, hystgen_signal_t y)",
             [*put, "return hystgen_preview_target(hystgen_tap, self->line);"] if ahead
             else ["(void)self;", "return y;"],
         )
@@ -325,6 +420,7 @@ def _functions(
     gains = [block for block in after if block.kind.name == "gain"]
     ageing = [block for block in after if block.kind.name == "ageing"]
     heat = [block for block in after if block.kind.name == "heat"]
+    way = "(hystgen_signal_t)v - self->applied"
     yield _function(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
@@ -343,7 +439,7 @@ def _functions(
         [
             *(f"hystgen_clock_tick({each.table}, &self->{each.name});" for each in clocks),
             *(f"hystgen_heat_move({each.table}, &self->{each.name}, self->applied, v);" for each in heat),
-            *(f"hystgen_ageing_move({each.table}, &self->{each.name}, v - self->applied);" for each in ageing),
+            *(f"hystgen_ageing_move({each.table}, &self->{each.name}, {way});" for each in ageing),
             *(["(void)self;"] if not (clocks or heat or ageing) else []),
             *(["(void)v;"] if not (heat or ageing) else []),
         ],

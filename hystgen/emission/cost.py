@@ -11,9 +11,9 @@ from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.chain import blocks, costs
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.effects.kinds import Kind
+from hystgen.effects.kinds import Kind, Rows
 from hystgen.emission.chain import Field
 from hystgen.emission.options import Options
 from hystgen.plays import slots
@@ -105,15 +105,24 @@ def _corner_structs(arithmetic: Arithmetic, layout: Layout) -> dict[str, tuple[i
     }
 
 
+_LETTERS = {"w": (8, 8), "i": (4, 4), "c": (16, 4), "b": (1, 1)}
+"""Sizes and alignments of the numbers of a block in fixed point, by the letters of `Kind`."""
+
+
 def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout) -> dict[str, tuple[int, int]]:
     """Sizes and alignments of the tables of a chain's blocks."""
+    sizes = {**_LETTERS, "f": layout.struct((4, 4), (1, 1))}
+
+    def made_of(numbers: Kind | Rows) -> list[tuple[int, int]]:
+        return [sizes[letter] for letter in numbers.letters] or len(numbers.table) * [real]
+
     found = {}
     for kind in kinds:
-        members = [(layout.pointer, layout.pointer)] * bool(kind.rows) + len(kind.table) * [real]
+        members = [(layout.pointer, layout.pointer)] * bool(kind.rows) + made_of(kind)
         counts = [(2, 2) if i == 0 else (1, 1) for i, _ in enumerate(kind.counts)]
         found[f"_{kind.name}_table_t"] = layout.struct(*members, *counts)
         if kind.rows:
-            found[f"_{kind.name}_{kind.rows.name}_t"] = layout.struct(*len(kind.rows.table) * [real])
+            found[f"_{kind.name}_{kind.rows.name}_t"] = layout.struct(*made_of(kind.rows))
     return found
 
 
@@ -125,6 +134,13 @@ def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterabl
     reach = (real, real)
     pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
+    factor, table = layout.struct((4, 4), (1, 1)), (layout.pointer, layout.pointer)
+    bend = layout.struct(table, table, table, (4, 4), count, *3 * [(1, 1)])
+    behind = {
+        "factor_t": factor,
+        "bend_t": layout.struct(bend, bend),
+        "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
+    }
     structs = {
         "dead_zone_t": layout.struct(*pointers, count),
         "envelope_t": layout.struct(*(7 * [reach])),
@@ -132,6 +148,7 @@ def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterabl
         "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
         **_corner_structs(arithmetic, layout),
         **_block_structs(kinds, reach, layout),
+        **(behind if fixed else {}),
     }
     total = 0
     found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
@@ -188,8 +205,8 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks of a model with effects in one step, of each operator."""
-    envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
-    stages = len(t.behind.stage_kind) + envelopes
+    kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
+    stages = len(kinds) + kinds.count(slots.TANH) * (t.behind.coefficient.shape[1] - 1 if t.fixed else 1)
     absorbed, solved = (sum(each.products[way] for each in blocks.every(t)) for way in (0, 1))
     return {"forward": absorbed + stages, "inverse": absorbed + solved + stages + len(t.tap)}
 
@@ -214,7 +231,7 @@ def _memory(
         if not getattr(options, op):
             continue
         if op in chain:
-            size = layout.struct(*(_field(each, real, layout) for each in chain[op]))[0]
+            size = layout.struct(*(_field(each, arithmetic, layout) for each in chain[op]))[0]
         elif options.engine == "corners":
             size, a_play = _corner_instance(n, op, arithmetic, bool(cascade.stages), layout)
         else:
@@ -227,11 +244,14 @@ def _memory(
     return Memory(_constants(text, arithmetic, layout, kinds), sizes, more)
 
 
-def _field(field: Field, real: int, layout: Layout) -> tuple[int, int]:
+def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, int]:
     """Size and alignment of a field of an instance."""
-    one = {"flag": 1, "status": layout.integer}.get(field.kind, real)
-    members = [*field.reals * [(real, real)], *field.flags * [(1, 1)]]
-    size, alignment = layout.struct(*members) if members else (one, one)
+    real = (arithmetic.bytes, arithmetic.bytes)
+    signal, fine = ((8, 8), (4, 4)) if arithmetic.fixed else (real, real)
+    whole = (layout.integer, layout.integer)
+    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine}.get(field.kind, real)
+    members = [*(_LETTERS.get(letter, real) for letter in field.members), *field.flags * [(1, 1)]]
+    size, alignment = layout.struct(*members) if members else one
     return size * max(field.count, 1), alignment
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import re
 import shlex
@@ -11,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
@@ -18,7 +20,8 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.tables import Compiled, OwnChainTables
+from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+from hystgen.compensator.chain.layout import SHARE_BITS, Compiled, OwnChainTables
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
 from hystgen.emission import banner, chain, cost, layout, numbers, own, runtime, selftest
@@ -189,7 +192,8 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
         return None
     assert parameters.sample_time is not None, "emit_options asks for it"
     how = parameters.emit.compensation
-    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how)
+    lsb = (parameters.emit.drive_lsb, parameters.emit.output_lsb)
+    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how, lsb)
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
@@ -201,6 +205,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     corners = options.engine == "corners"
     n = cascade.pi.n
     compiled = compiled_of(parameters, cascade, options)
+    if compiled:
+        about["family"] = dataclasses.replace(about["family"], chain=True)
     values = SimpleNamespace(
         **about,
         **(numbers.chain_fields(parameters, compiled, options, prefix) if compiled
@@ -242,7 +248,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
     values.types = ""
     if glue:
-        types = runtime.chain_types(own_types, "\n".join(glue.states.values()))
+        types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         tabled = runtime.needed(types, sorted(runtime.used(pieces)))
         tables = [piece for piece in tabled if piece not in states]
@@ -300,18 +306,18 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    apart = values.variant.slew and values.inverse_rounding_error != values.inverse_max_error
+    limited = "no drive is limited" if values.limited else "no slew limit acts" if values.variant.slew else ""
+    apart = limited and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
-        words = "the same while " + " and ".join(
-            ["both take the same branch"] * values.branches + ["no slew limit acts"] * values.variant.slew
-        )
+        branch = "both take the same branch" if values.branches else ""
+        words = f"the same while {' and '.join(filter(None, [branch, limited]))}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 
 
 def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
     """Macros of a model with effects about time."""
-    kind = compiled.tables.threshold.dtype.type
+    kind = np.float64 if compiled.tables.fixed else compiled.tables.threshold.dtype.type
     late = compiled.needed - compiled.ahead
     ahead = "samples that the argument of step is ahead of the motion"
     if late > 0:
@@ -321,7 +327,20 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
+        *_settings(compiled),
     ]
+
+
+def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
+    """In fixed point, what a code is that sets a temperature or a gain."""
+    if not compiled.tables.fixed:
+        return []
+    bits = int(31 - compiled.tables.number[SHARE_BITS])
+    kept = TEMPERATURE_BITS[bits]
+    degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
+    gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
+    t = compiled.tables
+    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
 
 
 def _status(values: SimpleNamespace) -> list[str]:

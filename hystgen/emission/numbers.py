@@ -16,7 +16,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.chain.bounds import chain_bounds
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
@@ -68,6 +68,8 @@ def chain_fields(
     parameters: Parameters, compiled: Compiled, options: Options, prefix: str
 ) -> dict[str, Any]:
     """The same of a model with effects, `glue` with its blocks."""
+    if compiled.tables.fixed:
+        return _fixed_chain_fields(parameters, compiled, options, prefix)
     name, tables = parameters.name, compiled.tables
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     behind = [
@@ -94,6 +96,51 @@ def chain_fields(
     }
 
 
+def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Options, prefix: str) -> dict[str, Any]:
+    name, tables, codes = parameters.name, compiled.tables, compiled.codes
+    plays = tables.plays
+    assert isinstance(plays, FixedTables) and codes is not None  # noqa: PT018
+    behind = [chain.saturation(tables, j, name, name) for j in range(len(tables.behind.kind))]
+    operators = [op for op in ("forward", "inverse") if getattr(options, op)]
+    glue = chain.glue(compiled, operators, name, behind)
+    curves, counts = _curves(plays, name, prefix, options) if plays.fronts else ([], [])
+    pointers = _fixed_loop_pointers(plays, name, options)
+    own = [_loop_tables(pointers, plays, name, prefix)]
+    if tables.moving.used:
+        others = [f"{name}_relaxing_{part}" for part in ("slope", "reciprocal", "shift")]
+        own.append(_loop_tables([*pointers[:2], *others, *pointers[5:]], plays, name, prefix, "relaxing"))
+    about = _limits(plays, [*_fixed_constants(plays), *counts, *glue.constants])
+    ends = zip(("drive_min", "drive_max", "output_min", "output_max"), tables.limits, strict=False)
+    return {
+        **about,
+        **{end: operand(value) for end, value in ends},
+        "numbers": tables,
+        "arrays": _fixed_loop_fields(plays, name, prefix, options),
+        "beside": [*curves, *glue.arrays, *own, *glue.beside],
+        "stages": [],
+        "fronts": bool(plays.fronts),
+        "envelopes": any(isinstance(stage, TanhEnvelope) for stage in compiled.static.stages)
+        or any(one["kind"] == "bend" for one in behind),
+        "finer": bool(tables.number[ARRIVING_BITS]),
+        "saturates": True,
+        "limited": codes.limited,
+        "drive_lsb": _physical(codes.drive_lsb),
+        "output_lsb": _physical(codes.output_lsb),
+        "forward_max_error": _decimal(codes.forward_error),
+        "inverse_max_error": _decimal(codes.inverse_error) if options.inverse else "",
+        "inverse_rounding_error": _decimal(codes.inverse_rounding) if options.inverse else "",
+        "precision": [
+            *_precision(
+                parameters, (codes.drive_lsb, codes.output_lsb), (codes.forward_error, codes.inverse_rounding),
+                " while no drive is limited" if codes.limited else " on the same branch" * plays.branches,
+            ),
+            f"Range: every signal behind the plays stays below 2^{codes.largest.bit_length()}, with "
+            f"{tables.number[LEVEL_BITS]} bits below an output code; states of effects below 2^62 (64 bits hold 2^63)",
+        ],
+        "glue": glue,
+    }  # fmt: skip
+
+
 def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     name, real_t = parameters.name, f"{prefix}_real_t"
     corners = options.engine == "corners"
@@ -110,6 +157,7 @@ def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options
         "stages": stages,
         "fronts": bool(stages),
         "finer": False,
+        "limited": False,
         "envelopes": any(stage["kind"] == "envelope" for stage in stages),
         "forward_max_error": operand(float_tables.upward(bounds.forward, dtype)),
         "inverse_max_error": operand(float_tables.upward(bounds.inverse, dtype)) if options.inverse else "",
@@ -144,10 +192,12 @@ def _loop_pointers(name: str, options: Options) -> list[str]:
     return [places.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
 
 
-def _loop_tables(pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str) -> str:
+def _loop_tables(
+    pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str, whose: str = "model"
+) -> str:
     """What points to the tables of engine loop."""
     entries = _lines([*pointers, str(len(numbers.threshold) - 1)])
-    return constant(f"{prefix}_tables_t {name}_model_tables", entries.splitlines())
+    return constant(f"{prefix}_tables_t {name}_{whose}_tables", entries.splitlines())
 
 
 def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> list[str]:
@@ -255,20 +305,10 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
     own = [] if corners else [_loop_tables(_fixed_loop_pointers(numbers, name, options), numbers, name, prefix)]
     curves, counts = _curves(numbers, name, prefix, options) if numbers.fronts else ([], [])
     fine = int(limits[slots.FINE])
-    units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
-    drive, output = (f" {unit}" if unit else "" for unit in units)
-    precision = [
-        f"Precision: a drive code is {float(form.drive_lsb):.6g}{drive}, an output code {float(form.output_lsb):.6g}"
-        f"{output}; against the exact model",
-        f"    forward within {form.forward_error:.4g} output codes = "
-        f"{form.forward_error * float(form.output_lsb):.4g}{output}",
-    ]
-    if form.inverse_rounding is not None:
-        precision.append(
-            f"    inverse within {form.inverse_rounding:.4g} drive codes = "
-            f"{form.inverse_rounding * float(form.drive_lsb):.4g}{drive}"
-            + (" on the same branch" if numbers.branches else "")
-        )
+    precision = _precision(
+        parameters, (form.drive_lsb, form.output_lsb), (form.forward_error, form.inverse_rounding),
+        " on the same branch" if numbers.branches else "",
+    )  # fmt: skip
     precision += [
         f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 bits hold "
         "2^63),",
@@ -283,6 +323,7 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
         "fronts": bool(numbers.fronts),
         "envelopes": any(isinstance(stage, TanhEnvelope) for stage in cascade.stages),
         "finer": fine > 0,
+        "limited": False,
         "saturates": bool(limits[slots.SATURATED] == limits[slots.CODE_MAX]),
         "drive_lsb": _physical(form.drive_lsb),
         "output_lsb": _physical(form.output_lsb),
@@ -291,6 +332,24 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
         "inverse_rounding_error": _decimal(form.inverse_rounding) if options.inverse and form.inverse_rounding else "",
         "precision": precision,
     }
+
+
+def _precision(
+    parameters: Parameters, lsb: tuple[Any, Any], errors: tuple[float, float | None], branch: str
+) -> list[str]:
+    """What codes are, and how far answers are from the exact model."""
+    units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
+    drive, output = (f" {unit}" if unit else "" for unit in units)
+    drive_lsb, output_lsb = (float(x) for x in lsb)
+    forward, inverse = errors
+    found = [
+        f"Precision: a drive code is {drive_lsb:.6g}{drive}, an output code {output_lsb:.6g}{output}; "
+        "against the exact model",
+        f"    forward within {forward:.4g} output codes = {forward * output_lsb:.4g}{output}",
+    ]
+    if inverse is not None:
+        found.append(f"    inverse within {inverse:.4g} drive codes = {inverse * drive_lsb:.4g}{drive}{branch}")
+    return found
 
 
 def _fixed_constants(numbers: FixedTables) -> list[tuple[str, str, str]]:

@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from hystgen.basics.problems import EffectsError, printable
-from hystgen.compensator.chain.tables import ChainTables, OwnChainTables
+from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.effects import own
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import VERBS, Kind

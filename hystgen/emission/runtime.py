@@ -30,8 +30,24 @@ FLOAT_KERNELS = (
     "loop_solve.c",
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
-CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "preview.c")
+CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "preview.c", "preview_float.c")
+FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
+FIXED_CHAIN_BLOCKS = (
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "preview.c",
+    "preview_fixed.c", "bend.c", "stops.c",
+)  # fmt: skip
 """What models with effects have of their own, also beside a shared run time."""
+
+SIGNALS = {
+    "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
+}  # fmt: skip
+"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes."""
+
+FINE = {
+    "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
+    "hystgen_clamp_fine": "hystgen_clamp_drive",
+}  # fmt: skip
+"""What is finer than a drive code there, and what it is elsewhere."""
 
 FIXED_KERNELS = (
     "over_slope.c",
@@ -44,9 +60,11 @@ FIXED_KERNELS = (
 
 @dataclass(frozen=True)
 class Family:
-    """How an arithmetic appears in C: which files of the run time and which types it has."""
+    """How an arithmetic appears in C: which files of the run time and which types it has; `chain`: in a model with
+    effects."""
 
     arithmetic: Arithmetic
+    chain: bool = False
 
     @property
     def bits(self) -> str:
@@ -75,6 +93,18 @@ class Family:
     def types(self) -> dict[str, str]:
         """Types of the run time beside `real_t`."""
         return {"play_t": "int32_t", "reach_t": self.arithmetic.reach, "sum_t": "int64_t"} if self.fixed else {}
+
+    @property
+    def signals(self) -> dict[str, str]:
+        """What code that models with and without effects share names, and what that is here."""
+        if self.chain and self.fixed:
+            return SIGNALS
+        return dict.fromkeys(SIGNALS, "hystgen_real_t") | FINE
+
+    @property
+    def chain_types(self) -> tuple[str, ...]:
+        """The headers with the types of effects."""
+        return FIXED_CHAIN_TYPES if self.fixed else CHAIN_TYPES
 
     @property
     def includes(self) -> tuple[str, ...]:
@@ -139,9 +169,10 @@ class Variant:
     """The kind of a model, which decides on the files of the run time that its operators are made of.
 
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
-    drive code; `saturates`: output codes are limited; `start_list`: each play starts at its own value; `chain`: it has
-    effects, `slew`: one of them keeps the drive within a rate, `ages`: one is a gain that follows the travel, `moves`
-    and `bends`: how plays move and are bent where that is not as in engine loop.
+    drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
+    `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
+    a rate, `ages`: one is a gain that follows the travel, `moves` and `bends`: how plays move and are bent where that
+    is not as in engine loop.
     """
 
     engine: str
@@ -166,14 +197,16 @@ class Variant:
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators."""
         files = ["clamp.c"]
-        if self.fixed:
+        if self.fixed and self.chain:
+            files.append("clamp_fine.c")
+        elif self.fixed:
             files.append("code_saturating.c" if self.saturates else "code.c")
         if self.fronts:
             if self.fixed:
                 files.append("front_two_curves.c" if self.branches else "front_curve.c")
             files.append("inverse_two_branches.c" if self.branches else "inverse_one_branch.c")
         elif self.fixed or self.engine == "loop":
-            files.append("front_finer.c" if self.finer else "front_none.c")
+            files.append("front_finer.c" if self.finer and not self.chain else "front_none.c")
         return (*files, *(self._loop() if self.engine == "loop" else self._corners()), "status.c")
 
     def _loop(self) -> tuple[str, ...]:
@@ -182,9 +215,13 @@ class Variant:
         start = "loop_start_list.c" if self.start_list else "loop_start.c"
         if self.chain:
             slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
-            moving = (f"moved_{self.moves}.c", f"bent_{self.bends}.c", "chain_moving.c")
-            plays = ("chain_plays.c",) if not self.moves else moving if self.bends else ("chain_relaxing.c",)
-            return (start, f"loop_{front}.c", slew, *plays, "chain.c", *more)
+            kept = () if self.moves == "dashpot" else ("moved_kept.c",)
+            moving = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
+            ending = "_fixed" * self.fixed
+            alone = "relaxing" if self.moves else "plays"
+            plays = moving if self.bends else (f"chain_{alone}{ending}.c",)
+            finer = "chain_finer.c" if self.finer else "chain_whole.c"
+            return (start, f"loop_{front}.c", slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",
@@ -290,14 +327,14 @@ def operator_pieces(
 ) -> list[Piece]:
     """The functions of a model's operators, with those that `glue` defines for it; `calls` as for `api`; `own`: of
     blocks that are the user's own."""
-    blocks = CHAIN_BLOCKS if variant.chain else ()
+    blocks = (FIXED_CHAIN_BLOCKS if variant.fixed else CHAIN_BLOCKS) if variant.chain else ()
     wanted = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
     return needed([*_pieces(blocks), *own, *split_pieces(glue), *_pieces(variant.sources())], wanted)
 
 
-def chain_types(own: Iterable[Piece], glue: str) -> list[Piece]:
+def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
     """The types of blocks, those of the user's own last, and then of instances of models with effects."""
-    return [*_pieces(CHAIN_TYPES), *own, *split_pieces(glue)]
+    return [*_pieces(family.chain_types), *own, *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
@@ -383,6 +420,11 @@ def _own(family: Family) -> frozenset[str]:
 
 def _named(text: str, prefix: str, family: Family, name: str) -> str:
     """The text with the names of a model and of its run time."""
+    for shared, here in family.signals.items():
+        cast = f"({shared})"
+        if here == "hystgen_real_t":
+            text = text.replace(cast, "")
+        text = re.sub(rf"\b{shared}\b", here, text)
     if not family.fixed:  # one type for everything
         text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.fixed_tables import setting_codes
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal import fixed
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
 from hystgen.emission.text import literal
@@ -25,6 +27,9 @@ LETTERS = {
     "push": "p", "settle": "q", "set_offset": "o", "set_temperature": "t", "set_gain": "g", "set_travel": "d",
 }  # fmt: skip
 """Letters of the settings of models with effects."""
+
+WIDE = ("set_travel",)
+"""Settings that take more bits than a code, which samples of fixed point have no room for."""
 
 SHARE = 0.125
 """Of the spans of settings by which the samples change them: small enough for references to stay in reach."""
@@ -55,14 +60,16 @@ def operators(
     found = []
     for name in ("forward", "inverse"):
         if getattr(options, name):
-            own = [call for call in SETTINGS if call in calls.get(name, ())]
+            own = [call for call in SETTINGS if call in calls.get(name, ()) and not (numbers.fixed and call in WIDE)]
             settings = [(LETTERS[call], call) for call in own]
             found.append({"name": name, "settings": settings, "samples": _samples(numbers, name == "inverse", own)})
     return found
 
 
 def _setting(numbers: ChainTables, call: str, turn: int) -> float:
-    """An argument of a setting; every third one is beyond its limits where there are any."""
+    """An argument of a setting, in fixed point before it is rounded to a code; every third one is beyond its limits,
+    where there are any."""
+    degree, one = setting_codes(numbers) if numbers.fixed else (1.0, 1.0)
     drive_low, drive_high, low, high = (float(end) for end in numbers.limits[: slots.OUTPUT_MAX + 1])
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
     if call == "settle":
@@ -70,9 +77,10 @@ def _setting(numbers: ChainTables, call: str, turn: int) -> float:
     if call == "set_offset":
         return way * (high - low)
     if call == "set_temperature":
-        return float(numbers.gain[0, thermal.REFERENCE]) + 40.0 * way
+        place, bits = (fixed.REFERENCE, fixed.TEMPERATURE_BITS) if numbers.fixed else (thermal.REFERENCE, 0)
+        return degree * (float(numbers.gain[0, place]) / 2.0**bits + 40.0 * way)
     if call == "set_gain":
-        return 1.0 + way
+        return one * (1.0 + way)
     if call == "set_travel":
         return abs(way) * float(numbers.ageing.number[0, ageing.LAST])
     return low + (0.5 + way) * (high - low)
@@ -81,11 +89,15 @@ def _setting(numbers: ChainTables, call: str, turn: int) -> float:
 def _samples(
     numbers: Tables | FixedTables | ChainTables, inverse: bool, settings: Sequence[str]
 ) -> list[dict[str, Any]]:
+    def code(x: float) -> int:
+        """The nearest code."""
+        most = int(numbers.limits[slots.CODE_MAX])
+        return min(max(round(x), -most - 1), most)
+
     def at(low: Any, high: Any, part: float) -> Any:
         """The argument that far along a range: in the arithmetic's own operations, or the nearest code there is."""
-        if isinstance(numbers, FixedTables):
-            most = int(numbers.limits[slots.CODE_MAX])
-            return min(max(round(int(low) + (int(high) - int(low)) * part), -most - 1), most)
+        if numbers.fixed:
+            return code(int(low) + (int(high) - int(low)) * part)
         real = numbers.threshold.dtype.type
         return low + (high - low) * real(part)
 
@@ -105,7 +117,8 @@ def _samples(
         if isinstance(numbers, ChainTables) and settings and i % 11 == 5:
             call = settings[i // 11 % len(settings)]
             calls.append(SETTINGS[call])
-            arguments.append(_setting(numbers, call, i // 11 // len(settings)))
+            argument = _setting(numbers, call, i // 11 // len(settings))
+            arguments.append(code(argument) if numbers.fixed else argument)
     x = np.array(arguments, dtype=numbers.threshold.dtype)
     answers, status = reference.answers(numbers, inverse, calls, x, compiled=False)
     letters = {**CALLS, **{SETTINGS[call]: LETTERS[call] for call in settings}}

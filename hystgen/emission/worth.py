@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hystgen.basics.problems import EffectsError
-from hystgen.compensator.chain.tables import SAMPLES_A_SWEEP
+from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.effects.base import Effect
 from hystgen.model import Model
 

@@ -6,6 +6,7 @@ neither the records nor the output folder.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import logging
 import os
@@ -229,12 +230,11 @@ def cluster(address: str) -> Iterator[Any]:
     """A client of the Dask scheduler at `address`, which has a worker. Raises SchedulerError."""
     try:
         from distributed import Client
-        from distributed.comm import get_address_host_port
     except ModuleNotFoundError:
         raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
     with _quiet():
         try:
-            get_address_host_port(address)  # a client that was given no address would wait for it when it is deleted
+            asyncio.run(_answer(address))  # a client that is not answered would wait once more when it is deleted
             client = Client(address, timeout=PATIENCE, set_as_default=False)
         except Exception as failure:  # each protocol has its own
             reason = (str(failure).splitlines() or [type(failure).__name__])[0]
@@ -245,6 +245,15 @@ def cluster(address: str) -> Iterator[Any]:
             except TimeoutError:
                 raise SchedulerError(f"the Dask scheduler at {address} has no workers; start some") from None
             yield client
+
+
+async def _answer(address: str) -> None:
+    """Wait until a Dask scheduler answers. Each protocol has errors of its own."""
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    comm = await connect(address, timeout=PATIENCE, **Security().get_connection_args("client"))
+    comm.abort()
 
 
 def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Generator[Result, None, None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.front.stage import CurveTables
+from hystgen.front.stage import CurveTables, Polynomials
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, FINE
 
@@ -16,7 +16,7 @@ FORWARD, INVERSE = 0, 2
 
 
 @jit
-def curve(t: CurveTables, which: int, x: Any) -> Any:
+def curve(t: Polynomials, which: int, x: Any) -> Any:
     """Value of a curve: c0 + c1 h + c2 h^2 + ... on the piece that x lies on, h = 0 .. 1 along it."""
     j = t.first[which]
     high = j + t.pieces[which] - 1

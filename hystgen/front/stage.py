@@ -53,11 +53,9 @@ class StageTables(Protocol):
     def atanh(self) -> AtanhTables: ...
 
 
-class CurveTables(Protocol):
-    """Constants of the stages in fixed point, as `hystgen.compensator.layout.FixedTables` has them."""
+class Polynomials(Protocol):
+    """Curves as pieces of polynomials in fixed point."""
 
-    @property
-    def limits(self) -> Reals: ...
     @property
     def knot(self) -> Reals: ...
     @property
@@ -68,6 +66,13 @@ class CurveTables(Protocol):
     def first(self) -> Reals: ...
     @property
     def pieces(self) -> Reals: ...
+
+
+class CurveTables(Polynomials, Protocol):
+    """Constants of the stages in fixed point, as `hystgen.compensator.layout.FixedTables` has them."""
+
+    @property
+    def limits(self) -> Reals: ...
     @property
     def domain(self) -> Reals: ...
     @property

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -163,16 +164,26 @@ def wrong_drive(v: Array, y: Array) -> Flags:
     if span == 0.0:
         return found
     slope, noise = _span(y[known]) / span, _noise(y[known])
-    pulses = np.zeros(len(v), dtype=bool)
+    unseen = np.zeros(len(v), dtype=bool)
     for first, last, jump in _pulses(v, span):
-        pulse = np.zeros(len(v), dtype=bool)
-        pulse[first:last] = True
+        pulse = flags_of([(first, last)], len(v))
         seen = max(SEEN * slope * jump, SIGMAS * noise)
         if slope * jump > 2.0 * SIGMAS * noise and _notice(slope * bridged(v, pulse), y, first, last) < seen:
-            pulses |= pulse
-    if np.count_nonzero(pulses) <= most(len(v)):
-        found |= pulses
+            unseen |= pulse
+    if np.count_nonzero(unseen) <= most(len(v)):
+        found |= unseen
     return found
+
+
+def pulses(v: Array) -> list[tuple[int, int]]:
+    """Runs [first, last) of few samples of the drive that jump away and back, or stand apart at an end.
+
+    They may be real, or rows of which all is wrong: zeros, another sample's numbers, the converter's end. None where
+    they are so many that they are the drive.
+    """
+    span = _span(v)
+    found = [(first, last) for first, last, _ in _pulses(v, span)] if span > 0.0 and len(v) > WINDOW else []
+    return found if sum(last - first for first, last in found) <= most(len(v)) else []
 
 
 def returns(v: Array, first: int, last: int) -> bool:
@@ -303,7 +314,7 @@ def between_gaps(record: Record) -> list[Piece]:
     ]
 
 
-BRIDGED, NOT_COMPARED = "v jump away and back unseen by y, bridged", "y far from their neighbours, not compared"
+BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from their neighbours, not compared"
 """What is done about isolated wrong samples."""
 
 
@@ -456,6 +467,14 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
         sudden = step[edges] / np.maximum(follows[edges], np.finfo(np.float64).tiny)
         if not np.isfinite(sudden).any() or np.nanmedian(sudden) < SUDDEN:
             found.append((name, end))
+    return found
+
+
+def flags_of(runs: Iterable[tuple[int, int]], samples: int) -> Flags:
+    """Flags (samples,) that are set over stretches [a, b)."""
+    found = np.zeros(samples, dtype=bool)
+    for a, b in runs:
+        found[a:b] = True
     return found
 
 

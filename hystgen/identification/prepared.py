@@ -135,10 +135,7 @@ def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int,
     for what, find in (("drop-out", faults.drop_outs), ("run", faults.held)):
         runs = find(item.y, item.v)
         if runs:
-            wrong = np.zeros(len(item.y), dtype=bool)
-            for a, b in runs:
-                wrong[a:b] = True
-            item = _less(item, wrong)
+            item = _less(item, faults.flags_of(runs, len(item.y)))
             found.append((what, runs))
     return item, found
 
@@ -173,11 +170,12 @@ def mask_outliers(
     """Leave out isolated samples of y that lie far from the prediction of a play sum fitted to their neighbours.
 
     Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
-    that is bridged. The play sum is one of least trimmed squares (Rousseeuw and Van Driessen, Data Mining and Knowledge
-    Discovery 12, 2006): it is fitted again without the samples that it misses most, as many as may be left out, so that
-    none of them draws it near.
+    that is bridged. Pulses of the drive have no part in the first fit, which is then asked whether they are real: a
+    false one may make the memory known where it is not. The play sum is one of least trimmed squares (Rousseeuw and Van
+    Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the samples that it misses most,
+    as many as may be left out, so that none of them draws it near.
     """
-    solution, _ = pi.solve([_without_runs(item)[0] for item in to_fit], wanted, floor)
+    solution, _ = pi.solve([_without_pulses(_without_runs(item)[0]) for item in to_fit], wanted, floor)
     places = tuple(float(r) for r in solution.thresholds)
     before: list[Array] = []
     for number in range(MOST_FITS):
@@ -196,28 +194,71 @@ def mask_outliers(
             group[k] = replace(right, y=np.where(flags, np.nan, right.y)) if flags.any() else right
 
 
-def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
-    """The course with its drive bridged at isolated samples where a model then misses the output by far less.
+def _without_pulses(item: Course) -> Course:
+    """The course without the rows in which the drive jumps away and back."""
+    wrong = faults.flags_of(faults.pulses(item.v), len(item.v))
+    if not wrong.any():
+        return item
+    return replace(item, v=faults.bridged(item.v, wrong), y=np.where(wrong, np.nan, item.y)).resettled(math.inf)
 
-    And the rest of it by no more: a wrong drive is remembered, where a wrong output is not. A `robust` solution is
-    asked about the largest and the least drive too, if it misses the output there by as much as anywhere: what they
-    spoil may hide them, and the range of the model ends at them.
+
+def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
+    """The course with its drive bridged at isolated samples that the output does not bear out.
+
+    There, where a model then misses it by far less, and the rest of it by no more: a wrong drive is remembered, where a
+    wrong output is not. Or where the whole row is wrong, which shows in the output there, or behind it: a pulse that
+    was real has left its memory. A pulse right before the end of a record tells a fit nothing, and cannot be told from
+    a fault: it would only widen the range, and hide when the memory became known. A `robust` solution is asked about
+    the largest and the least drive too, if it misses the output there by as much as anywhere: what they spoil may hide
+    them, and the range of the model ends at them.
     """
     error = _errors(item, solution)
-    suspects = faults.far_from_others(error, item.output_range)
+    far = faults.far_from_others(error, item.output_range)
+    isolated = faults.flags_of(far, len(item.v))
+    suspects = [run for run in far if faults.returns(item.v, *run)]
     if robust:
         missed = _most_missed(item, error).tolist()
-        suspects += [(k, k + 1) for k in (int(np.argmax(item.v)), int(np.argmin(item.v))) if k in missed]
-    for first, last in suspects:
-        if not faults.returns(item.v, first, last):
-            continue
-        run = np.zeros(len(item.v), dtype=bool)
-        run[first:last] = True
+        ends = [(k, k + 1) for k in (int(np.argmax(item.v)), int(np.argmin(item.v))) if k in missed]
+        suspects += [run for run in ends if faults.returns(item.v, *run)]
+    for first, last in dict.fromkeys([*faults.pulses(item.v), *suspects]):
+        run = faults.flags_of([(first, last)], len(item.v))
         other = replace(item, v=faults.bridged(item.v, run)).resettled(math.inf)
         less = _errors(other, solution)
-        if _size(less[run]) < LESS_MISSED * _size(error[run]) and _size(less[~run]) <= _size(error[~run]):
+        explained = _size(less[run]) < LESS_MISSED * _size(error[run])
+        wrong = bool(isolated[run].any()) and _neither(error[run], less[run])
+        there = (explained or wrong) and _size(less[~run]) <= _size(error[~run])
+        at_the_end = len(item.v) - last < faults.LONGEST
+        if there or at_the_end or _not_remembered(error[~run], less[~run]):
             item, error = other, less
     return item
+
+
+def _neither(error: Array, less: Array) -> bool:
+    """Whether outputs, of which some are known, are further from those with a pulse of the drive, and from those
+    without it, than the two are apart: neither following nor lagging behind the drive brings them there."""
+    known = np.isfinite(error)
+    nearer = np.minimum(np.abs(error[known]), np.abs(less[known]))
+    return bool(known.any() and (nearer > np.abs(error[known] - less[known])).all())
+
+
+def _not_remembered(error: Array, less: Array) -> bool:
+    """Whether errors beside a pulse of the drive are those of a memory without it: the effect that the pulse has on
+    them is missing.
+
+    Judged where it is larger than the model's own errors without the pulse, `less`, and only if it is in all as sure as
+    an outlier is.
+    """
+    own = np.abs(less[np.isfinite(less)])
+    usual = np.sort(own)[: -faults.most(len(own))]
+    if not len(usual):
+        return False
+    scatter = math.sqrt(float(np.mean(usual**2)))
+    effect = error - less
+    # wrong outputs say nothing about the drive
+    here = (np.abs(effect) > scatter) & (np.abs(less) <= usual[-1])
+    error, less, effect = error[here], less[here], effect[here]
+    sure = _size(effect) > (faults.OUTLYING * scatter) ** 2
+    return sure and abs(float(less @ effect)) < math.sqrt(LESS_MISSED) * float(error @ effect)
 
 
 def _size(error: Array) -> float:

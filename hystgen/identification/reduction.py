@@ -31,6 +31,10 @@ CHUNK = 8192
 BLOCKED = 64
 """Columns for which the linear algebra library has room to work on at a time."""
 
+AS_FAR = 1e-3
+"""Share of its range by which the drive may miss its largest or least value and still have been there: four codes of a
+12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
+
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
 
@@ -107,11 +111,19 @@ def settled(v: Array, reach: float) -> int:
 
     Once the drive has swept `2 reach`, every play up to threshold `reach` is exact (MODEL.md section 2). Once it has
     visited its own largest and least value, plays that reach further never move again in this record: a constant.
-    Whichever comes first.
+    Whichever comes first. Values that are `AS_FAR` apart are the same: or noise of the drive would choose among turns.
     """
-    extremes = max(int(np.argmax(v)), int(np.argmin(v)))
+    extremes = max(_reached(v), _reached(-v))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
     return min(extremes, int(np.argmax(swept))) if swept[-1] else extremes
+
+
+def _reached(v: Array) -> int:
+    """The largest sample of the first visit to where the drive is largest."""
+    there = v >= np.max(v) - AS_FAR * np.ptp(v)
+    first = int(np.argmax(there))
+    visit = v[first:] if there[first:].all() else v[first : first + int(np.argmin(there[first:]))]
+    return first + int(np.argmax(visit))
 
 
 def travel(course: Course, threshold: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.plays.slots import Bytes
 from hystgen.verification import signals

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.fixed_tables import setting_codes
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.front import curve
 from hystgen.plays import slots
@@ -150,12 +151,14 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         op[rng.random(length) < 0.001] = slots.OP_INIT
         drives = rng.uniform(drive_low - 5.0, drive_high + 5.0, length)
         x = np.where((op == slots.OP_SETTLE) | (op == slots.OP_COMMIT), drives, x)
+        degree, gain = (1.0, 1.0) if not tables.fixed else setting_codes(tables)
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
-        x = np.where(op == slots.OP_TEMPERATURE, 20.0 + rng.standard_cauchy(length) * 30.0, x)
-        x = np.where(op == slots.OP_GAIN, rng.uniform(0.3, 2.2, length), x)
+        x = np.where(op == slots.OP_TEMPERATURE, degree * (20.0 + rng.standard_cauchy(length) * 30.0), x)
+        x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)
         x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(0.0, 9.0, length), x)
         odd = rng.random(length) < 0.01
-        x[odd] = rng.choice([np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30], int(odd.sum()))
+        strange = [0.0, 1e30, -1e30] if tables.fixed else [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30]
+        x[odd] = rng.choice(strange, int(odd.sum()))
         yield name, op, x
     # held for a long time, from where slow states still move
     yield "held", _steps(np.empty(length)), np.where(np.arange(length) < 50, low, 0.7 * high + 0.3 * low)

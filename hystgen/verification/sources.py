@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 
-from hystgen.compensator.chain.tables import VERIFIED_SHARE
+from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
+from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
 from hystgen.emission import files, module
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
@@ -36,24 +37,34 @@ class Sources:
         return (*self.emitted, self.harness)
 
 
-def harness(name: str, operators: tuple[str, ...], more: Mapping[str, Sequence[str]] = MappingProxyType({})) -> str:
+def harness(
+    name: str,
+    operators: tuple[str, ...],
+    more: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    arithmetic: Arithmetic = FLOAT32,
+) -> str:
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, what it has beside those of
     every model."""
-    chain = {op: list(_chain_calls(name, op, more.get(op, ()))) for op in operators}
+    chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
     return module.render("harness.c.j2", SimpleNamespace(name=name, operators=operators, calls=CALLS, chain=chain))
 
 
-def _chain_calls(name: str, op: str, more: Sequence[str]) -> Iterator[tuple[int, str]]:
-    """The number and the statement of each call that only models with effects have."""
-    own = f"{name}_{op}"
+def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic) -> Iterator[tuple[int, str]]:
+    """The number and the statement of each call that only models with effects have.
+
+    In fixed point travels have more bits than codes: set are multiples of 2^TRAVEL_BITS, and the last bits compared.
+    """
+    own, fixed = f"{name}_{op}", arithmetic.fixed
     for call, number in SETTINGS.items():
         if call in more:
-            yield number, f"{own}_{call}(&self, x[i])"
+            travel = f" * ((int64_t)1 << {TRAVEL_BITS})" if fixed and call == "set_travel" else ""
+            yield number, f"{own}_{call}(&self, x[i]{travel})"
     if "travel" in more:
-        yield slots.OP_TRAVELLED, f"answer[i] = {own}_travel(&self)"
+        yield slots.OP_TRAVELLED, f"answer[i] = ({name}_real_t){own}_travel(&self)"
     if "expected" in more:
+        share = int(VERIFIED_SHARE * (arithmetic.code_max + 1)) if fixed else VERIFIED_SHARE
         yield slots.OP_EXPECTED, f"answer[i] = {own}_expected(&self)"
-        yield slots.OP_CORRECT, f"{own}_correct(&self, x[i], ({name}_real_t){VERIFIED_SHARE})"
+        yield slots.OP_CORRECT, f"{own}_correct(&self, x[i], ({name}_real_t){share})"
 
 
 def write(folder: Path, model: Model, options: Options) -> Sources:
@@ -63,7 +74,9 @@ def write(folder: Path, model: Model, options: Options) -> Sources:
     operators = tuple(op for op in ("forward", "inverse") if getattr(options, op))
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(name, operators, module.calls_of(model.parameters, model.cascade, options))
+    texts["hystgen_harness.c"] = harness(
+        name, operators, module.calls_of(model.parameters, model.cascade, options), ARITHMETICS[options.arithmetic]
+    )
     paths = {path.name: path for path in files.write(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, operators, tuple(paths.values()), caller, selftest)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,19 +36,38 @@ class Plant:
     hysteresis: base.Base
     effects: tuple[Effect, ...] = ()
 
-    def respond(self, session: Session) -> Array:
-        """Noise-free output on the session's fine grid; zero drive gives about zero output."""
-        x, dt = session.v, session.dt
-        around = Surroundings(session.t, dt, session.v, session.temperature, session.bench)
-        present = {effect.name: effect for effect in self.effects}
+    def respond(self, session: Session, first: Session | None = None) -> Array:
+        """Noise-free output on the session's fine grid; zero drive gives about zero output.
+
+        `first`: the session in which the plant has had its zero and the strengths of its effects, where not this one.
+        """
+        around = _around(session)
+        x, h = self._driven(around)
+        known = h
+        if first is not None:
+            around = replace(around, first=_around(first))
+            x, known = self._driven(around.scale)
+        h = h - known.mean() + x.mean() * session.bench.span_out / session.bench.span
+        present = self._present
+        for name, block in OUTPUT_SIDE.items():
+            if name in present:
+                h = block(present[name], h, around)
+        return h
+
+    @property
+    def _present(self) -> dict[str, Effect]:
+        return {effect.name: effect for effect in self.effects}
+
+    def _driven(self, around: Surroundings) -> tuple[Array, Array]:
+        """Input and output of the hysteresis."""
+        x, present = around.drive, self._present
         for name, block in DRIVE_SIDE.items():
             if name in present:
                 x = block(present[name], x, around)
         viscosity = memory.viscosity(present["rate_dependence"]) if "rate_dependence" in present else None
         centre = memory.centre(present["noncongruent"]) if "noncongruent" in present else None
-        h = base.run(self.hysteresis, np.ascontiguousarray(x), dt, viscosity, centre)
-        h = h - h.mean() + x.mean() * session.bench.span_out / session.bench.span
-        for name, block in OUTPUT_SIDE.items():
-            if name in present:
-                h = block(present[name], h, around)
-        return h
+        return x, base.run(self.hysteresis, np.ascontiguousarray(x), around.dt, viscosity, centre)
+
+
+def _around(session: Session) -> Surroundings:
+    return Surroundings(session.t, session.dt, session.v, session.temperature, session.bench)

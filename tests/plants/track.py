@@ -33,8 +33,9 @@ Array = NDArray[np.float64]
 
 EFFECTS = (
     "creep", "lag", "rate_dependence", "asymmetry", "saturation", "resonance", "delay", "noncongruent", "slew_limit",
+    "ageing", "thermal",
 )  # fmt: skip
-"""Effects that nothing from outside goes with."""
+"""Effects that are looked at: drift is one of the clock, and a sensor's nonlinearity no error of the stage."""
 
 FAST = ("lag", "rate_dependence", "resonance", "delay", "slew_limit")
 """Those that are looked at at the rate of the bench's fast records."""
@@ -90,10 +91,19 @@ def reference(rng: np.random.Generator, low: float, high: float) -> Array:
     return np.concatenate([*parts, low + (high - low) * joined[:rest]])
 
 
-def answer(case: Case, drive: Array, rate: float) -> Array:
-    """What the plant answers to a drive, a sample each, from rest at its first value."""
+def rooms(case: Case) -> Array:
+    """Temperature along a reference: three waves as far as it went in the records, from where these began."""
+    seen = case.session.temperature
+    low, high = float(seen.min()), float(seen.max())
+    level = 2.0 * (seen[0] - low) / (high - low) - 1.0 if high > low else 0.0
+    phase = np.arcsin(np.clip(level, -1.0, 1.0)) + 6.0 * np.pi * np.arange(LENGTH) / LENGTH
+    return 0.5 * (low + high) + 0.5 * (high - low) * np.sin(phase)
+
+
+def answer(case: Case, drive: Array, room: Array, rate: float) -> Array:
+    """What the plant answers to a drive in a room, a sample each, from rest at its first value."""
     held = np.full(LENGTH, drive[0])  # whatever rings at the start has died out behind them
-    drive = np.concatenate([held, drive])
+    drive, room = np.concatenate([held, drive]), np.concatenate([np.full(LENGTH, room[0]), room])
     n = len(drive)
     before = np.geomspace(1e-4, 1.0, 50) * 5.0 * max(case.session.bench.long, n / rate)
     fine = before[-1] + ((np.arange(FINER * n) + 0.5) / FINER + 0.5) / rate
@@ -101,9 +111,9 @@ def answer(case: Case, drive: Array, rate: float) -> Array:
     t = np.concatenate([before, fine])
     v = np.interp(t, times, drive)
     planned = Planned("reference", True, rate, len(before), n)
-    room = np.full(len(t), float(case.session.temperature[0]))
-    stage = replace(case.session, t=t, v=v, records=(planned,), history=None, rest=None, temperature=room)
-    return stage.sampled(case.plant.respond(stage), planned)[LENGTH:]
+    heat = np.interp(t, times, room)
+    stage = replace(case.session, t=t, v=v, records=(planned,), history=None, rest=None, temperature=heat)
+    return stage.sampled(case.plant.respond(stage, case.session), planned)[LENGTH:]
 
 
 def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
@@ -131,8 +141,9 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         low, high = np.polyval(np.polyfit(drives, outputs, 1), [stand.low, stand.high]).tolist()
         low, high = low + INSIDE * (high - low), high - INSIDE * (high - low)
         u = reference(np.random.default_rng(seed), low, high)
-        rows = np.column_stack([np.arange(len(u)) / rate, u])
-        np.savetxt(home / "reference.csv", rows, delimiter=",", header="t,u", comments="", fmt="%.12g")
+        room = rooms(case)
+        rows = np.column_stack([np.arange(len(u)) / rate, u, room])
+        np.savetxt(home / "reference.csv", rows, delimiter=",", header="t,u,temperature", comments="", fmt="%.12g")
         slope, start = np.polyfit(outputs, drives, 1)
         tried = {"line": np.clip(start + slope * u, stand.low, stand.high)}
         for name in ("plain", "whole"):
@@ -143,7 +154,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
             tried[name] = np.genfromtxt(home / f"{name}.csv", delimiter=",", names=True, deletechars="")["v"]
     left = {}
     for name, drive in tried.items():
-        error = (answer(case, drive, rate) - u)[2 * SWEEP :]
+        error = (answer(case, drive, room, rate) - u)[2 * SWEEP :]
         left[name] = 100.0 * float(np.std(error)) / (high - low)
     named = [entry["name"] for entry in found["effects"]]
     alike = {name for pair in found["not_separable"] if set(pair) & set(named) for name in pair}

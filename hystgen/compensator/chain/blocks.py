@@ -5,13 +5,17 @@ from __future__ import annotations
 import itertools
 
 from hystgen.compensator.chain import own
-from hystgen.compensator.chain.tables import ChainTables, OwnChainTables
+from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.ageing import fixed as ageing_fixed
 from hystgen.effects.creep import compensator as creep
+from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag import fixed as lag_fixed
 from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal import fixed as thermal_fixed
 
 KINDS = (creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, drift.KIND)
 """Those of the catalogue, each with a file of its name in `c_runtime/`."""
@@ -19,6 +23,9 @@ KINDS = (creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, t
 
 def sides(t: ChainTables) -> tuple[list[Constants], list[Constants]]:
     """The blocks in front of the plays, from the drive on, and those behind them."""
+    if t.fixed:
+        gains = [*ageing_fixed.constants(t.ageing), *thermal_fixed.constants(t.gain)]
+        return [*lag_fixed.constants(t.lag)], [*creep_fixed.constants(t.creep), *gains]
     given = own.constants(t.own, t.own_effects) if isinstance(t, OwnChainTables) else []
     ahead, behind = given[: t.own.ahead], given[t.own.ahead :]
     gains = [*ageing.constants(t.ageing), *thermal.heat_constants(t.heat), *thermal.constants(t.gain)]

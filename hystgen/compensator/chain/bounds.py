@@ -26,11 +26,12 @@ import numpy as np
 
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LEAST_GAIN
@@ -122,6 +123,12 @@ def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
         play = 8.0 * u * size / float(np.min(slow))
         if kind != "float64":
             play += compiled.largest_step / 4.0  # contacts inside a step, taken at the first touch
+    if t.moves == moving.DASHPOT:
+        effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_step
+        rows = t.yields.astype(float)
+        play = 8.0 * u * size + dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, way)
+        if kind != "float64":
+            play += float(t.number[moving.SEEN]) * way  # at which the input stands still
     each = steep * play + (12.0 + len(static.pi.weights)) * u * size * steep
     error = float(np.sum(p)) * each
     width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from hystgen.compensator import engines
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.tables import ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.plays import slots
 
 PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "tanh", "dead_zone",
-    "relaxing", "dilated", "polynomial", "centre",
+    "relaxing", "dilated", "dashpot", "polynomial", "centre",
 )  # fmt: skip
 """What is counted: `any` once for a model with effects, the others for each kind of block that there is; `dilated`
 for all plays that a search finds."""
@@ -23,13 +23,14 @@ for all plays that a search finds."""
 def parts(t: ChainTables) -> list[str]:
     """The parts that a model has; two blocks of one kind share their code."""
     exact = [bool(each) for each in t.lag.exact]
-    kinds = [int(kind) for kind in t.behind.stage_kind]
+    kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter({
         "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
         "heat": len(t.heat.turns), "clock": len(t.clock),
         "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
+        "dashpot": t.moving.moves == moving.DASHPOT,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
     return ["any", *(part for part in PARTS[1:] if found[part])]

@@ -4,6 +4,10 @@ Play i is kept as where it would come to rest and what it contributes there. A p
 one is on its way there, `z = q + b1 dz_r(w - q)` at the end of a step, whose rest a step later is
 `q = z + (1 - E/M) dz_r(w - z)` with `M = (1 - E) tau/T` and dz_r what lies beyond +-r: the exact response to a straight
 input while the play slides or rests.
+
+A play with a nonlinear dashpot is kept where it is, in two parts: in a step its input counts as if it stood at a share
+a of the way, `z' = z + D(dz_r(x + a (w - x) - z))` with D what a stretch yields in a step by the dashpot's own law. Two
+such plays with inputs that differ by at most e stay within e of each other, so that the error is at most a of the way.
 """
 
 from __future__ import annotations
@@ -14,21 +18,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.chain.static import StaticModel
+from hystgen.compensator.fixed_tables import reciprocal
+from hystgen.compensator.layout import FixedTables
 from hystgen.effects.base import Effect, decays
 from hystgen.effects.noncongruent.model import LoopCentre, PlayFunctions
+from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
 from hystgen.front.tanh.kernels import TanhTables, tanh
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals
 
-PLAIN, DILATED, RELAXING = range(3)
+PLAIN, DILATED, RELAXING, DASHPOT = range(4)
 STRAIGHT, POLYNOMIAL, CENTRE = range(3)
 """How plays move, and how they are bent."""
 
-SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LARGEST_INPUT, HALF = range(9)
+SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LARGEST_INPUT, HALF, SEEN = range(10)
 """Places in `MovingTables.number`."""
 
 CELLS = 4096
@@ -51,6 +59,7 @@ class MovingTables(NamedTuple):
     scanned: int  # 1 for viscous plays of one time constant that nothing bends
     share: Reals  # of these, p_i b1 (n + 1,)
     inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
+    yields: Reals  # (K, 5): what a nonlinear dashpot yields, by pieces
 
     @property
     def used(self) -> bool:
@@ -58,11 +67,25 @@ class MovingTables(NamedTuple):
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
+class FixedMovingTables(NamedTuple):
+    """The same in fixed point, which has no more than viscous plays of one time constant: `late`, `kept` (2,), factors
+    of what a stretch gains, and `relaxed`, tables of plays whose sums have the slopes that these have in a step."""
+
+    moves: int
+    bends: int
+    scanned: int
+    late: Reals
+    kept: Reals
+    relaxed: FixedTables
+
+    @property
+    def used(self) -> bool:
+        """Whether plays are other than those of engine loop."""
+        return self.moves != PLAIN
+
+
 def problems(static: StaticModel, effects: Sequence[Effect]) -> Iterator[tuple[Effect, str]]:
     """Which effects on plays the C cannot solve for, and why."""
-    for effect in effects:
-        if isinstance(effect, RelaxingPlays) and effect.exponent != 1.0 and effect.time_constant > 0.0:
-            yield effect, "there is no C for a nonlinear dashpot, an exponent other than 1"
     bends = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bends[1:])
     if bends and not (slope := least_slope(static, bends[:1])) > 0.0:
@@ -103,19 +126,24 @@ def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def build(
-    static: StaticModel, effects: Sequence[Effect], seconds: float, dtype: Any
+    static: StaticModel, effects: Sequence[Effect], seconds: float, largest_step: float, dtype: Any
 ) -> MovingTables:
-    """The tables of a model's plays, for effects without `problems`."""
+    """The tables of a model's plays, for effects without `problems` and a drive that takes no larger steps."""
     n = static.pi.n
     low, high = static.play_range
     first, second = np.zeros(n + 1), np.zeros(n + 1)
     moves, bends = PLAIN, STRAIGHT
     r = np.array(static.pi.thresholds)
     curve = np.zeros((n + 1, 1))
-    number = np.zeros(9)
+    number = np.zeros(SEEN + 1)
+    yields = np.zeros((0, dashpot.C3 + 1))
     number[[LEAST_INPUT, LARGEST_INPUT, HALF]] = 2.0 * low - high, 2.0 * high - low, 0.5
     for effect in effects:
-        if isinstance(effect, RelaxingPlays | ThresholdRate):
+        if dashpot.nonlinear(effect):
+            moves = DASHPOT
+            number[SEEN] = dashpot.seen(effect, r[-1], seconds, largest_step)
+            yields = dashpot.pieces(effect, r[-1], seconds, 3.0 * (high - low))
+        elif isinstance(effect, RelaxingPlays | ThresholdRate):
             moves = RELAXING
             movement = Movement(effect, r, np.array(static.pi.weights))
             if movement.by_threshold(seconds):
@@ -139,9 +167,42 @@ def build(
     scanned = moves == RELAXING and bends == STRAIGHT and len(set(first[1:].tolist())) == 1 and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])
     inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
-    given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse))
-    first, second, curve, number, share, inverse = given
-    return MovingTables(moves, bends, first, second, curve, number, halves, int(scanned), share, inverse)
+    given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse, yields))
+    first, second, curve, number, share, inverse, yields = given
+    return MovingTables(moves, bends, first, second, curve, number, halves, int(scanned), share, inverse, yields)
+
+
+def build_fixed(
+    plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float
+) -> FixedMovingTables:
+    """The same in fixed point, for effects without `beyond_fixed`. Raises OverflowError."""
+    own = build(static, effects, seconds, np.ptp(static.input_range), np.float64)
+    if not own.scanned:
+        none = np.zeros(2, dtype=np.int64)
+        return FixedMovingTables(PLAIN, STRAIGHT, 0, none, none, plays)
+    late = float(own.first[1])
+    weight = plays.weight
+    sums = [0, int(weight[0])]
+    for p in weight[1:].tolist():
+        sums.append(sums[-1] + round(p * late))
+    pairs = [reciprocal(slope) for slope in sums]
+    relaxed = plays._replace(
+        slope=np.array(sums, dtype=np.int64),
+        reciprocal=np.array([pair[0] for pair in pairs], dtype=np.int64),
+        shift=np.array([pair[1] for pair in pairs], dtype=np.int64),
+    )
+    gained, kept = (np.array(factor(x), dtype=np.int64) for x in (late, float(own.second[1])))
+    return FixedMovingTables(RELAXING, STRAIGHT, 1, gained, kept, relaxed)
+
+
+def beyond_fixed(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
+    """What fixed point does not have of effects on plays."""
+    if effects and not build(static, effects, seconds, np.ptp(static.input_range), np.float64).scanned:
+        words = (
+            "in fixed point there is no C for plays that are bent, have a nonlinear dashpot or do not all relax with "
+            "one time constant"
+        )
+        yield from ((effect, f"{words}; use float32") for effect in effects)
 
 
 def _viscous(seconds: float, tau: float) -> tuple[float, float]:
@@ -163,12 +224,43 @@ def beyond(x: Any, r: Any) -> Any:
 
 
 @jit
-def moved(t: MovingTables, r: Reals, i: int, q: Any, before: Any, w: Any) -> Any:
-    """Play i that rests at q, once its input has gone from `before` to w."""
+def yields(t: MovingTables, x: Any) -> Any:
+    """What a play that is stretched by x, not negative, gains of it in a step."""
+    low = 0
+    high = len(t.yields)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < t.yields[middle, 0]:
+            high = middle
+        else:
+            low = middle
+    on = x - t.yields[low, 0]
+    return ((t.yields[low, 4] * on + t.yields[low, 3]) * on + t.yields[low, 2]) * on + t.yields[low, 1]
+
+
+@jit
+def change(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+    """How far play i with a nonlinear dashpot moves while the input of the plays goes to w."""
+    x = s.play[0] + (w - s.play[0]) * t.number[SEEN] - s.play[i]
+    gained = r[0]
+    if x > r[i]:
+        gained = yields(t, x - r[i])
+    elif x < -r[i]:
+        gained = -yields(t, -x - r[i])
+    return gained + lost[i]
+
+
+@jit
+def moved(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+    """Play i once the input of the plays has gone to w."""
+    q = s.play[i]
+    if t.moves == DASHPOT:
+        return q + change(t, r, i, s, lost, w)
     if t.moves == RELAXING:
         return q + t.first[i] * beyond(w - q, r[i])
     threshold = r[i]
     if t.moves == DILATED:
+        before = s.play[0]
         way = w - before if w > before else before - w
         threshold = r[i] + t.first[i] * way
     low = w - threshold
@@ -183,6 +275,22 @@ def left(t: MovingTables, r: Reals, i: int, z: Any, w: Any) -> Any:
     if t.moves == RELAXING:
         return z + t.second[i] * beyond(w - z, r[i])
     return z
+
+
+@jit
+def keep(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any, z: Any) -> None:
+    """Play i has moved, and comes to rest at z, while the input of the plays goes to w."""
+    if t.moves == DASHPOT:
+        lost[i] = change(t, r, i, s, lost, w) - (z - s.play[i])
+    s.play[i] = z
+
+
+@jit
+def put(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, z: Any) -> None:
+    """Play i rests at z."""
+    if t.moves == DASHPOT:
+        lost[i] = r[0]
+    s.play[i] = z
 
 
 @jit
@@ -201,26 +309,30 @@ def bent(t: MovingTables, kernel: TanhTables, i: int, z: Any) -> Any:
 
 
 @jit
-def moved_sum(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, w: Any) -> Any:
+def moved_sum(
+    t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, lost: Reals, values: Reals, w: Any
+) -> Any:
     """What the plays give once their input has gone to w."""
     total = p[0] * w
     for i in range(1, len(r)):
-        z = moved(t, r, i, s.play[i], s.play[0], w)
+        z = moved(t, r, i, s, lost, w)
         total = total + p[i] * (values[i] if z == s.play[i] else bent(t, kernel, i, z))
     return total
 
 
 @jit
-def moved_follow(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, w: Any) -> Any:
+def moved_follow(
+    t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, lost: Reals, values: Reals, w: Any
+) -> Any:
     """The plays follow their input w; their sum."""
     total = p[0] * w
     for i in range(1, len(r)):
-        z = moved(t, r, i, s.play[i], s.play[0], w)
+        z = moved(t, r, i, s, lost, w)
         rest = left(t, r, i, z, w)
         value = values[i] if z == s.play[i] else bent(t, kernel, i, z)
         total = total + p[i] * value
         values[i] = value if rest == z else bent(t, kernel, i, rest)
-        s.play[i] = rest
+        keep(t, r, i, s, lost, w, rest)
     s.play[0] = w
     return total
 
@@ -233,6 +345,32 @@ def relaxing_follow(t: MovingTables, r: Reals, p: Reals, s: State, w: Any) -> An
         z = s.play[i] + t.first[1] * beyond(w - s.play[i], r[i])
         total = total + p[i] * z
         s.play[i] = z + t.second[1] * beyond(w - z, r[i])
+    s.play[0] = w
+    return total
+
+
+@jit
+def stretched(x: Any, r: Any, share: Reals) -> Any:
+    """A share of the part of x beyond +-r, in fixed point."""
+    return times(beyond(x, r), share[0], share[1])
+
+
+@jit
+def fixed_relaxing_follow(t: FixedMovingTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
+    """Viscous plays follow their input w in fixed point; their sum. They stay as near to each other as they are to be,
+    give or take no rounding."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = s.play[i] + stretched(w - s.play[i], r[i], t.late)
+        total = total + p[i] * z
+        rest = z + stretched(w - z, r[i], t.kept)
+        if i > 1:
+            room = r[i] - r[i - 1]
+            if rest > s.play[i - 1] + room:
+                rest = s.play[i - 1] + room
+            elif rest < s.play[i - 1] - room:
+                rest = s.play[i - 1] - room
+        s.play[i] = rest
     s.play[0] = w
     return total
 
@@ -267,11 +405,13 @@ def resting(r: Reals, s: State, i: int, w: Any) -> Any:
 
 
 @jit
-def moved_rest(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, w: Any) -> Any:
+def moved_rest(
+    t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, lost: Reals, values: Reals, w: Any
+) -> Any:
     """The plays at rest with their input at w; their sum."""
     total = p[0] * w
     for i in range(1, len(r)):
-        s.play[i] = resting(r, s, i, w)
+        put(t, r, i, s, lost, resting(r, s, i, w))
         values[i] = bent(t, kernel, i, s.play[i])
         total = total + p[i] * values[i]
     s.play[0] = w
@@ -289,18 +429,18 @@ def resting_sum(t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: Stat
 
 @jit
 def moved_input(
-    t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, values: Reals, moving: bool, h: Any
+    t: MovingTables, kernel: TanhTables, r: Reals, p: Reals, s: State, lost: Reals, values: Reals, moving: bool, h: Any
 ) -> Any:
     """Input of the plays at which their sum is h, by halves between where it is and the farthest."""
     here = s.play[0]
-    total = moved_sum(t, kernel, r, p, s, values, here) if moving else resting_sum(t, kernel, r, p, s, here)
+    total = moved_sum(t, kernel, r, p, s, lost, values, here) if moving else resting_sum(t, kernel, r, p, s, here)
     if total == h:
         return here
     low = here if total < h else t.number[LEAST_INPUT]
     high = t.number[LARGEST_INPUT] if total < h else here
     for _ in range(t.halves):
         w = low + (high - low) * t.number[HALF]
-        total = moved_sum(t, kernel, r, p, s, values, w) if moving else resting_sum(t, kernel, r, p, s, w)
+        total = moved_sum(t, kernel, r, p, s, lost, values, w) if moving else resting_sum(t, kernel, r, p, s, w)
         if total < h:
             low = w
         else:

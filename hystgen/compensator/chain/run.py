@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.tables import Compiled
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.base import Run
 from hystgen.effects.thermal.model import COLUMN
 from hystgen.plays import slots

@@ -10,14 +10,27 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.own import OwnTables
-from hystgen.compensator.chain.tables import ChainTables
-from hystgen.effects.ageing.compensator import ageing_absorb, ageing_solve
-from hystgen.effects.creep.compensator import creep_absorb, creep_rest, creep_resting, creep_solve
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag.compensator import lag_absorb, lag_rest, lag_solve
-from hystgen.effects.thermal.compensator import gain_absorb, gain_solve, heat_absorb, heat_solve
+from hystgen.effects.thermal.compensator import heat_absorb, heat_solve
 from hystgen.plays.slots import Reals
+
+
+class Blocks(NamedTuple):
+    """What the blocks of a chain do in one arithmetic, each function as in the C of the same name."""
+
+    lag: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # rest, absorb, solve
+    creep: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # and resting
+    ageing: tuple[Callable[..., Any], Callable[..., Any]]  # absorb, solve
+    ageing_settings: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # move, set, set_travel
+    gain: tuple[Callable[..., Any], Callable[..., Any]]
+    gain_settings: tuple[Callable[..., Any], Callable[..., Any]]  # reset, heat
+    saturation: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
+    target: Callable[..., Any]  # of the preview's line
+    front: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
+    plays: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # follow, started, inverse input
+    finer: Callable[..., Any]  # what has to arrive, with bits below an input of the plays
 
 
 class Sides(NamedTuple):
@@ -70,11 +83,15 @@ def _through(calls: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
     return both
 
 
-def sides_of(drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
-    """Both sides, with blocks of the user's own in front of the plays and behind them."""
+def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
+    """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them."""
+    lag_rest, lag_absorb, lag_solve = blocks.lag
+    creep_rest, creep_absorb, creep_solve, creep_resting = blocks.creep
+    ageing_absorb, ageing_solve = blocks.ageing
+    gain_absorb, gain_solve = blocks.gain
 
-    def own(verb: str, blocks: Sequence[OwnBlock], begin: int, backwards: bool = False) -> Callable[..., Any]:
-        calls = [_one(block, verb, begin + j) for j, block in enumerate(blocks)]
+    def own(verb: str, given: Sequence[OwnBlock], begin: int, backwards: bool = False) -> Callable[..., Any]:
+        calls = [_one(block, verb, begin + j) for j, block in enumerate(given)]
         return _through(calls[::-1] if backwards else calls)
 
     own_drive_rest, own_drive_absorb = own("rest", drives, 0), own("absorb", drives, 0)

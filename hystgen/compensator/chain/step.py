@@ -1,29 +1,21 @@
 """One step of a model with effects: the bit reference of `c_runtime/chain.c`, and the operations around it.
 
 Blocks in front of the plays (lag) and behind them (creep, gain) take what was applied forwards and are solved
-backwards; the plays between them are those of engine loop.
+backwards; the plays between them are those of engine loop. What a block computes, and what a code is as a signal
+between blocks, is the arithmetic's (`step_float`, `step_fixed`).
 """
 
 from __future__ import annotations
 
-import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.moving import (
-    PLAIN,
-    STRAIGHT,
-    moved_follow,
-    moved_input,
-    moved_rest,
-    relaxing_follow,
-    relaxing_input,
-)
-from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat, preview_target
-from hystgen.compensator.chain.sides import sides_of
-from hystgen.compensator.chain.tables import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
+from hystgen.compensator.chain.layout import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
+from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
+from hystgen.compensator.chain.sides import Blocks, sides_of
 from hystgen.compensator.step import (
     Operations,
     clamp_drive,
@@ -32,19 +24,12 @@ from hystgen.compensator.step import (
     inverse_replace,
     plays_of,
 )
-from hystgen.compensator.step_float import finite
 from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
-from hystgen.effects.ageing.compensator import (
-    AgeingState,
-    ageing_move,
-    ageing_set,
-    ageing_set_travel,
-)
+from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
 from hystgen.effects.drift.compensator import LEAD, MOST_AHEAD, ONE, clock_drift, clock_start, clock_tick
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.thermal.compensator import gain_heat, gain_reset, heat_move, heat_reset
-from hystgen.front.compensator import front_forward, front_inverse
+from hystgen.effects.thermal.compensator import heat_move, heat_reset
 from hystgen.plays import loop
 from hystgen.plays.loop import (
     ANSWER,
@@ -56,9 +41,7 @@ from hystgen.plays.loop import (
     STATUS,
     STEPPED,
     State,
-    loop_absorb,
     loop_output,
-    loop_solve,
 )
 from hystgen.plays.slots import (
     DOMAIN,
@@ -95,7 +78,8 @@ class ChainState(NamedTuple):
     `flags`: whether any drive has been applied yet."""
 
     plays: State
-    bent: Reals  # (n + 1,), what each play contributes, where an effect moves or bends them
+    lost: Reals  # (n + 1,), what each play has lost below its last bit, where a nonlinear dashpot moves them
+    bent: Reals  # (n + 1,), what each contributes, where an effect moves or bends them
     lag: Reals  # (k, 5)
     creep: CreepState
     ageing: AgeingState
@@ -114,6 +98,7 @@ def new_state(t: ChainTables) -> ChainState:
     return ChainState(
         loop.new_state(t.plays),
         np.zeros(len(t.threshold), dtype),
+        np.zeros(len(t.threshold), dtype),
         np.zeros((len(t.lag.block), 5), dtype),
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
@@ -127,238 +112,108 @@ def new_state(t: ChainTables) -> ChainState:
     )
 
 
-plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
+class Codes(NamedTuple):
+    """What the numbers that the operators take and give are between the blocks, in one arithmetic."""
 
-# ---------------------------------------------------------------- the glue of a model's blocks
-
-
-@jit(inline=True)
-def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
-    """What leaves the actuator: the output side's answer through what saturates, and its offsets."""
-    offset = t.number[OFFSET] + s.real[SET]
-    for j in range(len(t.clock)):
-        offset = offset + clock_drift(t.clock, s.clock, j, t.plays.limits[ZERO])
-    return front_forward(t.behind, y, 1) + offset
-
-
-@jit(inline=True)
-def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
-    """What the output side has to give for the displacement u, and whether nothing does."""
-    offset = t.number[OFFSET] + s.real[SET]
-    for j in range(len(t.clock)):
-        lead = s.clock[j, LEAD] if s.line.filled[0] else t.plays.limits[ZERO]
-        offset = offset + clock_drift(t.clock, s.clock, j, lead + t.clock[j, ONE] if s.flags[MOVING] else lead)
-    return front_inverse(t.behind, u - offset, 1)
+    finite: Callable[..., Any]
+    entered_drive: Callable[..., Any]
+    arriving: Callable[..., Any]  # a signal as an input of the plays
+    entered_level: Callable[..., Any]
+    drive_code: Callable[..., Any]
+    output_code: Callable[..., Any]  # with status bits
+    entered_travel: Callable[..., Any]  # as verification sets it
+    shared: Callable[..., Any]  # a share of a signal
 
 
-@jit
-def led(t: ChainTables, s: ChainState) -> None:
-    """A reference has come: the next one is a sample more ahead, up to the preview."""
-    for j in range(len(t.clock)):
-        lead = t.clock[j, ONE]
-        if s.line.filled[0]:
-            lead = lead + s.clock[j, LEAD]
-        s.clock[j, LEAD] = t.clock[j, MOST_AHEAD] if lead > t.clock[j, MOST_AHEAD] else lead
+def made_of(
+    blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
+) -> Operations:
+    """The operations of models with effects in one arithmetic, with blocks of the user's own in front of the plays and
+    behind them."""
+    ageing_move, ageing_set, ageing_set_travel = blocks.ageing_settings
+    gain_reset, gain_heat = blocks.gain_settings
+    saturated, unsaturated = blocks.saturation
+    preview_target = blocks.target
+    front_forward, front_inverse = blocks.front
+    follow, started, inverse_input = blocks.plays
+    finer = blocks.finer
+    finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
+    plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
-
-@jit
-def settings_reset(t: ChainTables, s: ChainState) -> None:
-    """Offset and gains as in the parameter file."""
-    s.real[SET] = t.plays.limits[ZERO]
-    for j in range(len(t.clock)):
-        clock_start(s.clock, j)
-    for j in range(len(t.heat.turns)):
-        heat_reset(t.heat, s.heat, j)
-    for j in range(len(t.gain)):
-        gain_reset(t.gain, s.gain, j)
-    for j in range(len(t.ageing.turns)):
-        ageing_set_travel(t.ageing, s.ageing, j, t.plays.limits[ZERO])
-
-
-@jit
-def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
-    """The drive moves to v from where it was, in one sample."""
-    for j in range(len(t.clock)):
-        clock_tick(t.clock, s.clock, j)
-    for j in range(len(t.heat.turns)):
-        heat_move(t.heat, s.heat, j, s.real[APPLIED], v)
-    for j in range(len(t.ageing.turns)):
-        ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
-
-
-# ---------------------------------------------------------------- chain_plays.c, or chain_moving.c
-
-
-@jit
-def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-    """The plays follow their input w; their sum."""
-    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
-        loop_absorb(t.plays, s.plays, w)
-        return loop_output(t.plays, s.plays)
-    r, p = t.plays.threshold, t.plays.weight
-    if t.moving.scanned:
-        if s.flags[MOVING]:
-            return relaxing_follow(t.moving, r, p, s.plays, w)
-        loop_absorb(t.plays, s.plays, w)
-        return loop_output(t.plays, s.plays)
-    if s.flags[MOVING]:
-        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, w)
-
-
-@jit
-def started(t: ChainTables, s: ChainState) -> Any:
-    """The sum of the plays as they are set."""
-    if t.moving.scanned or (t.moving.moves == PLAIN and t.moving.bends == STRAIGHT):
-        return loop_output(t.plays, s.plays)
-    r, p = t.plays.threshold, t.plays.weight
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.plays.play[0])
-
-
-@jit
-def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
-    """Input of the plays at which their sum is h."""
-    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
-        return loop_solve(t.plays, s.plays, h)
-    r, p = t.plays.threshold, t.plays.weight
-    if t.moving.scanned:
-        if s.flags[MOVING]:
-            return relaxing_input(t.moving, r, p, s.plays, h)
-        return loop_solve(t.plays, s.plays, h)
-    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.bent, s.flags[MOVING] != 0, h)
-
-
-# ---------------------------------------------------------------- chain.c
-
-
-@jit
-def slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
-    """The drive nearest to v that can be reached in one step."""
-    if not t.slew or not s.flags[MOVING]:
-        return v
-    if v > s.real[APPLIED] + t.number[RISING]:
-        return s.real[APPLIED] + t.number[RISING]
-    if v < s.real[APPLIED] - t.number[FALLING]:
-        return s.real[APPLIED] - t.number[FALLING]
-    return v
-
-
-@jit
-def inverse_put(t: ChainTables, s: ChainState, u: Any) -> Any:
-    """The next reference, in the line of the preview where there is one; what the output side has to give now."""
-    level = inverse_clamp(t.plays, u)
-    if level != u:
-        s.plays.counts[STATUS] |= INPUT_CLAMPED
-    wanted, limited = undisplaced(t, s, level)
-    if limited:
-        s.plays.counts[STATUS] |= DOMAIN
-    if len(t.tap) == 0:
-        return wanted
-    led(t, s)
-    preview_put(s.line, wanted)
-    return preview_target(t.tap, s.line)
-
-
-@jit
-def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
-    """The next reference of the preview, no drive."""
-    if finite(t.plays, u):
-        inverse_put(t, s, u)
-    else:
-        s.plays.counts[STATUS] |= HELD
-        preview_repeat(s.line)
-
-
-@jit
-def inverse_commit(t: ChainTables, s: ChainState, applied: Any) -> None:
-    """What the drive really applied in place of the last answer."""
-    if not finite(t.plays, applied):
-        s.plays.counts[STATUS] |= HELD
-        return
-    inverse_replace(s.plays, applied, clamp_drive(t.plays, applied) + t.plays.limits[ZERO])  # no drive is -0
-
-
-@jit
-def expected(t: ChainTables, s: ChainState) -> Any:
-    """Displacement that the model expects of the drive absorbed last."""
-    return displacement(t, s, s.real[OUTPUT])
-
-
-@jit
-def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
-    """An offset of the displacement, from the next step on, within its limits."""
-    if not finite(t.plays, d):
-        s.plays.counts[STATUS] |= HELD
-        return
-    inside = d
-    if inside > t.number[FARTHEST]:
-        inside = t.number[FARTHEST]
-    elif inside < -t.number[FARTHEST]:
-        inside = -t.number[FARTHEST]
-    if inside != d:
-        s.plays.counts[STATUS] |= LIMITED_SETTING
-    s.real[SET] = inside
-
-
-@jit
-def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
-    """An offset of the displacement, from the next step on; drift begins anew."""
-    put_offset(t, s, d)
-    if finite(t.plays, d):
-        for j in range(len(t.clock)):
-            clock_start(s.clock, j)
-
-
-@jit
-def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
-    """Trim the offset by a share of what a sensor sees beyond the expected displacement."""
-    put_offset(t, s, s.real[SET] + share * (measured - expected(t, s)))
-
-
-@jit
-def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
-    """The temperature, from the next step on."""
-    if not finite(t.plays, degrees):
-        s.plays.counts[STATUS] |= HELD
-        return
-    for j in range(len(t.gain)):
-        if gain_heat(t.gain, s.gain, j, degrees):
-            s.plays.counts[STATUS] |= LIMITED_SETTING
-
-
-@jit
-def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
-    """A gain in place of that of the travel, from the next step on."""
-    if not finite(t.plays, gain):
-        s.plays.counts[STATUS] |= HELD
-    elif ageing_set(t.ageing, s.ageing, 0, gain):
-        s.plays.counts[STATUS] |= LIMITED_SETTING
-
-
-@jit
-def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
-    """The distance travelled, from the next step on."""
-    if not finite(t.plays, travel):
-        s.plays.counts[STATUS] |= HELD
-    elif ageing_set_travel(t.ageing, s.ageing, 0, travel):
-        s.plays.counts[STATUS] |= LIMITED_SETTING
-
-
-@functools.cache
-def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()) -> Operations:
-    """The operations of models with effects, among them these of the user's own, in front of the plays and behind."""
-    side = sides_of(drives, outputs)
+    side = sides_of(blocks, drives, outputs)
     drive_side_rest, drive_side_absorb, drive_side_solve = side.drive_rest, side.drive_absorb, side.drive_solve
     output_side_rest, output_side_absorb = side.output_rest, side.output_absorb
     output_side_resting, output_side_solve = side.output_resting, side.output_solve
+
+    @jit(inline=True)
+    def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
+        """What leaves the actuator: the output side's answer through what saturates, and its offsets."""
+        offset = t.number[OFFSET] + s.real[SET]
+        for j in range(len(t.clock)):
+            offset = offset + clock_drift(t.clock, s.clock, j, t.limits[ZERO])
+        return saturated(t.behind, y) + offset
+
+    @jit(inline=True)
+    def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
+        """What the output side has to give for the displacement u, and whether nothing does."""
+        offset = t.number[OFFSET] + s.real[SET]
+        for j in range(len(t.clock)):
+            lead = s.clock[j, LEAD] if s.line.filled[0] else t.limits[ZERO]
+            offset = offset + clock_drift(t.clock, s.clock, j, lead + t.clock[j, ONE] if s.flags[MOVING] else lead)
+        y, limited = unsaturated(t.behind, u - offset)
+        return y, limited
+
+    @jit
+    def led(t: ChainTables, s: ChainState) -> None:
+        """A reference has come: the next one is a sample more ahead, up to the preview."""
+        for j in range(len(t.clock)):
+            lead = t.clock[j, ONE]
+            if s.line.filled[0]:
+                lead = lead + s.clock[j, LEAD]
+            s.clock[j, LEAD] = t.clock[j, MOST_AHEAD] if lead > t.clock[j, MOST_AHEAD] else lead
+
+    @jit
+    def settings_reset(t: ChainTables, s: ChainState) -> None:
+        """Offset and gains as in the parameter file."""
+        s.real[SET] = t.limits[ZERO]
+        for j in range(len(t.clock)):
+            clock_start(s.clock, j)
+        for j in range(len(t.heat.turns)):
+            heat_reset(t.heat, s.heat, j)
+        for j in range(len(t.gain)):
+            gain_reset(t.gain, s.gain, j)
+        for j in range(len(t.ageing.turns)):
+            ageing_set_travel(t.ageing, s.ageing, j, t.limits[ZERO])
+
+    @jit
+    def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
+        """The drive moves to v from where it was, in one sample."""
+        for j in range(len(t.clock)):
+            clock_tick(t.clock, s.clock, j)
+        for j in range(len(t.heat.turns)):
+            heat_move(t.heat, s.heat, j, s.real[APPLIED], v)
+        for j in range(len(t.ageing.turns)):
+            ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
+
+    # ---------------------------------------------------------------- chain.c
+
+    @jit
+    def expected(t: ChainTables, s: ChainState) -> Any:
+        """Displacement that the model expects of the drive absorbed last."""
+        code, _ = output_code(t, displacement(t, s, s.real[OUTPUT]))
+        return code
 
     @jit
     def begin(t: ChainTables, s: ChainState) -> None:
         """What init and reset have in common once the plays are set: everything rests at the start memory."""
         s.line.filled[0] = 0
         s.flags[MOVING] = 0
-        s.real[APPLIED] = drive_side_rest(t, s, s.plays.real[DRIVE])
-        s.real[OUTPUT] = output_side_rest(t, s, started(t, s))
+        drive = s.plays.real[DRIVE]
+        s.plays.real[DRIVE] = arriving(t, entered_drive(t, drive))
+        s.real[APPLIED] = drive
+        drive_side_rest(t, s, entered_drive(t, drive))
+        s.plays.real[LEVEL] = started(t, s)
+        s.real[OUTPUT] = output_side_rest(t, s, s.plays.real[LEVEL])
 
     @jit
     def init(t: ChainTables, s: ChainState, inverse: int) -> None:
@@ -367,7 +222,7 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
         plays_init(t.plays, s.plays, inverse)
         begin(t, s)
         if not inverse:
-            s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
+            s.plays.real[ANSWER] = expected(t, s)
 
     @jit
     def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
@@ -375,7 +230,7 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
         plays_reset(t.plays, s.plays, inverse)
         begin(t, s)
         if not inverse:
-            s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
+            s.plays.real[ANSWER] = expected(t, s)
 
     @jit
     def absorb(t: ChainTables, s: ChainState, v: Any) -> None:
@@ -383,8 +238,9 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
         moving = s.flags[MOVING] != 0
         if moving:
             travelled(t, s, v)
-        a = drive_side_absorb(t, s, v) if moving else drive_side_rest(t, s, v)
-        h = follow(t, s, arrive(t.plays, s.plays, a))
+        x = entered_drive(t, v)
+        a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
+        h = follow(t, s, arrive(t.plays, s.plays, arriving(t, a)))
         s.plays.real[LEVEL] = h
         s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
         s.real[APPLIED] = v
@@ -393,10 +249,10 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
     @jit
     def settle(t: ChainTables, s: ChainState, v: Any) -> None:
         """Everything is at rest at drive v, where the plays move like with any other."""
-        if not finite(t.plays, v):
+        if not finite(t, v):
             s.plays.counts[STATUS] |= HELD
             return
-        inside = clamp_drive(t.plays, v) + t.plays.limits[ZERO]
+        inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
         if inside != v:
             s.plays.counts[STATUS] |= INPUT_CLAMPED
         if s.flags[MOVING]:
@@ -405,19 +261,31 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
         absorb(t, s, inside)
 
     @jit
+    def slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
+        """The drive nearest to v that can be reached in one step."""
+        if not t.slew or not s.flags[MOVING]:
+            return v
+        if v > s.real[APPLIED] + t.number[RISING]:
+            return s.real[APPLIED] + t.number[RISING]
+        if v < s.real[APPLIED] - t.number[FALLING]:
+            return s.real[APPLIED] - t.number[FALLING]
+        return v
+
+    @jit
     def forward_step(t: ChainTables, s: ChainState, v: Any) -> Any:
         """One sample of the forward operator."""
-        if not finite(t.plays, v):
+        if not finite(t, v):
             s.plays.counts[STATUS] |= HELD
             return s.plays.real[ANSWER]
-        inside = clamp_drive(t.plays, v)
+        inside = clamp_drive(t, v)
         if inside != v:
             s.plays.counts[STATUS] |= INPUT_CLAMPED
         reached = slewed(t, s, inside)
         if reached != inside:
             s.plays.counts[STATUS] |= SLEW_LIMITED
         absorb(t, s, reached)
-        s.plays.real[ANSWER] = displacement(t, s, s.real[OUTPUT])
+        s.plays.real[ANSWER], bits = output_code(t, displacement(t, s, s.real[OUTPUT]))
+        s.plays.counts[STATUS] |= bits
         return s.plays.real[ANSWER]
 
     @jit
@@ -428,10 +296,34 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
             s.plays.counts[HAS_PENDING] = 0
 
     @jit
+    def inverse_put(t: ChainTables, s: ChainState, u: Any) -> Any:
+        """The next reference, in the line of the preview where there is one; what the output side has to give now."""
+        level = inverse_clamp(t, u)
+        if level != u:
+            s.plays.counts[STATUS] |= INPUT_CLAMPED
+        wanted, limited = undisplaced(t, s, entered_level(t, level))
+        if limited:
+            s.plays.counts[STATUS] |= DOMAIN
+        if len(t.tap) == 0:
+            return wanted
+        led(t, s)
+        preview_put(s.line, wanted)
+        return preview_target(t.tap, s.line)
+
+    @jit
+    def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
+        """The next reference of the preview, no drive."""
+        if finite(t, u):
+            inverse_put(t, s, u)
+        else:
+            s.plays.counts[STATUS] |= HELD
+            preview_repeat(s.line)
+
+    @jit
     def inverse_step(t: ChainTables, s: ChainState, u: Any) -> Any:
         """One sample of the inverse operator."""
         inverse_take(t, s)
-        if not finite(t.plays, u):
+        if not finite(t, u):
             s.plays.counts[STATUS] |= HELD
             preview_repeat(s.line)
             return inverse_answer(s.plays, s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED])
@@ -439,23 +331,87 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
         moving = s.flags[MOVING] != 0
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
         s.plays.counts[BITS] = 0
-        a = inverse_drive(t.plays, s.plays, h, inverse_input(t, s, h))
-        v = drive_side_solve(t, s, a) if moving else a
+        w = inverse_input(t, s, h)
+        a = finer(t, s, h, w, inverse_drive(t.plays, s.plays, h, w))
+        v = drive_code(t, drive_side_solve(t, s, a) if moving else a)
         reached = slewed(t, s, v)
         if reached != v:
             s.plays.counts[BITS] |= SLEW_LIMITED
-        inside = clamp_drive(t.plays, reached)
+        inside = clamp_drive(t, reached)
         if inside != reached:
             s.plays.counts[BITS] |= OUTPUT_CLAMPED
         s.plays.counts[STATUS] |= s.plays.counts[BITS]
         return inverse_answer(s.plays, inside)
 
     @jit
+    def inverse_commit(t: ChainTables, s: ChainState, applied: Any) -> None:
+        """What the drive really applied in place of the last answer."""
+        if not finite(t, applied):
+            s.plays.counts[STATUS] |= HELD
+            return
+        inverse_replace(s.plays, applied, clamp_drive(t, applied) + t.limits[ZERO])  # no drive is -0
+
+    @jit
+    def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+        """An offset of the displacement, from the next step on, within its limits."""
+        if not finite(t, d):
+            s.plays.counts[STATUS] |= HELD
+            return
+        inside = d
+        if inside > t.number[FARTHEST]:
+            inside = t.number[FARTHEST]
+        elif inside < -t.number[FARTHEST]:
+            inside = -t.number[FARTHEST]
+        if inside != d:
+            s.plays.counts[STATUS] |= LIMITED_SETTING
+        s.real[SET] = inside
+
+    @jit
+    def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
+        """An offset of the displacement, from the next step on; drift begins anew."""
+        put_offset(t, s, d)
+        if finite(t, d):
+            for j in range(len(t.clock)):
+                clock_start(s.clock, j)
+
+    @jit
+    def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
+        """Trim the offset by a share of what a sensor sees beyond the expected displacement."""
+        more = shared(t, share, entered_level(t, measured) - displacement(t, s, s.real[OUTPUT]))
+        put_offset(t, s, s.real[SET] + more)
+
+    @jit
+    def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
+        """The temperature, from the next step on."""
+        if not finite(t, degrees):
+            s.plays.counts[STATUS] |= HELD
+            return
+        for j in range(len(t.gain)):
+            if gain_heat(t.gain, s.gain, j, degrees):
+                s.plays.counts[STATUS] |= LIMITED_SETTING
+
+    @jit
+    def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
+        """A gain in place of that of the travel, from the next step on."""
+        if not finite(t, gain):
+            s.plays.counts[STATUS] |= HELD
+        elif ageing_set(t.ageing, s.ageing, 0, gain):
+            s.plays.counts[STATUS] |= LIMITED_SETTING
+
+    @jit
+    def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
+        """The distance travelled, from the next step on."""
+        if not finite(t, travel):
+            s.plays.counts[STATUS] |= HELD
+        elif ageing_set_travel(t.ageing, s.ageing, 0, travel):
+            s.plays.counts[STATUS] |= LIMITED_SETTING
+
+    @jit
     def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
         """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read
         and cleared."""
         for i in range(len(op)):
-            answers[i] = t.plays.limits[ZERO]
+            answers[i] = t.limits[ZERO]
             if op[i] == OP_INIT:
                 init(t, s, inverse)
             elif op[i] == OP_COMMIT:
@@ -466,13 +422,13 @@ def operations(drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] 
                 inverse_take(t, s)
                 settle(t, s, x[i])
             elif op[i] == OP_OFFSET:
-                set_offset(t, s, x[i])
+                set_offset(t, s, entered_level(t, x[i]))
             elif op[i] == OP_TEMPERATURE:
                 set_temperature(t, s, x[i])
             elif op[i] == OP_GAIN:
                 set_gain(t, s, x[i])
             elif op[i] == OP_TRAVEL:
-                set_travel(t, s, x[i])
+                set_travel(t, s, entered_travel(t, x[i]))
             elif op[i] == OP_TRAVELLED:
                 answers[i] = s.ageing.block[0, AGEING_HIGH]
             elif op[i] == OP_CORRECT:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+from typing import TypeGuard
+
 import numpy as np
 
-from hystgen.effects.base import Array
+from hystgen.effects.base import Array, Effect
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, relaxed
 
 
@@ -49,3 +52,99 @@ class Movement:
             else:
                 out[i] = min(max(plays[i], w - self.r[i]), w + self.r[i])
         return out
+
+
+# ---------------------------------------------------------------- a nonlinear dashpot, by a table
+
+BEGIN, C0, C1, C2, C3 = range(5)
+"""Columns of a piece: where it begins, and the coefficients of a cubic in what lies beyond."""
+
+LEAST_STRETCH = 1e-6
+"""[largest thresholds] Stretches below count as proportional to what they yield; a range has some 1e5 of them."""
+
+LEAST_YIELD = 2.0**-40
+"""Share of a stretch that it yields in a step, below which it counts as proportional: as good as none in 2^28 steps."""
+
+LONGEST = 4.0
+"""Most times that a piece ends at where it begins: steeper laws than a dashpot's are cubic over two octaves."""
+
+YIELD_ERROR = 1e-3
+"""Largest relative error of what a stretch yields: of the lag of plays behind their input it is a share of
+`YIELD_ERROR/exponent`, where records tell time constants to a per cent at best."""
+
+
+def nonlinear(effect: Effect) -> TypeGuard[RelaxingPlays]:
+    """Whether plays have a dashpot that takes its table."""
+    return isinstance(effect, RelaxingPlays) and effect.exponent != 1.0 and effect.time_constant > 0.0
+
+
+def yielded(effect: RelaxingPlays, scale: float, seconds: float, x: float) -> tuple[float, float]:
+    """What a stretch x > 0 loses while nothing moves but the play, and its slope.
+
+    `e' = -(scale/tau) (e/scale)^m` has the solution `e^(1-m) = x^(1-m) + (m - 1) T scale^(1-m)/tau`.
+    """
+    more = effect.exponent - 1.0
+    size = math.log(seconds / effect.time_constant) + more * math.log(x / scale)
+    part = more * math.exp(min(size, 700.0))
+    if part <= -1.0:
+        return x, 1.0  # it comes to an end within the step
+    spent = (math.log1p(part) if size < 700.0 else math.log(more) + size) / more
+    return -x * math.expm1(-spent), -math.expm1(-effect.exponent * spent)
+
+
+def seen(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> float:
+    """Share of a step's way, of the input, at which it counts as standing still: exact for a linear dashpot as stiff as
+    this one is where plays lag steadily behind an input that moves by `way` a step.
+
+    With `s = T f'(e)`, `E = exp(-s)` and `M = (1 - E)/s`: `(1 - M)/(1 - E)`, 1/2 for s = 0.
+    """
+    size = math.log(way * effect.time_constant / (seconds * scale)) / effect.exponent
+    stiff = min(effect.exponent * way / (scale * math.exp(min(size, 50.0))), 1e3)
+    return (1.0 + math.expm1(-stiff) / stiff) / -math.expm1(-stiff) if stiff > 1e-3 else 0.5 + stiff / 12.0
+
+
+def pieces(effect: RelaxingPlays, scale: float, seconds: float, top: float) -> Array:
+    """What stretches up to `top` yield in a step, in rows (K, 5)."""
+    more = effect.exponent - 1.0
+    share = 1.0 / -more if more < 0.0 else LEAST_YIELD  # of what yields all within the step, or hardly anything
+    begins = scale * math.exp(min(math.log(share * effect.time_constant / seconds) / more, 700.0))
+    at = min(max(LEAST_STRETCH * scale, begins), top)
+    rows: list[tuple[float, ...]] = [(0.0, 0.0, yielded(effect, scale, seconds, at)[0] / at, 0.0, 0.0)]
+    while at < top:
+        ratio = LONGEST
+        while not _fits(effect, scale, seconds, row := _piece(effect, scale, seconds, at, ratio), at * ratio):
+            ratio = math.sqrt(ratio)
+        rows.append(row)
+        at *= ratio
+    return np.array(rows)
+
+
+def _piece(effect: RelaxingPlays, scale: float, seconds: float, at: float, ratio: float) -> tuple[float, ...]:
+    (a, da), (b, db) = (yielded(effect, scale, seconds, x) for x in (at, at * ratio))
+    length = at * (ratio - 1.0)
+    mean = (b - a) / length
+    return at, a, da, (3.0 * mean - 2.0 * da - db) / length, (da + db - 2.0 * mean) / (length * length)
+
+
+def _fits(effect: RelaxingPlays, scale: float, seconds: float, row: tuple[float, ...], end: float) -> bool:
+    """Whether a piece rises, and is near enough to the law at places inside."""
+    at, *c = row
+    inside = np.linspace(at, end, 17)
+    on = inside - at
+    curve = ((c[3] * on + c[2]) * on + c[1]) * on + c[0]
+    law = np.array([yielded(effect, scale, seconds, x)[0] for x in inside.tolist()])
+    return bool(np.all(np.diff(curve) >= 0.0) and np.all(np.abs(curve - law) <= YIELD_ERROR * law))
+
+
+def stretch_error(effect: RelaxingPlays, scale: float, seconds: float, rows: Array, way: float) -> float:
+    """How much farther plays may be stretched by the table than by the law, with an input that moves by at most `way`
+    a step."""
+    if len(rows) == 1:
+        return LEAST_STRETCH * scale
+    x = np.geomspace(rows[1, BEGIN], LONGEST * rows[-1, BEGIN], 4000)
+    law, slope = np.array([yielded(effect, scale, seconds, each) for each in x.tolist()]).T
+    k = np.searchsorted(rows[:, BEGIN], x, side="right") - 1
+    on = x - rows[k, BEGIN]
+    curve = ((rows[k, C3] * on + rows[k, C2]) * on + rows[k, C1]) * on + rows[k, C0]
+    reached = law <= way
+    return float(np.max(np.abs(curve - law)[reached] / slope[reached], initial=LEAST_STRETCH * scale))

@@ -53,12 +53,6 @@ def turn_back(m: FixedMemory) -> None:
 
 
 @jit
-def count_from(t: FixedPlayTables, m: FixedMemory, c: int, k: int, left: int) -> Kink:
-    """The kink where play k began to follow that corner c held; `left` corners hold others."""
-    return begins(t, m, c, k, True), begins(t, m, c, k, False), k, left
-
-
-@jit
 def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
     """The last place where another play begins to follow before the output, or the input, `to`, as the present move
     sees it; or the present place."""
@@ -89,7 +83,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
         c = top if k > before else c
     if c < 0:
         return along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), k, left
-    return count_from(t, m, c, k, left)
+    return begins(t, m, c, k, True), begins(t, m, c, k, False), k, left
 
 
 @jit

@@ -158,7 +158,6 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
         begin = t.way[k] - origin
         y = y + t.reach[k]
         after = t.way[k + 1] - origin
-        cap = t.way[top] - origin
         if t.reach[top] > room:
             cap = begin + (room - t.reach[k]) * t.slope[k]
         m.real[FROM] = -along(m, origin)

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 363760282401c0623a18df9e9250716c784aed8ee52a2f5d2158cd738b6a840f, without this line
+ * Text: sha256 1727e23738cb68d534a605e5bff84cb1f97c616dfde1cb169ffb26953653841f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -205,14 +205,14 @@ static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limit
 
 static bent_real_t bent_clamp_drive(bent_real_t v)
 {
-    return (bent_real_t)(v < BENT_DRIVE_MIN ? BENT_DRIVE_MIN : v > BENT_DRIVE_MAX ? BENT_DRIVE_MAX
-                         : v);
+    const bent_real_t least = v < BENT_DRIVE_MIN ? BENT_DRIVE_MIN : v;
+    return (bent_real_t)(least > BENT_DRIVE_MAX ? BENT_DRIVE_MAX : least);
 }
 
 static bent_real_t bent_inverse_clamp(bent_real_t u)
 {
-    return (bent_real_t)(u < BENT_OUTPUT_MIN ? BENT_OUTPUT_MIN : u > BENT_OUTPUT_MAX
-                         ? BENT_OUTPUT_MAX : u);
+    const bent_real_t least = u < BENT_OUTPUT_MIN ? BENT_OUTPUT_MIN : u;
+    return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
 /* The drive that gives w; `limited` tells whether no drive at all does. */

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 90cc6666ce6b202e323d0430a659b6e60bddad6e28bbbd71c076b3837644e693, without this line
+ * Text: sha256 0de57e8787eaced285a171eb165f76ea0a811c08f426a43cbd5ca783e96fc8a5, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -90,16 +90,6 @@ static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int sh
 
 #define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's output, in sums */
 
-/* Field by field: for a whole structure a compiler may call memcpy. */
-static void curved_copy_place(curved_place_t *to, const curved_place_t *from)
-{
-    to->output = from->output;
-    to->input = from->input;
-    to->k = from->k;
-    to->depth = from->depth;
-    to->rising = from->rising;
-}
-
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline int64_t curved_along(const curved_place_t *here, int64_t x)
 {
@@ -117,8 +107,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where the play of a segment, of a corner's block, begins to follow, as the present move sees it.
- */
+/* Where the play of a segment of a corner's block begins to follow, as the move sees it. */
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
                                     const curved_segment_t *s, bool by_output)
 {
@@ -136,14 +125,6 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
         here->k = 0;
     }
     here->rising = !here->rising;
-}
-
-/* Puts a kink where the play of a segment began to follow that corner c held. */
-CURVED_APART void curved_count_from(const curved_place_t *here, const curved_corner_t *c,
-                                    const curved_segment_t *s, curved_kink_t *kink)
-{
-    kink->input = curved_begins(here, c, s, false);
-    kink->output = curved_begins(here, c, s, true);
 }
 
 /* The last place where another play begins to follow before the output, or input, `to`; or here. */
@@ -185,7 +166,8 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
     if (c != NULL) {
-        curved_count_from(here, c, &t->segment[k], kink);
+        kink->input = curved_begins(here, c, &t->segment[k], false);
+        kink->output = curved_begins(here, c, &t->segment[k], true);
     }
 }
 
@@ -224,8 +206,7 @@ CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
 
-/* The input, near the range, that gives an output behind a kink, `to` as the present move sees it.
- */
+/* The input, near the range, that gives an output behind a kink, `to` as the move sees it. */
 CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
                                    const curved_kink_t *kink, int64_t to)
 {
@@ -445,14 +426,14 @@ static const curved_ends_t curved_back_ends = {
 
 static curved_real_t curved_clamp_drive(curved_reach_t v)
 {
-    return (curved_real_t)(v < CURVED_DRIVE_MIN ? CURVED_DRIVE_MIN : v > CURVED_DRIVE_MAX
-                           ? CURVED_DRIVE_MAX : v);
+    const curved_reach_t least = v < CURVED_DRIVE_MIN ? CURVED_DRIVE_MIN : v;
+    return (curved_real_t)(least > CURVED_DRIVE_MAX ? CURVED_DRIVE_MAX : least);
 }
 
 static curved_real_t curved_inverse_clamp(curved_reach_t u)
 {
-    return (curved_real_t)(u < CURVED_OUTPUT_MIN ? CURVED_OUTPUT_MIN : u > CURVED_OUTPUT_MAX
-                           ? CURVED_OUTPUT_MAX : u);
+    const curved_reach_t least = u < CURVED_OUTPUT_MIN ? CURVED_OUTPUT_MIN : u;
+    return (curved_real_t)(least > CURVED_OUTPUT_MAX ? CURVED_OUTPUT_MAX : least);
 }
 
 /* Output code of a sum. */
@@ -500,7 +481,7 @@ static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved
 /* The next step begins here. */
 static void curved_inverse_keep(curved_inverse_t *self)
 {
-    curved_copy_place(&self->undo, &self->here);
+    self->undo = self->here;
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -555,7 +536,7 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied)
     if (v != applied) {
         self->status |= CURVED_STATUS_INPUT_CLAMPED;
     }
-    curved_copy_place(&self->here, &self->undo);
+    self->here = self->undo;
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     self->repeat = false;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 282440faa558565c0af140adfa2a1fb45d154593a4bbd182de34a197dceb3bd3, without this line
+ * Text: sha256 98b7d9329b52b6346295e22edcee0056257b23ad1d791baec398e55a32e6133a, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -20,8 +20,7 @@
 #define PLAIN_HALF 0.5f
 
 /* Whether each operation of a number is a call of a library. */
-#if (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) ||    \
-    defined(__AVR__)
+#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
 #define PLAIN_SOFT_FLOAT
 #endif
 
@@ -65,16 +64,6 @@ static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x)
 #endif
 }
 
-/* Field by field: for a whole structure a compiler may call memcpy. */
-static void plain_copy_place(plain_place_t *to, const plain_place_t *from)
-{
-    to->input = from->input;
-    to->output = from->output;
-    to->k = from->k;
-    to->depth = from->depth;
-    to->rising = from->rising;
-}
-
 /* There is no line to go on along: the next sample searches. */
 static void plain_forget_line(plain_plays_t *m)
 {
@@ -116,8 +105,7 @@ static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
+        const bool before = x > step[4u * middle];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -203,7 +191,6 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        cap = t->segment[c->top].way - from;
         if (t->segment[c->top].reach > room) {
             /* gains fall from segment to segment: the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
@@ -264,20 +251,15 @@ PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
                              plain_corner_t *corner, const plain_start_t *start)
 {
     unsigned int k;
-    corner[0].output = start->bottom.output;
-    corner[0].pass[0] = start->bottom.pass[0];
-    corner[0].pass[1] = start->bottom.pass[1];
-    corner[0].top = start->bottom.top;
-    corner[0].rose = start->bottom.rose;
+    corner[0] = start->bottom;
     m->here.depth = 1;
     for (k = start->bottom.top - 1u; k > 0; --k) {
+        const plain_real_t *center = start->center[start->step > 0 ? k : 0u];
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = start->center[start->step > 0 ? k : 0u][0] +
-                        plain_along(m, t->segment[k].way * PLAIN_HALF);
-        m->here.output = start->center[start->step > 0 ? k : 0u][1] +
-                         plain_along(m, t->segment[k].reach * PLAIN_HALF);
+        m->here.input = center[0] + plain_along(m, t->segment[k].way * PLAIN_HALF);
+        m->here.output = center[1] + plain_along(m, t->segment[k].reach * PLAIN_HALF);
         plain_leave_corner(t, m, corner);
     }
     m->here.k = 0;
@@ -306,8 +288,8 @@ static const plain_start_t plain_inverse_start[2] = {
 
 static plain_real_t plain_clamp_drive(plain_real_t v)
 {
-    return (plain_real_t)(v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v > PLAIN_DRIVE_MAX
-                          ? PLAIN_DRIVE_MAX : v);
+    const plain_real_t least = v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v;
+    return (plain_real_t)(least > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX : least);
 }
 
 /* Any other sample than a usual one. */
@@ -317,7 +299,7 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
     plain_plays_t *m = &self->plays;
     plain_real_t x = u - PLAIN_OFFSET;
     unsigned int bits = 0;
-    plain_copy_place(&self->undo, &m->here);
+    self->undo = m->here;
     if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
         bits = u >= -FLT_MAX && u <= FLT_MAX ? PLAIN_STATUS_INPUT_CLAMPED : PLAIN_STATUS_HELD;
         x = (u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX) - PLAIN_OFFSET;
@@ -366,7 +348,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u)
         return m->here.output;
     }
     if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
-        plain_copy_place(&self->undo, &m->here);
+        self->undo = m->here;
         self->before = x;
         if (plain_move_in_block(&plain_inverse_curve, m, x)) {
             return m->here.output;
@@ -390,11 +372,11 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied)
     self->committed = true;
     if (self->before < m->here.input || self->before > m->here.input) {
         /* the last step went on along its line */
-        plain_copy_place(&self->undo, &m->here);
+        self->undo = m->here;
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
-    plain_copy_place(&m->here, &self->undo);
+    m->here = self->undo;
     plain_forget_line(m);
     plain_move_to_output(&plain_inverse_curve, m, self->corner, v);
     self->before = m->here.input;
@@ -405,7 +387,7 @@ PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, const plain_start_t 
     plain_start(&plain_inverse_curve, &self->plays, self->corner, start);
     plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
                          plain_clamp_drive(self->plays.here.output));
-    plain_copy_place(&self->undo, &self->plays.here);
+    self->undo = self->plays.here;
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 927c874cf1cb7beaf202a851ae5e0db541889febe71a628c306e1db2b360d75b, without this line
+ * Text: sha256 19e6b3f3e0ebb3cee360a274f023d5f2c2e8724e34293e43de133ef0cda0f38d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -175,8 +175,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_HALF 0.5f
 
 /* Whether each operation of a number is a call of a library. */
-#if (defined(__arm__) && !defined(__ARM_FP)) || (defined(__riscv) && !defined(__riscv_flen)) ||    \
-    defined(__AVR__)
+#if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
 #define TWO_BRANCHES_SOFT_FLOAT
 #endif
 
@@ -401,16 +400,6 @@ static inline two_branches_real_t two_branches_along(const two_branches_plays_t 
 #endif
 }
 
-/* Field by field: for a whole structure a compiler may call memcpy. */
-static void two_branches_copy_place(two_branches_place_t *to, const two_branches_place_t *from)
-{
-    to->input = from->input;
-    to->output = from->output;
-    to->k = from->k;
-    to->depth = from->depth;
-    to->rising = from->rising;
-}
-
 /* There is no line to go on along: the next sample searches. */
 static void two_branches_forget_line(two_branches_plays_t *m)
 {
@@ -455,8 +444,7 @@ static unsigned int two_branches_find_segment(const two_branches_real_t *step, u
 {
     while (k < last) {
         const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
+        const bool before = x > step[4u * middle];
         k = before ? middle + 1u : k;
         last = before ? last : middle;
     }
@@ -548,7 +536,6 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        cap = t->segment[c->top].way - from;
         if (t->segment[c->top].reach > room) {
             /* gains fall from segment to segment: the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
@@ -635,20 +622,15 @@ TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_br
                                            const two_branches_start_t *start)
 {
     unsigned int k;
-    corner[0].output = start->bottom.output;
-    corner[0].pass[0] = start->bottom.pass[0];
-    corner[0].pass[1] = start->bottom.pass[1];
-    corner[0].top = start->bottom.top;
-    corner[0].rose = start->bottom.rose;
+    corner[0] = start->bottom;
     m->here.depth = 1;
     for (k = start->bottom.top - 1u; k > 0; --k) {
+        const two_branches_real_t *center = start->center[start->step > 0 ? k : 0u];
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = start->center[start->step > 0 ? k : 0u][0] +
-                        two_branches_along(m, t->segment[k].way * TWO_BRANCHES_HALF);
-        m->here.output = start->center[start->step > 0 ? k : 0u][1] +
-                         two_branches_along(m, t->segment[k].reach * TWO_BRANCHES_HALF);
+        m->here.input = center[0] + two_branches_along(m, t->segment[k].way * TWO_BRANCHES_HALF);
+        m->here.output = center[1] + two_branches_along(m, t->segment[k].reach * TWO_BRANCHES_HALF);
         two_branches_leave_corner(t, m, corner);
     }
     m->here.k = 0;
@@ -710,8 +692,8 @@ static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, boo
 
 static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v)
 {
-    return (two_branches_real_t)(v < TWO_BRANCHES_DRIVE_MIN ? TWO_BRANCHES_DRIVE_MIN
-                                 : v > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX : v);
+    const two_branches_real_t least = v < TWO_BRANCHES_DRIVE_MIN ? TWO_BRANCHES_DRIVE_MIN : v;
+    return (two_branches_real_t)(least > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX : least);
 }
 
 /* Whether going to v is a move of the branch that v was computed on. */
@@ -748,7 +730,7 @@ TWO_BRANCHES_APART two_branches_real_t
 /* The next step begins here. */
 static void two_branches_inverse_keep(two_branches_inverse_t *self)
 {
-    two_branches_copy_place(&self->undo, &self->plays.here);
+    self->undo = self->plays.here;
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -764,7 +746,7 @@ static void two_branches_inverse_arrive(two_branches_inverse_t *self, two_branch
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
                                                      two_branches_real_t v)
 {
-    two_branches_copy_place(&self->plays.here, &self->undo);
+    self->plays.here = self->undo;
     two_branches_forget_line(&self->plays);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;

@@ -32,13 +32,21 @@ class Effect:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an effect may look at: fine time and steps [s], drive [input], temperature [degC], the bench."""
+    """What an effect may look at: fine time and steps [s], drive [input], temperature [degC], the bench.
+
+    Strengths of what adds up refer to the end of a session: of `first`, where the plant has been in another one before.
+    """
 
     t: Array
     dt: Array
     drive: Array
     temperature: Array
     bench: Bench
+    first: Surroundings | None = None
+
+    @property
+    def scale(self) -> Surroundings:
+        return self.first or self
 
 
 Draw = Callable[[np.random.Generator, Bench], Effect]

@@ -132,7 +132,7 @@ def draw_drift(rng: np.random.Generator, bench: Bench) -> Effect:
 
 
 def drift(effect: Effect, y: Array, around: Surroundings) -> Array:
-    x = (around.t - around.t[0]) / (around.t[-1] - around.t[0])
+    x = (around.t - around.t[0]) / (around.scale.t[-1] - around.scale.t[0])
     shift = x + effect.values["curved"] * (x * x - x)
     return np.asarray(y + effect.strength * around.bench.span_out * shift)
 

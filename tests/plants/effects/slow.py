@@ -90,15 +90,17 @@ def draw_ageing(rng: np.random.Generator, bench: Bench) -> Effect:
 
 
 def ageing(effect: Effect, h: Array, around: Surroundings) -> Array:
+    return np.asarray(h * (1.0 - effect.strength * _loss(effect, around) / _loss(effect, around.scale)[-1]))
+
+
+def _loss(effect: Effect, around: Surroundings) -> Array:
     travel = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(around.drive)))))
     x = travel / effect.values["scale"]
     if effect.form == "stretched":
-        loss = 1.0 - np.exp(-(x ** effect.values["exponent"]))
-    elif effect.form == "logarithmic":
-        loss = np.log1p(x)
-    else:
-        loss = x ** (0.6 * effect.values["exponent"])
-    return np.asarray(h * (1.0 - effect.strength * loss / loss[-1]))
+        return np.asarray(1.0 - np.exp(-(x ** effect.values["exponent"])))
+    if effect.form == "logarithmic":
+        return np.log1p(x)
+    return np.asarray(x ** (0.6 * effect.values["exponent"]))
 
 
 # -- thermal: a room whose temperature is logged, or the stack's own loss ----------------------------------------------
@@ -117,17 +119,20 @@ def draw_thermal(rng: np.random.Generator, bench: Bench) -> Effect:
 
 def thermal(effect: Effect, h: Array, around: Surroundings) -> Array:
     """Gain and offset with the excess temperature, scaled so that the gain changes by `strength` at its largest."""
-    if effect.form == "room":
-        excess = around.temperature - around.temperature[0]
-    else:
-        excess = _heat(around.drive, around.dt, effect.values["time"], around.bench.span)
-    peak = float(np.abs(excess).max())
+    peak = float(np.abs(_excess(effect, around.scale)).max())
     if peak == 0.0:
         return h
-    x = excess / peak
+    x = _excess(effect, around) / peak
     gain = effect.strength * (x + effect.values["curved"] * x * x)
     offset = 0.3 * effect.strength * effect.values["offset_share"] * around.bench.span_out * x
     return np.asarray(h * (1.0 + gain) + offset)
+
+
+def _excess(effect: Effect, around: Surroundings) -> Array:
+    """Temperature above that of the first session's start."""
+    if effect.form == "room":
+        return around.temperature - around.scale.temperature[0]
+    return np.asarray(_heat(around.drive, around.dt, effect.values["time"], around.bench.span))
 
 
 @njit(cache=True)

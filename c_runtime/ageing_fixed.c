@@ -1,0 +1,88 @@
+#include "hystgen_runtime.h"
+
+/* Gain that follows the distance travelled in drive codes, as cubic pieces over it. */
+
+/* Fraction bits of the share of a piece, and half of one. */
+#define HYSTGEN_PART_BITS 20u
+#define HYSTGEN_PART_HALF ((int64_t)1 << (HYSTGEN_PART_BITS - 1u))
+
+/* The gain after a travel, from the piece that it lies in; behind the last one it stays. */
+static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t travel)
+{
+    unsigned int low = 0;
+    unsigned int high = t->n;
+    while (high - low > 1u) {
+        const unsigned int middle = (low + high) / 2u;
+        if (travel >= t->piece[middle].begin) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const hystgen_ageing_piece_t *piece = &t->piece[low];
+    const int64_t along = hystgen_times((travel - piece->begin) >> piece->drop, &piece->share);
+    const int64_t whole = (int64_t)1 << HYSTGEN_PART_BITS;
+    const int64_t share = along > whole ? whole : along;
+    int64_t gain = 0;
+    unsigned int i;
+    for (i = 4; i > 0; --i) {
+        gain = piece->c[i - 1u] + ((gain * share + HYSTGEN_PART_HALF) >> HYSTGEN_PART_BITS);
+    }
+    return (int32_t)gain;
+}
+
+/* The travel from the next step on. Returns whether it had to be limited. */
+static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
+                                      int64_t travel)
+{
+    const int64_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
+    self->high = inside;
+    self->own = true;
+    self->gain = hystgen_ageing_gain(t, inside);
+    self->inverse = hystgen_gain_reciprocal(self->gain);
+    return inside != travel;
+}
+
+/* A gain in place of that of the travel, from the next step on. Returns whether it had to be
+   limited. */
+static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
+                               hystgen_real_t gain)
+{
+    const int64_t given = (int64_t)gain * ((int64_t)1 << t->bits);
+    self->own = false;
+    self->gain = hystgen_gain_inside(given);
+    self->inverse = hystgen_gain_reciprocal(self->gain);
+    return self->gain != given;
+}
+
+/* The drive has moved by `way`. The reciprocal of the gain follows by Newton's steps. */
+static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
+                                int64_t way)
+{
+    const int64_t next = self->high + (way >= 0 ? way : -way);
+    self->high = next > t->last ? t->last : next;
+    if (self->own) {
+        const int64_t half = (int64_t)1 << (HYSTGEN_GAIN_BITS - 1u);
+        int64_t inverse = self->inverse;
+        unsigned int i;
+        self->gain = hystgen_ageing_gain(t, self->high);
+        for (i = 0; i < t->turns; ++i) {
+            const int64_t product = (self->gain * inverse + half) >> HYSTGEN_GAIN_BITS;
+            const int64_t more = 2 * HYSTGEN_GAIN_ONE - product;
+            inverse = (inverse * more + half) >> HYSTGEN_GAIN_BITS;
+        }
+        self->inverse = (int32_t)inverse;
+    }
+}
+
+/* The input that gives the output y. */
+static int64_t hystgen_ageing_solve(const hystgen_ageing_t *self, int64_t y)
+{
+    return hystgen_gain_times(y, self->inverse);
+}
+
+/* The output for the input x. */
+static int64_t hystgen_ageing_absorb(const hystgen_ageing_t *self, int64_t x)
+{
+    return hystgen_gain_times(x, self->gain);
+}

@@ -1,0 +1,26 @@
+#include "hystgen_runtime.h"
+
+/* A smooth limit behind the plays, in fixed point: curves of polynomials there and back. */
+
+/* The value of a curve at x; `limited` is set where x lies beyond its ends. */
+static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limited)
+{
+    const int64_t argument = hystgen_nearest(x, c->drop);
+    const int64_t inside = argument < -c->end ? -c->end : argument > c->end ? c->end : argument;
+    if (inside != argument) {
+        *limited = true;
+    }
+    return hystgen_curve(c->knot, c->scale, c->coefficient, c->pieces, c->degree, (int32_t)inside) *
+           ((int64_t)1 << c->lift);
+}
+
+static int64_t hystgen_bend_forward(const hystgen_bend_t *t, int64_t x)
+{
+    bool limited = false; /* at the ends of what there is */
+    return hystgen_bend(&t->forward, x, &limited);
+}
+
+static int64_t hystgen_bend_inverse(const hystgen_bend_t *t, int64_t y, bool *limited)
+{
+    return hystgen_bend(&t->inverse, y, limited);
+}

@@ -1,0 +1,61 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: signals in fixed point, which have bits below those of codes.
+ */
+
+/* Every code is a number. */
+static inline bool hystgen_finite(hystgen_signal_t x)
+{
+    (void)x;
+    return true;
+}
+
+static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v)
+{
+    return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_DRIVE_BITS);
+}
+
+/* What arrives in front of the plays, in units of their input. */
+static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a)
+{
+    return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
+}
+
+static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u)
+{
+    return (hystgen_signal_t)u * ((hystgen_signal_t)1 << HYSTGEN_LEVEL_BITS);
+}
+
+/* Drive code of a signal, kept near the range. */
+static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v)
+{
+    const hystgen_signal_t code = hystgen_nearest(v, HYSTGEN_DRIVE_BITS);
+    return (hystgen_reach_t)(code > HYSTGEN_MOST_CODE    ? HYSTGEN_MOST_CODE
+                             : code < HYSTGEN_LEAST_CODE ? HYSTGEN_LEAST_CODE
+                                                         : code);
+}
+
+/* A drive that was applied, within its range. */
+static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v)
+{
+    return hystgen_clamp_drive(v);
+}
+
+/* Output code of a signal, limited to the type. */
+static hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *status)
+{
+    const hystgen_signal_t code = hystgen_nearest(y, HYSTGEN_LEVEL_BITS);
+    if (code > HYSTGEN_CODE_MAX || code < -HYSTGEN_CODE_MAX) {
+        *status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    }
+    return (hystgen_real_t)(code > HYSTGEN_CODE_MAX    ? HYSTGEN_CODE_MAX
+                            : code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX
+                                                       : code);
+}
+
+/* A share of x; 1 would be one more than the largest code. */
+static hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x)
+{
+    const hystgen_factor_t f = {(int32_t)share * ((int32_t)1 << HYSTGEN_SHARE_BITS), 31u};
+    return hystgen_times(x, &f);
+}

@@ -1,0 +1,47 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: signals in floating point, which are numbers of the same type.
+ */
+
+static bool hystgen_finite(hystgen_signal_t x)
+{
+    return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
+}
+
+static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v)
+{
+    return v;
+}
+
+static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a)
+{
+    return a;
+}
+
+static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u)
+{
+    return u;
+}
+
+static inline hystgen_reach_t hystgen_drive_code(hystgen_signal_t v)
+{
+    return v;
+}
+
+/* A drive that was applied, within its range; none is -0. */
+static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v)
+{
+    return hystgen_clamp_drive(v) + 0;
+}
+
+static inline hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *status)
+{
+    (void)status;
+    return y;
+}
+
+/* A share of x. */
+static inline hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x)
+{
+    return share * x;
+}

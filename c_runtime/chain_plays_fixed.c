@@ -1,0 +1,42 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: plays that move as in any other model, in fixed point, where
+   their sum has bits below those of a signal. */
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self)
+{
+    return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
+                           HYSTGEN_LEVEL_DROP);
+}
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self)
+{
+    return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
+                           HYSTGEN_LEVEL_DROP);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w)
+{
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_forward_started(self);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w)
+{
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_inverse_started(self);
+}
+
+/* Input of the plays at which their sum is h. */
+static hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_signal_t h)
+{
+    const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
+                                    : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
+                                                                 : h;
+    return hystgen_loop_solve(&hystgen_model_tables, self->play,
+                              inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP));
+}

@@ -1,0 +1,91 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: viscous plays with one time constant, in fixed point. A play
+   is kept as where it would come to rest (`play`); see chain_relaxing.c. A stretch gains less than
+   half a step of the plays' input where a play is within the time constant's samples of rest: it
+   stays. */
+
+/* A share of the part of x beyond +-r. */
+static int64_t hystgen_stretched(int64_t x, int32_t r, const hystgen_factor_t *share)
+{
+    return hystgen_times(x > r ? x - r : x < -(int64_t)r ? x + r : 0, share);
+}
+
+/* Where play i rests, as near to the one before as their thresholds are: rounding must not pass. */
+static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest)
+{
+    const hystgen_tables_t *t = &hystgen_model_tables;
+    if (i > 1u) {
+        const int64_t room = (int64_t)t->threshold[i] - t->threshold[i - 1u];
+        const int64_t low = play[i - 1u] - room;
+        const int64_t high = play[i - 1u] + room;
+        return (hystgen_play_t)(rest < low ? low : rest > high ? high : rest);
+    }
+    return (hystgen_play_t)rest;
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w)
+{
+    const hystgen_tables_t *t = &hystgen_model_tables;
+    hystgen_sum_t sum = (hystgen_sum_t)t->weight[0] * w;
+    unsigned int i;
+    for (i = 1; i <= t->n; ++i) {
+        const int32_t r = t->threshold[i];
+        const int64_t z =
+            play[i] + hystgen_stretched((int64_t)w - play[i], r, &hystgen_relaxing_late);
+        sum += t->weight[i] * z;
+        play[i] = hystgen_beside(play, i, z + hystgen_stretched(w - z, r, &hystgen_relaxing_kept));
+    }
+    play[0] = w;
+    return hystgen_nearest(sum, HYSTGEN_LEVEL_DROP);
+}
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self)
+{
+    return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
+                           HYSTGEN_LEVEL_DROP);
+}
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self)
+{
+    return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
+                           HYSTGEN_LEVEL_DROP);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w)
+{
+    if (self->moving) {
+        return hystgen_relaxing_follow(self->play, w);
+    }
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_forward_started(self);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w)
+{
+    if (self->moving) {
+        return hystgen_relaxing_follow(self->play, w);
+    }
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_inverse_started(self);
+}
+
+/* Input of the plays at which their sum is h. Of viscous plays none is stretched with their input
+   where play 1 rests; from there on they are solved for like others, with smaller slopes. */
+static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h)
+{
+    const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
+                                    : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
+                                                                 : h;
+    const hystgen_sum_t sum = inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
+    if (!self->moving) {
+        return hystgen_loop_solve(&hystgen_model_tables, self->play, sum);
+    }
+    self->play[0] = self->play[1];
+    return hystgen_loop_solve(&hystgen_relaxing_tables, self->play, sum);
+}

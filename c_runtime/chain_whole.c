@@ -1,0 +1,13 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: the input of the plays is as fine as what arrives there. */
+
+static inline hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self,
+                                                     hystgen_signal_t h, hystgen_reach_t w,
+                                                     hystgen_reach_t a)
+{
+    (void)self;
+    (void)h;
+    (void)w;
+    return a;
+}

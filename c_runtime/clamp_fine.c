@@ -1,0 +1,10 @@
+#include "hystgen_runtime.h"
+
+/* What arrives in front of the plays of a model with effects, within what the drive's range gives.
+ */
+static hystgen_fine_t hystgen_clamp_fine(hystgen_reach_t a)
+{
+    return (hystgen_fine_t)(a < HYSTGEN_FINE_MIN   ? HYSTGEN_FINE_MIN
+                            : a > HYSTGEN_FINE_MAX ? HYSTGEN_FINE_MAX
+                                                   : a);
+}

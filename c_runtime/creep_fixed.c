@@ -1,0 +1,56 @@
+#include "hystgen_runtime.h"
+
+/* Creep as a block of the chain, in fixed point. A state is what it will give at the next sample if
+   the input stays; a change of that counts at once by a known share, so that the block is exactly
+   invertible. States have bits below those of a signal, so that the slowest one does not stall. */
+
+/* Everything has settled at the input x. Returns the output. */
+static int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                  hystgen_creep_state_t *state, int64_t x)
+{
+    int64_t sum = 0;
+    unsigned int i;
+    for (i = 0; i < t->n; ++i) {
+        state[i].next = hystgen_times(x, &t->term[i].weight) * ((int64_t)1 << t->bits);
+        sum += state[i].next;
+    }
+    self->before = x;
+    self->ahead = hystgen_times(x, &t->direct) + hystgen_nearest(sum, t->bits);
+    return self->ahead;
+}
+
+/* The input that gives the output y once everything has settled. */
+static int64_t hystgen_creep_resting(const hystgen_creep_table_t *t, int64_t y)
+{
+    return hystgen_times(y, &t->inverse_rest);
+}
+
+/* The input that gives the output y at this sample. */
+static int64_t hystgen_creep_solve(const hystgen_creep_table_t *t, const hystgen_creep_t *self,
+                                   int64_t y)
+{
+    return self->before + hystgen_times(y - self->ahead, &t->inverse_slope);
+}
+
+/* The input is x at this sample. Returns the output. */
+static int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                    hystgen_creep_state_t *state, int64_t x)
+{
+    const int64_t change = x - self->before;
+    const int64_t direct = hystgen_times(x, &t->direct);
+    int64_t sum = 0;
+    int64_t next = 0;
+    unsigned int i;
+    for (i = 0; i < t->n; ++i) {
+        const hystgen_creep_term_t *term = &t->term[i];
+        const int64_t late = hystgen_times(change, &term->late) * ((int64_t)1 << term->lift);
+        const int64_t now = state[i].next + late;
+        const int64_t settled = hystgen_times(x, &term->weight) * ((int64_t)1 << t->bits);
+        state[i].next = now + hystgen_times((settled - now) >> t->drop, &term->rate);
+        sum += now;
+        next += state[i].next;
+    }
+    self->before = x;
+    self->ahead = direct + hystgen_nearest(next, t->bits);
+    return direct + hystgen_nearest(sum, t->bits);
+}

@@ -1,0 +1,65 @@
+#include "hystgen_runtime.h"
+
+/* Gain and offset behind the plays, set from outside, in fixed point. */
+
+/* Fraction bits of a gain, 1, and the limits of one that is set. */
+#define HYSTGEN_GAIN_BITS 29u
+#define HYSTGEN_GAIN_ONE ((int64_t)1 << HYSTGEN_GAIN_BITS)
+#define HYSTGEN_GAIN_LEAST (HYSTGEN_GAIN_ONE / 2)
+#define HYSTGEN_GAIN_LARGEST (HYSTGEN_GAIN_ONE * 2)
+
+/* A gain within its limits. */
+static int32_t hystgen_gain_inside(int64_t gain)
+{
+    return (int32_t)(gain < HYSTGEN_GAIN_LEAST     ? HYSTGEN_GAIN_LEAST
+                     : gain > HYSTGEN_GAIN_LARGEST ? HYSTGEN_GAIN_LARGEST
+                                                   : gain);
+}
+
+/* 1 over a gain within its limits. */
+static int32_t hystgen_gain_reciprocal(int32_t gain)
+{
+    return (int32_t)((((int64_t)1 << 2u * HYSTGEN_GAIN_BITS) + gain / 2) / gain);
+}
+
+/* x times a gain. */
+static int64_t hystgen_gain_times(int64_t x, int32_t gain)
+{
+    const hystgen_factor_t f = {gain, HYSTGEN_GAIN_BITS};
+    return hystgen_times(x, &f);
+}
+
+static void hystgen_gain_init(hystgen_gain_t *self)
+{
+    self->gain = (int32_t)HYSTGEN_GAIN_ONE;
+    self->inverse = (int32_t)HYSTGEN_GAIN_ONE;
+    self->offset = 0;
+}
+
+/* Gain and offset of a temperature from the next step on. Returns whether it had to be limited. */
+static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
+                              hystgen_real_t temperature)
+{
+    const int64_t given = (int64_t)temperature * ((int64_t)1 << t->bits);
+    const int64_t inside = given < t->coldest   ? t->coldest
+                           : given > t->hottest ? t->hottest
+                                                : given;
+    const int64_t above = inside - t->reference;
+    const int64_t wanted = HYSTGEN_GAIN_ONE + hystgen_times(above, &t->per_degree);
+    self->offset = hystgen_times(above, &t->offset_per_degree);
+    self->gain = hystgen_gain_inside(wanted);
+    self->inverse = hystgen_gain_reciprocal(self->gain);
+    return self->gain != wanted || inside != given;
+}
+
+/* The input that gives the output y. */
+static int64_t hystgen_gain_solve(const hystgen_gain_t *self, int64_t y)
+{
+    return hystgen_gain_times(y - self->offset, self->inverse);
+}
+
+/* The output for the input x. */
+static int64_t hystgen_gain_absorb(const hystgen_gain_t *self, int64_t x)
+{
+    return hystgen_gain_times(x, self->gain) + self->offset;
+}

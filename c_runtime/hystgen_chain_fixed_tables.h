@@ -1,0 +1,105 @@
+/* The constants of a model's effects in fixed point, for steps of HYSTGEN_SAMPLE_TIME. */
+#ifndef HYSTGEN_CHAIN_FIXED_TABLES_H
+#define HYSTGEN_CHAIN_FIXED_TABLES_H
+
+/* What is no whole number: mantissa / 2^shift. */
+typedef struct {
+    int32_t mantissa;
+    uint8_t shift;
+} hystgen_factor_t;
+
+/* A state of creep: what it will give at the next sample goes to weight times the input by its
+ * rate.
+ */
+typedef struct {
+    hystgen_factor_t rate;
+    hystgen_factor_t late; /* of a change of the input, what counts at once */
+    hystgen_factor_t weight;
+    uint8_t lift; /* bits of a state that the product with `late` leaves out */
+} hystgen_creep_term_t;
+
+/* Creep behind the plays: y = d h + X_1 + X_2 + ... */
+typedef struct {
+    const hystgen_creep_term_t *term;
+    hystgen_factor_t direct;        /* d */
+    hystgen_factor_t inverse_slope; /* over what y changes by with h at once */
+    hystgen_factor_t inverse_rest;  /* h over y at rest */
+    uint8_t bits;                   /* of the states below those of a signal, */
+    uint8_t drop;                   /* and those that products leave out */
+    uint_least16_t n;
+} hystgen_creep_table_t;
+
+/* Lag in front of the plays: x += rate (v - x), and what arrives lies theta of that step behind x.
+ */
+typedef struct {
+    hystgen_factor_t rate;
+    hystgen_factor_t theta;
+    hystgen_factor_t inverse_rate;
+    uint8_t bits; /* of the states below those of a signal, */
+    uint8_t drop; /* and those that products leave out */
+} hystgen_lag_table_t;
+
+/* Lag that is shorter than half a step: of what arrives, `late` of a move at once, and the rest by
+   `rate` in the next step. */
+typedef struct {
+    hystgen_factor_t rate;
+    hystgen_factor_t late;
+    hystgen_factor_t inverse_late;
+    uint8_t bits; /* of the state below those of a signal, */
+    uint8_t drop; /* and those that products leave out */
+} hystgen_lag_exact_table_t;
+
+/* Gain and offset per degree above the reference, and between which temperatures. */
+typedef struct {
+    hystgen_factor_t per_degree;
+    hystgen_factor_t offset_per_degree;
+    int64_t reference;
+    int64_t coldest;
+    int64_t hottest;
+    uint8_t bits; /* of a temperature below a code */
+} hystgen_gain_table_t;
+
+/* A piece of the gain over travel, cubic in the share of its length. */
+typedef struct {
+    int64_t begin;
+    hystgen_factor_t
+        share; /* of the travel from there on, less the bits that the product leaves out */
+    uint8_t drop;
+    int32_t c[4];
+} hystgen_ageing_piece_t;
+
+/* Gain over travel up to `last`. */
+typedef struct {
+    const hystgen_ageing_piece_t *piece;
+    int64_t last;
+    uint_least16_t n;
+    uint8_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
+    uint8_t bits;  /* of a gain below a code that sets it */
+} hystgen_ageing_table_t;
+
+/* A smooth limit, or the way back from it, as polynomials. */
+typedef struct {
+    const int32_t *knot;
+    const uint8_t *scale;
+    const int32_t *coefficient;
+    int32_t end; /* largest argument of either sign */
+    uint_least16_t pieces;
+    uint8_t degree;
+    uint8_t drop; /* bits of a signal that an argument leaves out, */
+    uint8_t lift; /* and those that a value does */
+} hystgen_bend_curve_t;
+
+typedef struct {
+    hystgen_bend_curve_t forward;
+    hystgen_bend_curve_t inverse;
+} hystgen_bend_t;
+
+/* Stops, and the slope beyond them. */
+typedef struct {
+    int64_t lower;
+    int64_t upper;
+    hystgen_factor_t give;
+    hystgen_factor_t inverse_give;
+} hystgen_stops_t;
+
+#endif

@@ -1,0 +1,20 @@
+#include "hystgen_runtime.h"
+
+/* Stops behind the plays, in fixed point: beyond them the output goes on with another slope. */
+
+/* x, with the slope f beyond the stops. */
+static int64_t hystgen_stops_beyond(const hystgen_stops_t *t, int64_t x, const hystgen_factor_t *f)
+{
+    const int64_t inside = x < t->lower ? t->lower : x > t->upper ? t->upper : x;
+    return inside + hystgen_times(x - inside, f);
+}
+
+static int64_t hystgen_stops_forward(const hystgen_stops_t *t, int64_t x)
+{
+    return hystgen_stops_beyond(t, x, &t->give);
+}
+
+static int64_t hystgen_stops_inverse(const hystgen_stops_t *t, int64_t y)
+{
+    return hystgen_stops_beyond(t, y, &t->inverse_give);
+}

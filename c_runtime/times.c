@@ -1,0 +1,14 @@
+#include "hystgen_runtime.h"
+
+/* Bits of the part of a number that is multiplied apart. */
+#define HYSTGEN_LOW_PART 20u
+
+/* x times a factor, to the nearest whole number; |x| < 2^51, a shift is 21 to 82. */
+static int64_t hystgen_times(int64_t x, const hystgen_factor_t *f)
+{
+    const int64_t high = x >> HYSTGEN_LOW_PART;
+    const int64_t low = x & (((int64_t)1 << HYSTGEN_LOW_PART) - 1);
+    const int64_t whole = high * f->mantissa + ((low * f->mantissa) >> HYSTGEN_LOW_PART);
+    const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
+    return (whole + ((int64_t)1 << (shift - 1u))) >> shift;
+}

@@ -1,0 +1,52 @@
+"""Products of whole numbers with constants that are none, in fixed point: `c_runtime/times.c`."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+from hystgen.basics.jit import jit
+
+LOW_BITS = 20
+"""Bits of the part of a number that is multiplied apart."""
+
+LARGEST = 2**51
+"""Numbers that are multiplied are smaller: their upper part then has 31 bits, as a mantissa has."""
+
+MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
+BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
+"""Factors are smaller."""
+
+
+def factor(x: float | Fraction) -> tuple[int, int]:
+    """Mantissa and shift of a factor, `mantissa / 2^shift`, to 31 bits; fewer only below 2^-52.
+
+    Raises OverflowError from `BEYOND` on.
+    """
+    exact = Fraction(x)
+    if not exact:
+        return 0, LEAST_SHIFT
+    shift = min(MANTISSA_BITS - math.frexp(float(exact))[1], MOST_SHIFT)
+    mantissa = round(exact * 2**shift)
+    if abs(mantissa) >= 1 << MANTISSA_BITS:  # rounded up to a power of 2
+        shift -= 1
+        mantissa = round(exact * 2**shift)
+    if shift < LEAST_SHIFT:
+        raise OverflowError(f"{float(x):.6g} is no factor below {BEYOND:g}")
+    return mantissa, shift
+
+
+def error(x: float | Fraction) -> float:
+    """How far a factor is from the number."""
+    mantissa, shift = factor(x)
+    return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
+
+
+@jit
+def times(x: Any, mantissa: Any, shift: Any) -> Any:
+    """x times a factor, to the nearest whole number; for |x| < LARGEST."""
+    high = x >> LOW_BITS
+    low = x & ((1 << LOW_BITS) - 1)
+    whole = high * mantissa + ((low * mantissa) >> LOW_BITS)
+    return (whole + (1 << (shift - LOW_BITS - 1))) >> (shift - LOW_BITS)

@@ -1,0 +1,330 @@
+"""How far a model with effects in fixed point can be from the one in double precision, block by block.
+
+As in `hystgen.compensator.chain.bounds`: every block adds the roundings of its own operations and constants to the
+error that reaches it, and passes the sum on with its largest gain. Signals are rounded to their last bit in every
+operation; a state to bits below that, each rounding kept by it for 1/rate samples. The drive is rounded to a code, and
+absorbed as sent: without a lag the plays are given that, with one `rate/2` codes of it. Errors are in signals in front
+of the plays and in output codes behind them.
+
+Behind a memoryless part there is nothing beyond the drive's range to which a lag could lead, so that while a drive is
+limited the state behind it follows another target than in double precision, and what comes behind is bounded by the
+range alone; `rounding` leaves that out, as it does a lag behind a slew limit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from hystgen.arithmetic.factors import error as missed
+from hystgen.chain.static import StaticModel
+from hystgen.compensator.bounds import SECOND_ORDER
+from hystgen.compensator.chain.layout import ChainTables, Parts
+from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.creep import fixed as creep_fixed
+from hystgen.effects.creep.compensator import CreepNumbers
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
+from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
+from hystgen.effects.thermal.fixed import GAIN_BITS
+
+DOUBLE = 2.0**-40
+"""Share of a size that double precision itself may be off by: a thousand roundings."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Largest sizes of the signals behind the plays, in output codes: forwards the sum of the plays, the input of each
+    creep and of each saturation, and the output; back what is left of a reference behind each saturation, the target
+    that the output side is given, and the sum that is asked of the plays."""
+
+    plays: float
+    creeps: list[float]
+    saturations: list[float]
+    output: float
+    undone: list[float]
+    target: float
+    asked: float
+
+    @property
+    def largest(self) -> float:
+        """Of all of them."""
+        return max(self.plays, *self.creeps, *self.saturations, self.output, *self.undone, self.target, self.asked)
+
+
+@dataclass(frozen=True)
+class Bend:
+    """A curve of what saturates: bits of a signal that arguments and values leave out."""
+
+    curve: FixedCurve
+    drop: int
+    lift: int
+
+    def error(self, slope: float) -> float:
+        """In signals, for the largest slope."""
+        argument = 0.5 * 2.0**self.drop if self.drop else 0.0
+        return self.curve.error * 2.0**self.lift + argument * slope
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
+
+    `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
+    whole codes; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
+    `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
+    """
+
+    static: StaticModel
+    parts: Parts
+    inner: Builder
+    tables: ChainTables
+    sizes: Sizes
+    bits: int
+    drop: int
+    creeps: list[CreepNumbers]
+    lags: list[tuple[bool, tuple[float, float, float, float]]]
+    taps: list[float]
+    bends: list[Bend]
+    ends: tuple[float, float]
+    slowed: float
+    reached: bool
+    largest_step: float
+    finer: int
+
+    @property
+    def _fine(self) -> int:
+        """Bits of a signal in front of the plays below a drive code."""
+        return self.inner.fine + self.finer
+
+    @property
+    def _signal(self) -> float:
+        """A signal in output codes."""
+        return 2.0**-self.bits
+
+    @property
+    def _arriving(self) -> float:
+        """A signal in front of the plays in drive units."""
+        return float(self.inner.drive_lsb) / 2.0**self._fine
+
+    # ------------------------------------------------------------ blocks
+
+    def _creep(self, j: int) -> float:
+        """Roundings of the output of creep j, in output codes."""
+        numbers, size = self.creeps[j], self.sizes.creeps[j]
+        bits, drop = (int(x) for x in self.tables.creep.block[j, [creep_fixed.BITS, creep_fixed.DROP]])
+        state = 2.0**-bits * self._signal
+        found = 0.0
+        for rate, _, late, weight in numbers.terms.tolist():
+            scale = 2.0 ** (bits - creep_fixed.lifted(late, bits))
+            found += state * (0.5 / rate + 2.0**drop) + 0.5 * self._signal / scale / rate
+            found += 0.5 * self._signal + missed(weight) * size + 2.0 * size * missed(late * scale) / scale / rate
+            found += 2.0 * weight * size * missed(rate * 2.0**drop) / 2.0**drop / rate
+        direct = numbers.rest - float(sum(numbers.terms[:, creep.WEIGHT]))
+        return found + missed(direct) * size + self._signal
+
+    def _creep_back(self, j: int) -> float:
+        """Roundings of its inverse, as errors of the output."""
+        numbers, size = self.creeps[j], self.sizes.creeps[j]
+        moved = self.sizes.asked + size * numbers.rest
+        return numbers.slope * (missed(1.0 / numbers.slope) * moved + 0.5 * self._signal)
+
+    @staticmethod
+    def _creep_gain(numbers: CreepNumbers) -> float:
+        """Largest gain of its inverse, as in `hystgen.compensator.chain.bounds`."""
+        total, late = (float(sum(numbers.terms[:, column])) for column in (creep.WEIGHT, creep.LATE))
+        around = numbers.rest - 2.0 * total + 2.0 * late
+        return 1.0 / around if around > 0.0 else 2.0 / numbers.slope - 1.0 / numbers.rest
+
+    def _lag(self, j: int, given: float, asked: float) -> tuple[float, float, float]:
+        """Roundings of what arrives behind lag j, of its state in its inverse, and of the answer, in signals.
+
+        `given`, `asked`: sizes of what it is given, and of what is asked of it.
+        """
+        exact, (rate, second, late, inverse) = self.lags[j]
+        bits, drop = (int(x) for x in self.tables.lag.block[j, [lag_fixed.BITS, lag_fixed.DROP]])
+        state, scale = 2.0**-bits, 2.0**drop
+        sizes = lag_fixed.Sizes(exact, rate, late, given, asked)
+        kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
+        if exact:
+            kept += (0.5 * state + 2.0 * given * missed(late * 2.0**bits) / 2.0**bits) / rate
+            answer = sizes.state * missed(inverse * 2.0 ** (drop - bits)) * 2.0 ** (bits - drop) + state * scale / late
+            return kept + 0.5, kept, answer + 0.5
+        product = state * (0.5 + scale * second) + sizes.state * missed(second * scale) / scale
+        answer = sizes.state * missed(inverse * 2.0 ** (drop - bits)) * 2.0 ** (bits - drop) + state * scale * inverse
+        return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + 1.0
+
+    def _lag_sizes(self) -> list[tuple[float, float]]:
+        """Of each lag, the largest input and the largest output that is asked for, in signals."""
+        given = float(max(map(abs, self.inner.drive)) << self._fine) + 1.0
+        asked = given + 1.0
+        if not self.static.stages:
+            asked = float(max(map(abs, self.inner.play)) + self.inner.margin) * 2.0**self.finer
+        found = []
+        for exact, numbers in reversed(self.lags):
+            found.append((given, asked))
+            asked = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked).answer
+        return found[::-1]
+
+    def _gains(self) -> tuple[int, float]:
+        """How many gains there are, and the error of each as a share of the output."""
+        return len(self.parts.ageing) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
+
+    def _saturation(self) -> tuple[float, float, float]:
+        """Of what saturates: the slope of its inverse at the ends of the output, the error of the inverse, and that of
+        the map, in output codes."""
+        size = max(abs(end - self.static.output_offset) for end in self.ends)
+        slope, back, there = 1.0, 0.0, 0.0
+        bends = [self.bends[i : i + 2] for i in range(0, len(self.bends), 2)]
+        for effect in reversed(self.parts.saturations):
+            if isinstance(effect, TanhSaturation):
+                onward, backward = bends.pop()
+                share = min(size / effect.level, 1.0 - 2.0**-50)
+                slope = slope / (1.0 - share * share)
+                back = back / (1.0 - share * share) + backward.error(1.0 / (1.0 - share * share)) * self._signal
+                there += onward.error(1.0) * self._signal
+                size = effect.level * math.atanh(share)
+            elif isinstance(effect, HardSaturation | Stops):
+                give = getattr(effect, "give", 0.0)
+                over = 1.0 / give if 0.0 < give < 1.0 else 1.0
+                slope, back = slope * over, back * over
+                if give:
+                    back += (0.5 + over) * self._signal + missed(1.0 / give) * size / float(self.inner.output_lsb)
+                    there += 1.0 * self._signal + missed(give) * self.sizes.output
+        return slope, back, there
+
+    def _late(self) -> float:
+        """Share of the output by which a gain is late, as in floating point."""
+        if not self.parts.ageing:
+            return 0.0
+        moved = max(ageing.most_at_once(each, self.largest_step) for each in self.parts.ageing)
+        return moved + ageing.TABLE_ERROR
+
+    # ------------------------------------------------------------ operators
+
+    def _arrival(self) -> tuple[float, float]:
+        """Roundings of what arrives in front of the plays for the drive as sent, forwards, and what rounding the drive
+        to a code makes of it, in signals."""
+        places = zip(range(len(self.lags)), self._lag_sizes(), strict=True)
+        here = sum(self._lag(j, *sizes)[0] for j, sizes in places)
+        here += 0.5 * 2.0**self.finer if self.finer else 0.0
+        code = 0.5 * 2.0**self._fine
+        if self.lags:
+            exact, (rate, theta, _, _) = self.lags[0]
+            return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
+        rounded = bool(self.static.stages) or self._fine > 0
+        return here, code * rounded
+
+    def _viscous(self) -> float:
+        """What roundings, and contacts inside a step, make of the sum of viscous plays, in output codes."""
+        t = self.tables.moving
+        if not t.used:
+            return 0.0
+        late, kept = (float(row[0]) / 2.0 ** int(row[1]) for row in (t.late, t.kept))
+        low, high = self.inner.hull
+        wrong = 2.0 * float(high - low) * (2.0**-30 * (late + kept))
+        play = (1.0 + wrong) / min(late, 1.0) * float(self.inner.step) + 0.25 * self.largest_step
+        slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * float(high - low)
+        return math.fsum(self.static.pi.weights[1:]) * play / float(self.inner.output_lsb) + slopes
+
+    def _plays(self, arriving: float) -> float:
+        """Error of the sum of the plays for one of what arrives in front of the memoryless part, in output codes."""
+        steep = self.static.front_slopes[1] * self.static.pi.slopes[-1] / float(self.inner.output_lsb)
+        level = 0.5 * self._signal if self.drop else 0.0
+        return float(self.inner.sum_error()) + self._viscous() + steep * arriving * self._arriving + level
+
+    def forward(self) -> float:
+        """In output codes."""
+        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
+        error = self._plays(self._arrival()[0] + short)
+        for j, numbers in enumerate(self.creeps):
+            error = error * numbers.rest + self._creep(j)
+        gains, share = self._gains()
+        error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.output + self._signal))
+        if self.parts.ageing:
+            error += ageing.TABLE_ERROR * self.sizes.output
+        there = self._saturation()[2]
+        return upward(Fraction(SECOND_ORDER * (error + there + 0.5 + self._signal) + DOUBLE * self.sizes.output))
+
+    def _asked(self) -> float:
+        """Error of the sum that the inverse asks of the plays, in output codes."""
+        slope, back, _ = self._saturation()
+        low, high = (end / float(self.inner.output_lsb) for end in self.ends)
+        limits = self.tables.limits
+        short = max(high - float(limits[3]), float(limits[2]) - low, 0.0)
+        error = slope * (short + self._signal) + back
+        if self.taps:
+            size = max(self.sizes.undone)
+            own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
+            error = error * math.fsum(map(abs, self.taps)) + own
+        gains, share = self._gains()
+        late = self._late() * self.sizes.output
+        error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.output + self._signal) + late)
+        for j in range(len(self.creeps) - 1, -1, -1):
+            error = self._creep_gain(self.creeps[j]) * (error + self._creep(j) + self._creep_back(j))
+        return error
+
+    def _arriving_error(self) -> float:
+        """Error of what the inverse asks to arrive in front of the memoryless part, in signals."""
+        code = self._arrival()
+        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
+        steep = self.static.front_slopes[1]
+        solved = float(self.inner.solved()) / self._arriving + steep * float(self.inner.back())
+        solved += steep * (sum(code) + short)
+        outer = self.static.pi.slopes[-1]
+        residual = (self._asked() + self._plays(0.0)) * float(self.inner.output_lsb) + outer * solved * self._arriving
+        return self._gain() * residual / self._arriving
+
+    def _gain(self) -> float:
+        """Largest change of the drive in front of the memoryless part for one of the plays' sum."""
+        if self.tables.moving.used:  # as in floating point: each play is stretched further than it would be
+            return 2.0 / self.static.pi.weights[0] / self.static.front_slopes[0]
+        return float(self.inner.gain())
+
+    def _led(self, error: float) -> float:
+        """The error of the drive in signals, for one of what is in front of the plays."""
+        for j in range(len(self.lags) - 1, -1, -1):
+            exact, (rate, second, late, _) = self.lags[j]
+            _, kept, answer = self._lag(j, *self._lag_sizes()[j])
+            code = 0.5 * 2.0**self._fine if j == 0 else 0.5
+            if exact:
+                error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
+            else:
+                goal = (1.0 + 2.0 * second) / (1.0 - second) * (error + kept + rate * code)
+                error = (goal + kept) * (2.0 - rate) / rate + (2.0 - rate) * code + answer
+        return error
+
+    def _codes(self, error: float) -> float:
+        """An error of the drive, in signals in front of the plays, in drive codes."""
+        own = SECOND_ORDER * self._led(error) / 2.0**self._fine
+        whole = float(self.inner.drive[1] - self.inner.drive[0])
+        return upward(Fraction(min(own + DOUBLE * whole + self.slowed * whole, whole)))
+
+    def hold(self) -> int:
+        """Signals in front of the plays by which the drive steps back by rounding alone."""
+        if not self.static.branches_differ or not self.inner.invertible:
+            return 0
+        return math.floor(2.0 * self._arriving_error())
+
+    @property
+    def limited(self) -> bool:
+        """Whether a limit of the drive in front of a lag leaves the inverse with no bound but the range."""
+        return bool(self.lags) and (not self.reached or bool(self.parts.slew))
+
+    def rounding(self) -> float:
+        """Of the inverse, in drive codes, on the same branch, and while no drive is limited where it is `limited`."""
+        return self._codes(self._arriving_error())
+
+    def inverse(self) -> float:
+        """The same with what another branch and limits make."""
+        if self.limited:
+            return float(self.inner.drive[1] - self.inner.drive[0])
+        if not self.static.branches_differ:
+            return self.rounding()
+        gap = self.static.branch_gap
+        other = self._gain() * self.static.pi.slopes[-1] * gap + gap / self.static.front_slopes[0]
+        return self._codes(self._arriving_error() + 1.001 * other / self._arriving)

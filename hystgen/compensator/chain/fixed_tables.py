@@ -1,0 +1,420 @@
+"""From a model with effects to whole numbers: signals, ranges and constants of fixed point.
+
+Signals. In front of the plays they are in units of the plays' input, which is a drive code or finer; behind the plays
+in a fraction of an output code, `LEVEL_BITS` bits. Every signal is bounded here, by intervals from the drive on and
+from the reference back, and these bits are as many as let all of them be factors of a product (`LARGEST`). States of
+filters have bits below that, as many as keep the slowest one from stalling. So no sum or product can overflow, whatever
+is called in whatever order; what does not fit is refused.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic.factors import LARGEST, factor
+from hystgen.basics.problems import FormatError
+from hystgen.chain.chain import Chain
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
+from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
+    LARGEST_LEVEL,
+    LEAST_CODE,
+    LEVEL_BITS,
+    LEVEL_DROP,
+    MOST_CODE,
+    OFFSET,
+    SAMPLES_A_SWEEP,
+    SHARE_BITS,
+    VERIFIED_SHARE,
+    ChainTables,
+    Codes,
+    Compiled,
+    Parts,
+    output_range,
+    taps_of,
+)
+from hystgen.compensator.chain.own import OwnTables
+from hystgen.compensator.fixed_tables import Builder, FixedCurve, lsbs, nearest
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.ageing import fixed as ageing_fixed
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.creep import fixed as creep_fixed
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.saturation.fixed import Saturations
+from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
+from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal import fixed as thermal_fixed
+from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.parameters.schema import Compensation
+from hystgen.plays import slots
+
+TEMPERATURE_BITS = {15: 7, 31: 22}
+"""Fraction bits of a temperature in degC by the bits of a code: 256 or 512 degrees either way."""
+
+BEYOND = 7
+"""Spans of their input by which plays in front of a lag may be asked for more than the drive gives: 8 of 2^26 steps,
+with their sign, fit 32 bits."""
+
+MOST_FINER = 16
+"""Bits of what arrives in front of the plays below their input: then a slope of 31 bits is still divided by in 64."""
+
+BEND_BITS = 30
+"""Bits of the arguments and values of a curve, without their sign."""
+
+STEEP = 4.0
+"""Levels of a tanh to which a displacement is led back: the slope is 750 there."""
+
+
+def build(
+    chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
+) -> Compiled:
+    """The model in 'q31' or 'q15' at steps of `seconds`, whose effects on plays have no `moving.beyond_fixed`.
+
+    Raises FormatError when a given LSB does not fit the type, or a signal or a constant the arithmetic.
+    """
+    return _Builder(chain, arithmetic, seconds, how, lsb).build()
+
+
+class _Builder:
+    """The steps of `build`, each with what the ones before it found."""
+
+    def __init__(
+        self, chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
+    ) -> None:
+        self.arithmetic, self.seconds, self.how = arithmetic, seconds, how
+        self.about = ARITHMETICS[arithmetic]
+        self.static, self.parts = chain.cascade, Parts.of(chain.effects)
+        self.low, self.high = output_range(self.static, self.parts, seconds)
+        self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
+        self.taps = taps_of(self.parts, seconds, how)
+        self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
+        self.lags = [lag.numbers(each, seconds) for each in self.parts.lags]
+        self.given = (lsb[0] is not None, lsb[1] is not None)
+
+    def build(self) -> Compiled:
+        static = self.static
+        plain = dataclasses.replace(static, output_offset=0.0)
+        inner = (self.drive_lsb, self.output_lsb)
+        beyond, self.reached = self._beyond() if self.lags else (0, True)
+        self.inner = Builder(plain, self.arithmetic, "loop", inner, self.given, beyond, bool(self.lags))
+        plays, _ = self.inner.build()
+        room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
+        if room < 1:
+            self._refuse(f"signals behind the plays reach {self.sizes.largest:.3g} output codes, too many")
+        self.finer = 0
+        self.bits = min(self.inner.bits, room)
+        self.drop = self.inner.bits - self.bits
+        limits = self._limits(plays.limits)
+        behind = self._saturations()
+        drive = [end << self.inner.fine for end in self.inner.drive]
+        plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
+        span = self.static.input_range[1] - self.static.input_range[0]
+        tables = ChainTables(
+            plays,
+            limits,
+            self._need(lambda: moving.build_fixed(plays, static, self.parts.plays, self.seconds), "rate_dependence"),
+            self._need(self._lags, "a lag"),
+            self._need(self._creep_tables, "creep"),
+            self._need(lambda: self._ageing(span), "ageing"),
+            self._need(self._gains, "a temperature"),
+            HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
+            np.zeros((0, 8), np.int64),
+            OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
+            behind,
+            self._need(self._tap, "the preview"),
+            np.array(self._numbers(), dtype=np.int64),
+            int(bool(self.parts.slew)),
+        )
+        step = min((self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)) * self.seconds, span)
+        slowed = 0.0
+        if self.parts.slew:
+            slowed = max(1.0 - math.floor(rate) / float(rate) for rate in self.rates())
+        weights = self.taps.weights.tolist() if self.taps else []
+        bounds = Bounds(
+            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags, weights,
+            self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
+        )  # fmt: skip
+        plays.limits[slots.HOLD] = bounds.hold()
+        codes = Codes(
+            self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
+            bounds.limited, math.ceil(self.sizes.largest * 2**self.bits),
+        )  # fmt: skip
+        max_rate = self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)
+        return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)
+
+    # ------------------------------------------------------------ refusals
+
+    def _refuse(self, what: str) -> None:
+        raise FormatError((("model", "effects"), f"{what} for {self.arithmetic}; use {self.about.finer}"))
+
+    def _need(self, made: Callable[[], Any], what: str) -> Any:
+        try:
+            return made()
+        except OverflowError as error:
+            raise FormatError((
+                ("model", "effects"),
+                f"{what}: its states and constants do not fit {self.arithmetic}, whose signals have "
+                f"{self.bits} bits below an output code; use {self.about.finer}",
+            )) from error  # fmt: skip
+
+    # ------------------------------------------------------------ ranges
+
+    def _code(self, x: float) -> float:
+        """A displacement in output codes."""
+        return x / float(self.output_lsb)
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        """The signals behind the plays."""
+        static, slack = self.static, 1.0 + 2.0**-20
+        w = max(*map(abs, static.play_range), *map(abs, static.pi.start))
+        size = plays = self._code(math.fsum(static.pi.weights) * w) * slack + 1.0
+        creeps = []
+        for each in self.creeps:
+            creeps.append(size)
+            size = size * each.rest * slack + 1.0
+        settled = size
+        span = self._code(self.high - self.low)
+        for _ in self.parts.ageing:
+            size *= thermal.LARGEST_GAIN
+        for _ in self.parts.thermal:
+            size = size * thermal.LARGEST_GAIN + span
+        saturations = [size] * len(self.parts.saturations)
+        output = size + abs(self._code(static.output_offset)) + span
+        back = float(self.about.code_max) + abs(self._code(static.output_offset)) + span + 1.0
+        undone = [back]
+        for effect in reversed(self.parts.saturations):
+            if isinstance(effect, TanhSaturation):
+                back = self.led_back(effect, settled, size)
+            elif isinstance(effect, HardSaturation):
+                back = min(back, self._code(effect.level) + 1.0)
+            elif isinstance(effect, Stops):
+                stop = max(abs(effect.lower), abs(effect.upper))
+                back = back / effect.give if effect.give else self._code(stop)
+            undone.append(back)
+        target = back * (math.fsum(map(abs, self.taps.weights.tolist())) if self.taps else 1.0) + 1.0
+        asked = target
+        for _ in self.parts.thermal:
+            asked = (asked + span) / thermal.LEAST_GAIN
+        for _ in self.parts.ageing:
+            asked = asked / thermal.LEAST_GAIN
+        for each, inside in zip(reversed(self.creeps), reversed(creeps), strict=True):
+            moved = inside + (asked + inside * each.rest) / each.slope
+            asked = max(moved, asked / each.rest) * slack + 1.0
+        return Sizes(plays, creeps, saturations, output, undone, target, asked)
+
+    def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
+        """Largest input to which a displacement is led back: any that the model has at rest at least."""
+        return max(settled, min(size, STEEP * self._code(effect.level)))
+
+    def _beyond(self) -> tuple[int, bool]:
+        """Spans of their input by which plays have to be asked for more than the drive gives, and whether they are.
+
+        The lag leads to what is asked, and goes on from there; behind a memoryless part there is nothing beyond.
+        """
+        if self.static.stages:
+            return 0, False
+        low, high = self.static.play_range
+        most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
+        spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
+        return min(spans, BEYOND), spans <= BEYOND
+
+    # ------------------------------------------------------------ constants
+
+    def _limits(self, plays: Any) -> Any:
+        """Those of the whole chain."""
+        limits = plays.copy()
+        low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
+        slack = Fraction(1, 1024)  # as much as double precision may have moved an end off a code
+        limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = math.ceil(low - slack), math.floor(high + slack)
+        limits[slots.OFFSET] = 0
+        most = self.about.code_max
+        if limits[slots.OUTPUT_MIN] < -most or limits[slots.OUTPUT_MAX] > most:
+            limits[slots.OUTPUT_MIN] = max(limits[slots.OUTPUT_MIN], -most)
+            limits[slots.OUTPUT_MAX] = min(limits[slots.OUTPUT_MAX], most)
+        if limits[slots.OUTPUT_MAX] - limits[slots.OUTPUT_MIN] < 2:
+            message = f"lies so far from 0 that {self.arithmetic} has no codes for the range; move it nearer to 0"
+            raise FormatError((("model", "output_offset"), message))
+        return limits
+
+    def signal(self, x: float) -> int:
+        """A displacement as a signal."""
+        return nearest(Fraction(x) / self.output_lsb * 2**self.bits)
+
+    def _numbers(self) -> list[int]:
+        span = self.inner.drive[1] - self.inner.drive[0]
+        found = [0] * 13
+        found[OFFSET] = self.signal(self.static.output_offset)
+        found[1] = self.signal(self.high - self.low)
+        found[2], found[3] = self.slew(span)
+        found[4] = round(VERIFIED_SHARE * (self.about.code_max + 1))
+        found[LEVEL_BITS], found[LEVEL_DROP] = self.bits, self.drop
+        hull = max(map(abs, self.inner.hull)) + self.inner.margin
+        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * hull >> self.drop, LARGEST)
+        found[LEAST_CODE] = self.inner.drive[0] - 2 * span
+        found[MOST_CODE] = self.inner.drive[1] + 2 * span
+        found[SHARE_BITS] = 31 - self.about.code_bits
+        found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
+        return found
+
+    def rates(self) -> tuple[Fraction, Fraction]:
+        """Drive codes by which the drive may rise and fall in one step."""
+        pairs = [(each.rate, each.falling_rate) for each in self.parts.slew]
+        rising, falling = (min(each) for each in zip(*pairs, strict=True))
+        return tuple(Fraction(x * self.seconds) / self.drive_lsb for x in (rising, falling))  # type: ignore[return-value]
+
+    def slew(self, span: int) -> tuple[int, int]:
+        """The same in whole codes."""
+        if not self.parts.slew:
+            return 0, 0
+        whole = [math.floor(rate) for rate in self.rates()]
+        if min(whole) < 1:
+            code = f"{float(min(self.rates())):.3g} drive codes a sample"
+            self._refuse(f"slew_limit: {code} are less than one, too slow")
+        return min(whole[0], span + 1), min(whole[1], span + 1)
+
+    def _lags(self) -> Any:
+        wanted = self._finest()
+        for bits in range(wanted, -1, -1):  # as many as there is room for
+            self.finer = bits
+            try:
+                return self._lag_tables()
+            except OverflowError:
+                if not bits:
+                    raise
+        return None
+
+    def _finest(self) -> int:
+        """Bits below the plays' input that keep the lead of the lags from making more of its rounding than half a code.
+
+        Plays alone have them, in an arithmetic that has none below a drive code.
+        """
+        if not self.lags or self.static.stages or self.parts.plays or self.inner.fine:
+            return 0
+        leads = [math.log2(4.0 / numbers[lag.RATE]) for exact, numbers in self.lags if not exact]
+        return min(MOST_FINER, math.ceil(sum(leads)) + 1) if leads else 0
+
+    def _lag_tables(self) -> Any:
+        c = self.inner
+        given = float(max(map(abs, c.drive)) << (c.fine + self.finer)) + 1.0
+        asked = float(max(map(abs, c.play)) + c.margin) * 2.0**self.finer if not self.static.stages else given + 1.0
+        rows = []
+        for exact, numbers in reversed(self.lags):
+            sizes = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked)
+            rows.append((exact, numbers, sizes))
+            asked = sizes.answer
+            if asked > 2.0**60:
+                raise OverflowError("no room")
+        return lag_fixed.tables(rows[::-1])
+
+    def _creep_tables(self) -> Any:
+        scale = 2.0**self.bits
+        sizes = [size * scale for size in self.sizes.creeps]
+        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)))
+
+    def _ageing(self, span: float) -> Any:
+        rows = [
+            (ageing.pieces(each), ageing.turns(each, span, 2.0**-thermal_fixed.GAIN_BITS)) for each in self.parts.ageing
+        ]
+        bits = thermal_fixed.GAIN_BITS - (self.about.code_bits - 2)
+        return ageing_fixed.tables(rows, float(self.drive_lsb), bits)
+
+    def _gains(self) -> Any:
+        span = self.high - self.low
+        rows = [thermal.numbers(each, span) for each in self.parts.thermal]
+        kept = TEMPERATURE_BITS[self.about.code_bits]
+        level = 2.0**self.bits / float(self.output_lsb)
+        degrees = self.about.code_max / 2.0**kept
+        return thermal_fixed.tables(rows, level, thermal_fixed.TEMPERATURE_BITS - kept, degrees)
+
+    def _tap(self) -> Any:
+        rows = [factor(weight) for weight in self.taps.weights.tolist()] if self.taps else []
+        return np.array(rows, dtype=np.int64).reshape(-1, 2)
+
+    # ------------------------------------------------------------ what saturates
+
+    def _saturations(self) -> Saturations:
+        self.bends: list[Bend] = []
+        kinds, pieces = [], []
+        domain: list[tuple[int, int]] = []
+        scaled: list[tuple[int, int]] = []
+        curves: list[FixedCurve | None] = []
+        places = zip(self.parts.saturations, self.sizes.saturations, reversed(self.sizes.undone[1:]), strict=True)
+        for effect, size, back in places:
+            row = [0, 0, *factor(0), *factor(0)]
+            if isinstance(effect, TanhSaturation):
+                kinds.append(slots.TANH)
+                pair = self._bends(self._code(effect.level), size, back)
+                self.bends += pair
+                curves += [one.curve for one in pair]
+                domain += [one.curve.domain for one in pair]
+                scaled += [(one.drop, one.lift) for one in pair]
+            else:
+                kinds.append(slots.DEAD_ZONE)
+                lower, upper, give = (
+                    (-effect.level, effect.level, 0.0) if isinstance(effect, HardSaturation)
+                    else (effect.lower, effect.upper, effect.give)
+                )  # fmt: skip
+                most = LARGEST // 2
+                ends = [min(max(self.signal(end), -most), most) for end in (lower, upper)]
+                over = self._need(lambda give=give: factor(1.0 / give if give else 0.0), "stops")  # type: ignore[misc]
+                row = [*ends, *factor(give), *over]
+                curves += [None, None]
+                domain += [(0, 0), (0, 0)]
+                scaled += [(0, 0), (0, 0)]
+            pieces.append(row)
+        each = [[] if one is None else one.pieces for one in curves]
+        flat = list(itertools.chain.from_iterable(each))
+
+        def whole(values: Any, columns: int = 0) -> Any:
+            found = np.array(values, dtype=np.int64)
+            return found.reshape(-1, columns) if columns else found
+
+        first = [0, *itertools.accumulate(map(len, each))][: len(each)]
+        return Saturations(
+            whole(kinds), whole(pieces, 6), whole([one.knot for one in flat]),
+            whole([one.coefficients for one in flat], self.about.degree + 1), whole([one.scale for one in flat]),
+            whole(first), whole([len(one) for one in each]), whole(domain, 2), whole(scaled, 2),
+        )  # fmt: skip
+
+    def _bends(self, level: float, size: float, back: float) -> tuple[Bend, Bend]:
+        """The curves of a tanh for inputs up to `size` codes, and those that lead back up to `back`."""
+        scale = 2.0**self.bits
+
+        def bend(function: Callable[[float], float], most: float, value: float) -> Bend:
+            drop = max(0, math.ceil(math.log2(most * scale)) - BEND_BITS)
+            lift = max(0, math.ceil(math.log2(value * scale)) - BEND_BITS)
+            end = math.floor(most * scale / 2.0**drop)
+            into, out = 2.0**drop / scale, scale / 2.0**lift
+            allowed = max(0.5, out / 64.0)
+            try:
+                curve = FixedCurve(lambda x: function(x * into) * out, (-end, end), [], self.about.degree, allowed)
+            except FormatError:
+                self._refuse("saturation bends too sharply within the output's range")
+            return Bend(curve, drop, lift)
+
+        envelope = TanhEnvelope((level, 1.0 / level, 0.0, 0.0))
+        far = float(envelope.forward(back))
+        return (
+            bend(lambda x: float(envelope.forward(x)), size, min(level, size)),
+            bend(lambda y: float(envelope.inverse(y)), far, back),
+        )
+
+
+def setting_codes(tables: ChainTables) -> tuple[float, float]:
+    """Codes of a degree, and of a gain of 1."""
+    most = int(tables.limits[slots.CODE_MAX]) + 1
+    return 2.0 ** TEMPERATURE_BITS[most.bit_length() - 1], most / 4

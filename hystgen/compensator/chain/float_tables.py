@@ -1,0 +1,168 @@
+"""From a model with effects to the numbers that its operators work with in floating point."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.problems import FormatError
+from hystgen.chain.chain import Chain
+from hystgen.compensator.chain import moving, own
+from hystgen.compensator.chain.layout import (
+    SAMPLES_A_SWEEP,
+    VERIFIED_SHARE,
+    ChainTables,
+    Compiled,
+    OwnChainTables,
+    Parts,
+    Stages,
+    output_range,
+    taps_of,
+)
+from hystgen.compensator.float_tables import build_float, inward
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.ageing.compensator import AgeingTables
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.drift import compensator as drift
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag.compensator import LagTables
+from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
+from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.front.tanh import kernels
+from hystgen.parameters.schema import Compensation
+from hystgen.plays import slots
+
+
+def _behind(parts: Parts, dtype: Any) -> Stages:
+    """The stages of saturation: an envelope, or three straight pieces."""
+    kinds: list[int] = []
+    firsts: list[int] = []
+    sizes: list[int] = []
+    data: list[float] = []
+    for effect in parts.saturations:
+        firsts.append(len(data))
+        if isinstance(effect, TanhSaturation):
+            kinds.append(slots.TANH)
+            sizes.append(0)
+            one = [effect.level, 1.0 / effect.level, 0.0, 0.0, 1.0 / effect.level, effect.level]
+            one.append(float(np.nextafter(dtype(1), dtype(0))))
+            data += 2 * one  # both branches
+            continue
+        lower, upper, give = -math.inf, math.inf, 1.0
+        if isinstance(effect, HardSaturation):
+            lower, upper, give = -effect.level, effect.level, 0.0
+        elif isinstance(effect, Stops):
+            lower, upper, give = effect.lower, effect.upper, effect.give
+        kinds.append(slots.DEAD_ZONE)
+        sizes.append(2)
+        ends, anchors = [lower, upper], [lower, lower, upper]
+        data += [*ends, *ends, *anchors, *anchors, give, 1.0, give]
+        data += [1.0 / give if give else 0.0, 1.0, 1.0 / give if give else 0.0]
+    kind, first, size = (np.array(each, dtype=np.int64) for each in (kinds, firsts, sizes))
+    numbers = np.array(data, dtype=dtype)
+    return Stages(kind, first, size, numbers, kernels.tanh_tables(dtype), kernels.atanh_tables(dtype))
+
+
+def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]], roundoff: float) -> AgeingTables:
+    """Gains over travel."""
+    rows = [ageing.pieces(each) for each in parts.ageing]
+    last = [float(pieces[-1, ageing.BEGIN] + 1.0 / pieces[-1, ageing.INVERSE_LENGTH]) for pieces in rows]
+    numbers = [(1.0, 2.0, thermal.LEAST_GAIN, thermal.LARGEST_GAIN, end) for end in last]
+    return AgeingTables(
+        np.cumsum([0, *map(len, rows)]).astype(np.int64),
+        reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
+        reals(numbers, "travels of the ageing").reshape(-1, 5),
+        np.array([ageing.turns(each, span, roundoff) for each in parts.ageing], dtype=np.int64),
+    )
+
+
+def _heat(
+    parts: Parts,
+    ends: tuple[float, float],
+    span: float,
+    seconds: float,
+    reals: Callable[[Any, str], NDArray[Any]],
+    roundoff: float,
+) -> HeatTables:
+    """Gains over the temperature of own heat."""
+    return HeatTables(
+        reals([thermal.heat_numbers(each, span, seconds) for each in parts.heat], "temperatures").reshape(-1, 7),
+        np.array([thermal.heat_turns(each, ends, seconds, roundoff) for each in parts.heat], dtype=np.int64),
+    )
+
+
+def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> Compiled:
+    """The model in 'float32' or 'float64' at steps of `seconds`.
+
+    None of its effects is among the `refusals`. Raises FormatError when a
+    number does not fit the arithmetic.
+    """
+    dtype = ARITHMETICS[arithmetic].computed.type
+    largest = float(np.finfo(dtype).max) / 16
+    static, parts = chain.cascade, Parts.of(chain.effects)
+
+    def reals(values: Any, what: str) -> NDArray[Any]:
+        found = np.array(values, dtype=np.float64)
+        if found.size and not np.max(np.abs(found)) <= largest:
+            message = f"{what} reach {np.max(np.abs(found)):.3g}, too large for {arithmetic}"
+            raise FormatError((("model", "effects"), message))
+        return found.astype(dtype)
+
+    plays = build_float(dataclasses.replace(static, output_offset=0.0), arithmetic, "loop", True, True)
+    low, high = inward(*output_range(static, parts, seconds), dtype)
+    if not low < high:
+        raise FormatError((("input_range",), f"the range of the output is narrower than {arithmetic} can tell apart"))
+    plays.limits[slots.OUTPUT_MIN], plays.limits[slots.OUTPUT_MAX] = low, high
+
+    creeps = [creep.numbers(each, seconds) for each in parts.creeps]
+    rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in creeps]
+    lags = [lag.numbers(each, seconds) for each in parts.lags]
+    span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
+    taps = taps_of(parts, seconds, how)
+    ahead = how.preview if how.preview is not None else max(taps.ahead, 0) if taps else 0
+    rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
+    rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
+    lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
+    steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
+    weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
+    drives, outputs = ([own.linear(each, seconds) for each in side] for side in (parts.own_drives, parts.own_outputs))
+    lead *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
+    most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
+    reals([most], "intermediate results")
+    first = np.cumsum([0, *(len(one.terms) for one in creeps)])
+    max_rate = how.max_rate or drive_span / (SAMPLES_A_SWEEP * seconds)
+    tables = ChainTables(
+        plays,
+        plays.limits,
+        moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
+        LagTables(
+            np.array([int(exact) for exact, _ in lags], dtype=np.int64),
+            reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
+        ),
+        CreepTables(
+            reals(rows, "constants of the creep").reshape(len(rows), 4),
+            first.astype(np.int64),
+            reals(np.concatenate([np.empty((0, 4)), *(one.terms for one in creeps)]), "constants of the creep"),
+        ),
+        _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
+        reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
+        _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
+        reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
+        own.build(drives, outputs, reals),
+        _behind(parts, dtype),
+        reals(taps.weights if taps else [], "weights of the preview"),
+        reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
+        int(bool(rates)),
+    )
+    if drives or outputs:
+        tables = OwnChainTables(*tables)
+        tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
+    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview)

@@ -1,0 +1,250 @@
+"""What a model with effects is compiled to: constants in one arithmetic, and what they mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hystgen.chain.static import StaticModel
+from hystgen.compensator.chain import own, preview
+from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.compensator.chain.preview import Taps
+from hystgen.effects.ageing.compensator import AgeingTables
+from hystgen.effects.base import Effect, Place
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag.compensator import LagTables
+from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.front.tanh.kernels import AtanhTables, TanhTables
+from hystgen.parameters.schema import Compensation
+from hystgen.plays.slots import Counts, Reals
+
+OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
+"""Places in `ChainTables.number`: output offset, how far another one may be set, how far the drive may move in a step,
+and the share that verification corrects with."""
+
+LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS = range(5, 13)
+"""More of them in fixed point: bits of a signal behind the plays below an output code, those that a sum of the plays
+has beyond that, the largest sum that is asked of the plays, between which codes a drive is kept before it is limited,
+bits of a mantissa below a code, and bits of a signal in front of the plays below a drive code and below their input."""
+
+TRAVEL_BITS = 16
+"""In fixed point verification sets travels of whole multiples of 2^16 drive codes."""
+
+VERIFIED_SHARE = 0.125
+
+SAMPLES_A_SWEEP = 50
+"""A drive that takes no fewer samples from one end of its range to the other is what bounds are stated for: at a
+hundredth of the sample rate a triangle still has shape, and what ageing and contacts inside a step leave is small."""
+
+
+class Stages(NamedTuple):
+    """Memoryless stages, as `hystgen.front.stage.StageTables`."""
+
+    stage_kind: Counts
+    stage_first: Counts
+    stage_size: Counts
+    stage_data: Reals
+    tanh: TanhTables
+    atanh: AtanhTables
+
+
+class ChainTables(NamedTuple):
+    """The constants of one model with effects in one arithmetic.
+
+    `limits`: as in `Tables`, of the whole chain; `plays`: front and plays, in floating point with the same limits, in
+    fixed point with those of a drive that may have bits below a code, both without an offset; `behind`: saturation.
+    """
+
+    plays: Any  # `Tables` or `FixedTables`
+    limits: Reals
+    moving: Any  # `MovingTables` or `FixedMovingTables`
+    lag: LagTables
+    creep: CreepTables
+    ageing: AgeingTables
+    gain: Reals  # (k, 8)
+    heat: HeatTables
+    clock: Reals  # (k, 8)
+    own: OwnTables
+    behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
+    tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
+    number: Reals
+    slew: int  # 1 where the drive is kept within a rate
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is fixed point."""
+        return bool(self.plays.fixed)
+
+    @property
+    def threshold(self) -> Reals:
+        """As in `Tables`."""
+        threshold: Reals = self.plays.threshold
+        return threshold
+
+
+class OwnChainTables(ChainTables):
+    """The same of a model with effects of the user's own; their classes are those of `own`, in its order."""
+
+    own_effects: tuple[type[Effect], ...]
+
+    @property
+    def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
+        """What they are made of, in front of the plays and behind."""
+        blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
+        return blocks[: self.own.ahead], blocks[self.own.ahead :]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The effects of a model by what the chain makes of them, those in order that the chain meets one by one."""
+
+    lags: list[Any]
+    creeps: list[Any]
+    ageing: list[Any]
+    thermal: list[Any]
+    heat: list[Any]
+    drift: list[Any]
+    modes: list[Any]
+    saturations: list[Any]
+    slew: list[Any]
+    plays: list[Effect]
+    delay: float
+    own_drives: list[Effect]
+    own_outputs: list[Effect]
+
+    @classmethod
+    def of(cls, effects: Sequence[Effect]) -> Parts:
+        """Those of a chain's effects."""
+
+        def called(name: str) -> list[Any]:
+            return [effect for effect in effects if effect.name == name]
+
+        thermal_effects = called("thermal")
+        return cls(
+            [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
+            [each for each in thermal_effects if each.columns], [each for each in thermal_effects if not each.columns],
+            called("drift"), called("resonance"), called("saturation"), called("slew_limit"),
+            [effect for effect in effects if effect.place is Place.PLAYS],
+            math.fsum(each.time for each in called("delay")),
+            [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
+            [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Codes:
+    """What fixed point makes of a model with effects: physical units a code, bounds in codes, and ranges.
+
+    `forward_error` in output codes, `inverse_error` and the part of it on the same branch, `inverse_rounding`, in drive
+    codes; `limited`: whether that holds only while no drive is limited; `largest`: bound of every signal.
+    """
+
+    drive_lsb: Fraction
+    output_lsb: Fraction
+    forward_error: float
+    inverse_error: float
+    inverse_rounding: float
+    limited: bool
+    largest: int
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A model with effects as it is emitted: `tables` of the arithmetic, and the taps of the preview in double."""
+
+    tables: ChainTables
+    taps: Taps | None
+    parts: Parts
+    seconds: float
+    static: StaticModel
+    max_rate: float
+    asked: int | None = None
+    codes: Codes | None = None
+    """of fixed point"""
+
+    @property
+    def largest_step(self) -> float:
+        """Largest move of the drive in a step for which the bounds hold."""
+        low, high = self.static.input_range
+        return min(self.max_rate * self.seconds, high - low)
+
+    @property
+    def ahead(self) -> int:
+        """NAME_PREVIEW: what the model needs, or what was asked for."""
+        return self.needed if self.asked is None else self.asked
+
+    @property
+    def needed(self) -> int:
+        """Samples that the reference has to be ahead for the motion to be in time."""
+        return max(self.taps.ahead, 0) if self.taps else 0
+
+    @cached_property
+    def own(self) -> list[Linear]:
+        """Blocks of the user's own, in the order of `tables.own`."""
+        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+
+    @cached_property
+    def noise_gain(self) -> float:
+        """Largest gain, over all frequencies, from the reference to the drive, over that at rest."""
+        z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
+        gain = np.ones_like(z)
+        if self.taps:
+            gain = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
+        for each in self.parts.creeps:
+            one = creep.numbers(each, self.seconds)
+            rate, early, late, _ = one.terms.T[:, :, None]
+            states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
+            gain = gain * one.rest / (one.slope - float(np.sum(late)) + states)
+        for each in self.parts.lags:
+            exact, (rate, second, late, _) = lag.numbers(each, self.seconds)
+            if exact:
+                gain = gain * (1.0 - (1.0 - rate) * z) / (late + second * z)
+            else:
+                gain = gain * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
+        for block in self.own:
+            gain = gain * block.backward.response(z) * block.rest
+        return float(np.max(np.abs(gain)))
+
+
+def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:
+    """The weights of the reference that are asked for; None where it is taken as it comes."""
+    delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
+    modes = parts.modes if how.resonance == "inverse" else []
+    needed = preview.taps(delay, modes, seconds, how.taps, how.corner)
+    led = preview.led(needed, how.preview)
+    return led if len(led.weights) > 1 or led.first else None
+
+
+def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
+    """The sum of the plays once their input has gone straight to w from the start memory."""
+    pi = static.pi
+    r = np.array(pi.thresholds)
+    rows = np.clip(np.array(pi.start), w - r, w + r)[:, None]
+    rows[0] = w
+    for effect in effects:
+        if effect.bends_plays():
+            rows = effect.bent(rows, r)
+    return math.fsum((np.array(pi.weights) * rows[:, 0]).tolist())
+
+
+def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:
+    """Extremes of the settled output over every drive history inside the input range."""
+    low, high = (settled(static, parts.plays, end) for end in static.play_range)
+    for each in parts.creeps:
+        rest = creep.numbers(each, seconds).rest
+        low, high = low * rest, high * rest
+    for each in parts.own_outputs:
+        rest = own.linear(each, seconds).rest
+        low, high = low * rest, high * rest
+    for effect in parts.saturations:
+        low, high = (float(end) for end in effect.mapped(np.array([low, high]), None))
+    return low + static.output_offset, high + static.output_offset

@@ -1,0 +1,206 @@
+"""What a step of a model with effects does in fixed point, where signals are whole numbers finer than codes.
+
+In front of the plays a signal is in units of their input, behind them a fraction of an output code.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.arithmetic.factors import times
+from hystgen.basics.jit import jit
+from hystgen.compensator import step_fixed
+from hystgen.compensator.chain.layout import (
+    ARRIVING_BITS,
+    DRIVE_BITS,
+    LARGEST_LEVEL,
+    LEAST_CODE,
+    LEVEL_BITS,
+    LEVEL_DROP,
+    MOST_CODE,
+    SHARE_BITS,
+    TRAVEL_BITS,
+    ChainTables,
+)
+from hystgen.compensator.chain.moving import fixed_relaxing_follow
+from hystgen.compensator.chain.preview import Line
+from hystgen.compensator.chain.sides import Blocks
+from hystgen.compensator.chain.step import MOVING, ChainState, Codes
+from hystgen.compensator.layout import FixedTables
+from hystgen.effects.ageing.fixed import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
+from hystgen.effects.creep.fixed import creep_absorb, creep_rest, creep_resting, creep_solve
+from hystgen.effects.lag.fixed import lag_absorb, lag_rest, lag_solve
+from hystgen.effects.saturation.fixed import saturated, unsaturated
+from hystgen.effects.thermal.fixed import gain_absorb, gain_heat, gain_reset, gain_solve
+from hystgen.front import curve
+from hystgen.plays.fixed import loop_solve, nearest, over_slope
+from hystgen.plays.loop import loop_absorb, loop_output
+from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
+
+# ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
+
+
+@jit
+def front_forward(t: FixedTables, a: Any, ascending: int) -> Any:
+    """Input of the plays for what arrives in front of the memoryless part."""
+    return curve.front_forward(t, a, ascending) if t.fronts else a
+
+
+@jit
+def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
+    """What has to arrive for an input of the plays, and whether an envelope limits that."""
+    if t.fronts:
+        return curve.front_inverse(t, w, ascending)
+    return w, 0
+
+
+# ---------------------------------------------------------------- chain_plays_fixed.c or chain_relaxing_fixed.c
+
+
+@jit
+def started(t: ChainTables, s: ChainState) -> Any:
+    """The sum of the plays as they are set."""
+    return nearest(loop_output(t.plays, s.plays), t.number[LEVEL_DROP])
+
+
+@jit
+def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+    """The plays follow their input w; their sum."""
+    if t.moving.scanned and s.flags[MOVING]:
+        total = fixed_relaxing_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
+        return nearest(total, t.number[LEVEL_DROP])
+    loop_absorb(t.plays, s.plays, w)
+    return started(t, s)
+
+
+@jit
+def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+    """Input of the plays at which their sum is h."""
+    inside = h
+    if inside > t.number[LARGEST_LEVEL]:
+        inside = t.number[LARGEST_LEVEL]
+    elif inside < -t.number[LARGEST_LEVEL]:
+        inside = -t.number[LARGEST_LEVEL]
+    if t.moving.scanned and s.flags[MOVING]:
+        s.plays.play[0] = s.plays.play[1]
+        return loop_solve(t.moving.relaxed, s.plays, inside << t.number[LEVEL_DROP])
+    return loop_solve(t.plays, s.plays, inside << t.number[LEVEL_DROP])
+
+
+# ---------------------------------------------------------------- chain_finer.c or chain_whole.c
+
+
+@jit
+def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
+    """What has to arrive in front of the plays, with bits below their input w: what is left of h there, over the
+    slope."""
+    bits = t.number[ARRIVING_BITS]
+    if bits == 0:
+        return a
+    whole = a << bits
+    if h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL]:
+        return whole
+    left = h << t.number[LEVEL_DROP]
+    k = 1
+    for i in range(len(s.plays.play)):
+        low = w - t.plays.threshold[i]
+        high = w + t.plays.threshold[i]
+        play = s.plays.play[i]
+        z = play
+        if z > high:
+            z = high
+        if z < low:
+            z = low
+        if z != play:
+            k = i + 1
+        left = left - t.plays.weight[i] * z
+    size = -left if left < 0 else left
+    if size > t.plays.slope[k]:
+        return whole
+    more = over_slope(t.plays, size << bits, k)
+    return whole - more if left < 0 else whole + more
+
+
+# ---------------------------------------------------------------- preview_fixed.c
+
+
+@jit
+def preview_target(tap: Reals, line: Line) -> Any:
+    """The weighted sum of the oldest samples."""
+    total = zero(line.sample[0])
+    for i in range(len(tap)):
+        total = total + times(line.sample[i], tap[i, 0], tap[i, 1])
+    return total
+
+
+# ---------------------------------------------------------------- chain_fixed.c
+
+
+@jit
+def entered_drive(t: ChainTables, v: Any) -> Any:
+    """A drive code as a signal."""
+    return v << t.number[DRIVE_BITS]
+
+
+@jit
+def arriving(t: ChainTables, a: Any) -> Any:
+    """What arrives in front of the plays, in units of their input."""
+    return nearest(a, t.number[ARRIVING_BITS])
+
+
+@jit
+def entered_level(t: ChainTables, u: Any) -> Any:
+    """An output code as a signal."""
+    return u << t.number[LEVEL_BITS]
+
+
+@jit
+def drive_code(t: ChainTables, x: Any) -> Any:
+    """Drive code of a signal, kept near the range."""
+    code = nearest(x, t.number[DRIVE_BITS])
+    if code > t.number[MOST_CODE]:
+        return t.number[MOST_CODE]
+    if code < t.number[LEAST_CODE]:
+        return t.number[LEAST_CODE]
+    return code
+
+
+@jit
+def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:
+    """Output code of a signal, limited to the type, and its status."""
+    code = nearest(y, t.number[LEVEL_BITS])
+    if code > t.limits[CODE_MAX]:
+        return t.limits[CODE_MAX], OUTPUT_CLAMPED
+    if code < -t.limits[CODE_MAX]:
+        return -t.limits[CODE_MAX], OUTPUT_CLAMPED
+    return code, 0
+
+
+@jit
+def entered_travel(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in floating point
+    """A travel in drive codes for an argument that has no more bits than a code."""
+    return x << TRAVEL_BITS
+
+
+@jit
+def shared(t: ChainTables, share: Any, x: Any) -> Any:
+    """A share of a signal, given as a code of which 1 is one more than the largest."""
+    return times(x, share << t.number[SHARE_BITS], 31)
+
+
+BLOCKS = Blocks(
+    (lag_rest, lag_absorb, lag_solve),
+    (creep_rest, creep_absorb, creep_solve, creep_resting),
+    (ageing_absorb, ageing_solve),
+    (ageing_move, ageing_set, ageing_set_travel),
+    (gain_absorb, gain_solve),
+    (gain_reset, gain_heat),
+    (saturated, unsaturated),
+    preview_target,
+    (front_forward, front_inverse),
+    (follow, started, inverse_input),
+    finer,
+)
+CODES = Codes(
+    step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
+)  # fmt: skip

@@ -1,0 +1,123 @@
+"""What a step of a model with effects does in floating point, where every signal is a number of the same type."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator import step_float
+from hystgen.compensator.chain.layout import ChainTables, Stages
+from hystgen.compensator.chain.moving import (
+    PLAIN,
+    STRAIGHT,
+    moved_follow,
+    moved_input,
+    moved_rest,
+    relaxing_follow,
+    relaxing_input,
+)
+from hystgen.compensator.chain.preview import preview_target
+from hystgen.compensator.chain.sides import Blocks
+from hystgen.compensator.chain.step import MOVING, ChainState, Codes
+from hystgen.effects.ageing.compensator import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
+from hystgen.effects.creep.compensator import creep_absorb, creep_rest, creep_resting, creep_solve
+from hystgen.effects.lag.compensator import lag_absorb, lag_rest, lag_solve
+from hystgen.effects.thermal.compensator import gain_absorb, gain_heat, gain_reset, gain_solve
+from hystgen.front.compensator import front_forward, front_inverse
+from hystgen.plays.loop import loop_absorb, loop_output, loop_solve
+
+# ---------------------------------------------------------------- chain_plays.c, chain_relaxing.c or chain_moving.c
+
+
+@jit
+def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+    """The plays follow their input w; their sum."""
+    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
+        loop_absorb(t.plays, s.plays, w)
+        return loop_output(t.plays, s.plays)
+    r, p = t.plays.threshold, t.plays.weight
+    if t.moving.scanned:
+        if s.flags[MOVING]:
+            return relaxing_follow(t.moving, r, p, s.plays, w)
+        loop_absorb(t.plays, s.plays, w)
+        return loop_output(t.plays, s.plays)
+    if s.flags[MOVING]:
+        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
+
+
+@jit
+def started(t: ChainTables, s: ChainState) -> Any:
+    """The sum of the plays as they are set."""
+    if t.moving.scanned or (t.moving.moves == PLAIN and t.moving.bends == STRAIGHT):
+        return loop_output(t.plays, s.plays)
+    r, p = t.plays.threshold, t.plays.weight
+    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.plays.play[0])
+
+
+@jit
+def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+    """Input of the plays at which their sum is h."""
+    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
+        return loop_solve(t.plays, s.plays, h)
+    r, p = t.plays.threshold, t.plays.weight
+    if t.moving.scanned:
+        if s.flags[MOVING]:
+            return relaxing_input(t.moving, r, p, s.plays, h)
+        return loop_solve(t.plays, s.plays, h)
+    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.flags[MOVING] != 0, h)
+
+
+# ---------------------------------------------------------------- chain_float.c
+
+
+@jit(inline=True)
+def saturated(t: Stages, x: Any) -> Any:
+    """What saturates makes of x."""
+    return front_forward(t, x, 1)
+
+
+@jit(inline=True)
+def unsaturated(t: Stages, y: Any) -> tuple[Any, int]:
+    """What gives y behind what saturates, and whether nothing does."""
+    return front_inverse(t, y, 1)
+
+
+@jit(inline=True)
+def entered(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """A number of the caller's, as a signal."""
+    return x
+
+
+@jit(inline=True)
+def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """What has to arrive in front of the plays."""
+    return a
+
+
+@jit(inline=True)
+def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:  # noqa: ARG001  as in fixed point
+    """A displacement as it is given to the caller, and its status."""
+    return y, 0
+
+
+@jit(inline=True)
+def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """A share of x."""
+    return share * x
+
+
+BLOCKS = Blocks(
+    (lag_rest, lag_absorb, lag_solve),
+    (creep_rest, creep_absorb, creep_solve, creep_resting),
+    (ageing_absorb, ageing_solve),
+    (ageing_move, ageing_set, ageing_set_travel),
+    (gain_absorb, gain_solve),
+    (gain_reset, gain_heat),
+    (saturated, unsaturated),
+    preview_target,
+    (front_forward, front_inverse),
+    (follow, started, inverse_input),
+    finer,
+)
+CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

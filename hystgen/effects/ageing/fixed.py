@@ -1,0 +1,148 @@
+"""The gain that ageing leaves in fixed point, over a travel in drive codes that is counted exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hystgen.arithmetic.factors import LARGEST as MOST
+from hystgen.arithmetic.factors import factor, times
+from hystgen.basics.jit import jit
+from hystgen.effects.ageing import compensator as floating
+from hystgen.effects.ageing.compensator import GAIN, HIGH, INVERSE, LAST, AgeingState, AgeingTables
+from hystgen.effects.base import Array
+from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, reciprocal
+from hystgen.plays.slots import zero
+
+SHARE_BITS = 20
+"""Fraction bits of the share of a piece: a gain changes along one by a hundredth, so that it has 27."""
+
+LONGEST = 2**61
+"""Drive codes that a travel is counted to at most."""
+
+
+KIND = Kind(
+    "ageing", rows=Rows("piece", letters="wfbc"), counts=("n", "turns", "bits"), flags=("own",), reading=(),
+    own=("solve", "absorb"), letters="w", memory="wii",
+)  # fmt: skip
+
+
+def constants(t: AgeingTables) -> Iterator[Constants]:
+    """The numbers of each gain."""
+    for each, number in zip(floating.constants(t), t.number, strict=True):
+        yield replace(each, kind=KIND, table=number[-1:], counts=(*each.counts, int(number[0])))
+
+
+def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
+    """Pieces and steps of Newton's of each ageing, for drive codes of `lsb`; `bits`: of a gain below a code that sets
+    it. Raises OverflowError."""
+    piece: list[list[int]] = []
+    number: list[list[int]] = []
+    for pieces, _ in rows:
+        for row in pieces.tolist():
+            length = 1.0 / row[floating.INVERSE_LENGTH] / lsb
+            drop = max(0, round(length).bit_length() + 1 - (MOST.bit_length() - 1))
+            begin = round(row[floating.BEGIN] / lsb)
+            if begin + length >= LONGEST:
+                raise OverflowError("no room")
+            curve = [round(c * ONE) for c in row[floating.C0 :]]
+            piece.append([begin, *factor(2.0**SHARE_BITS / length * 2.0**drop), drop, *curve])
+        last = pieces[-1, floating.BEGIN] + 1.0 / pieces[-1, floating.INVERSE_LENGTH]
+        number.append([bits, 0, 0, 0, round(last / lsb)])
+    first = np.cumsum([0, *(len(pieces) for pieces, _ in rows)]).astype(np.int64)
+    return AgeingTables(
+        first,
+        np.array(piece, dtype=np.int64).reshape(-1, 8),
+        np.array(number, dtype=np.int64).reshape(-1, 5),
+        np.array([turns for _, turns in rows], dtype=np.int64),
+    )
+
+
+# ---------------------------------------------------------------- ageing_fixed.c
+
+BEGIN, SHARE, DROP, C0 = 0, 1, 3, 4
+BITS = 0
+
+
+@jit
+def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
+    """The gain after a travel, from the piece that it lies in; behind the last one it stays."""
+    low = t.first[j]
+    high = t.first[j + 1]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if travel >= t.piece[middle, BEGIN]:
+            low = middle
+        else:
+            high = middle
+    share = times((travel - t.piece[low, BEGIN]) >> t.piece[low, DROP], t.piece[low, SHARE], t.piece[low, SHARE + 1])
+    if share > 1 << SHARE_BITS:
+        share = zero(share) + (1 << SHARE_BITS)
+    gain = zero(share)
+    for k in range(C0 + 3, C0 - 1, -1):
+        gain = t.piece[low, k] + ((gain * share + (1 << (SHARE_BITS - 1))) >> SHARE_BITS)
+    return gain
+
+
+@jit
+def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
+    """The travel from the next step on; whether it had to be limited."""
+    inside = travel
+    if inside < 0:
+        inside = zero(travel)
+    elif inside > t.number[j, LAST]:
+        inside = t.number[j, LAST]
+    s.block[j, HIGH] = inside
+    s.own[j] = 1
+    s.block[j, GAIN] = ageing_gain(t, j, inside)
+    s.block[j, INVERSE] = reciprocal(s.block[j, GAIN])
+    return bool(inside != travel)
+
+
+@jit
+def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
+    """A gain in place of the travel's, from the next step on; whether it had to be limited."""
+    given = gain << t.number[j, BITS]
+    inside = given
+    if inside < LEAST:
+        inside = zero(given) + LEAST
+    elif inside > LARGEST:
+        inside = zero(given) + LARGEST
+    s.own[j] = 0
+    s.block[j, GAIN] = inside
+    s.block[j, INVERSE] = reciprocal(inside)
+    return bool(inside != given)
+
+
+@jit
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
+    """The drive has moved by `way`, either sign."""
+    following = s.block[j, HIGH] + (way if way >= 0 else -way)
+    if following > t.number[j, LAST]:
+        following = t.number[j, LAST]
+    s.block[j, HIGH] = following
+    if s.own[j]:
+        gain = ageing_gain(t, j, following)
+        inverse = s.block[j, INVERSE]
+        half = 1 << (GAIN_BITS - 1)
+        for _ in range(t.turns[j]):
+            product = (gain * inverse + half) >> GAIN_BITS
+            inverse = (inverse * (2 * ONE - product) + half) >> GAIN_BITS
+        s.block[j, GAIN] = gain
+        s.block[j, INVERSE] = inverse
+
+
+@jit
+def ageing_solve(s: AgeingState, j: int, y: Any) -> Any:
+    """The input that gives the output y."""
+    return times(y, s.block[j, INVERSE], GAIN_BITS)
+
+
+@jit
+def ageing_absorb(s: AgeingState, j: int, x: Any) -> Any:
+    """The output for the input x."""
+    return times(x, s.block[j, GAIN], GAIN_BITS)

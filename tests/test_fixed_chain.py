@@ -1,0 +1,278 @@
+"""Models with effects in q31 and q15: their bounds, no overflow whatever is called, no stall and no cycle."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
+
+from hystgen.arithmetic import ARITHMETICS, factors
+from hystgen.basics import jit
+from hystgen.compensator import reference
+from hystgen.compensator.chain import tables
+from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+from hystgen.compensator.chain.layout import Codes, Compiled
+from hystgen.compensator.chain.run import answers
+from hystgen.compensator.chained import Compensator
+from hystgen.effects import Run
+from hystgen.emission import module
+from hystgen.emission.calls import emit_options
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.schema import Compensation
+from hystgen.plays import slots
+from hystgen.verification import sources
+
+T, N = 1e-3, 1500
+FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
+BOTH = pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+
+
+def model(text: str) -> Model:
+    one = parse_parameters(text, "fixed.yaml")
+    how = Compensation(noise_gain=1e9)
+    return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
+
+
+def compiled(one: Model, arithmetic: str) -> tuple[Compiled, Codes]:
+    found = tables.build(one.chain, arithmetic, T)
+    assert found.codes is not None
+    return found, found.codes
+
+
+def test_factors_are_multiplied_like_fractions() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(3000):
+        exact = float(rng.choice([-1.0, 1.0]) * 2.0 ** rng.uniform(-60.0, 9.99))
+        mantissa, shift = factors.factor(exact)
+        assert abs(Fraction(mantissa, 2**shift) - Fraction(exact)) <= Fraction(abs(exact)) / 2**31 + Fraction(1, 2**83)
+        x = int(rng.choice([-1, 1])) * (int(2.0 ** rng.uniform(0.0, 51.0)) - 1)
+        with jit.plain():
+            found = int(factors.times(np.int64(x), np.int64(mantissa), np.int64(shift)))
+        assert abs(found - x * Fraction(mantissa, 2**shift)) <= Fraction(1, 2)
+    with pytest.raises(OverflowError, match="no factor below 1024"):
+        factors.factor(1024.0)
+
+
+def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, Run]:
+    """A smooth reference with plateaus in codes, over a share of the output range, and the same in physical units."""
+    rng = np.random.default_rng(seed)
+    low, high = (float(end) for end in one.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    still = rng.random(N) < 0.2
+    still[N // 2 : N // 2 + 100] = True
+    phase = np.cumsum(np.where(still, 0.0, rng.uniform(0.0, 0.03, N)))
+    u = np.rint(0.5 * (low + high) + 0.5 * share * (high - low) * np.sin(phase))
+    y = u * float(codes.output_lsb)
+    degree = 2.0 ** TEMPERATURE_BITS[int(one.tables.limits[slots.CODE_MAX]).bit_length()]
+    warm = np.rint((20.0 + y) * degree)
+    t = np.arange(N) * T
+    return Run(t, u, {"temperature": warm}), Run(t, y, {"temperature": warm / degree})
+
+
+BRANCHED = ("lagging", "aged", "everything", "relaxing")
+"""Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
+
+
+@pytest.mark.parametrize("name", FIXED)
+@BOTH
+@pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
+def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: float) -> None:
+    """Against the compensator and the chain in double precision, which share no code with it."""
+    one = model(CHAINS[name])
+    numbers, codes = compiled(one, arithmetic)
+    given, exact = record(numbers, codes, seed, share)
+    drive = float(codes.drive_lsb)
+    v = answers(numbers, given, True).astype(float)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
+    left = np.abs(v - wanted)[: N - numbers.ahead]
+    assert np.max(left) <= codes.inverse_error
+    limited = np.any(np.abs(np.diff(v)) >= max(numbers.tables.number[2:4])) if numbers.tables.slew else False
+    if name not in BRANCHED and not limited:
+        assert np.max(left) <= codes.inverse_rounding
+    if name not in INVERSE_ALONE:
+        forward = answers(numbers, Run(given.t, v, given.extra), False).astype(float)
+        y = one.simulate(v * drive, t=given.t, extra=exact.extra) / float(codes.output_lsb)
+        assert np.max(np.abs(forward - y)) <= codes.forward_error
+
+
+@BOTH
+def test_branches_are_mostly_the_same(arithmetic: str) -> None:
+    """With two branches nine tenths of the samples are as near as one branch promises."""
+    one = model(CHAINS["lagging"])
+    numbers, codes = compiled(one, arithmetic)
+    given, exact = record(numbers, codes, 5, 0.5)
+    drive = float(codes.drive_lsb)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    left = np.abs(answers(numbers, given, True) - Compensator(one.chain).drives(exact, ends) / drive)  # type: ignore[arg-type]
+    assert np.quantile(left, 0.9) <= codes.inverse_rounding < 0.1 * codes.inverse_error
+
+
+OPERATIONS = {
+    "settle": slots.OP_SETTLE, "set_offset": slots.OP_OFFSET, "set_temperature": slots.OP_TEMPERATURE,
+    "set_gain": slots.OP_GAIN, "set_travel": slots.OP_TRAVEL, "travel": slots.OP_TRAVELLED,
+    "expected": slots.OP_EXPECTED, "correct": slots.OP_CORRECT, "push": slots.OP_PUSH,
+}  # fmt: skip
+
+MAIN = """#include <stdio.h>
+#include <stdlib.h>
+#include "{name}.h"
+void hystgen_harness_{op}(const unsigned char *call, const {name}_real_t *x, {name}_real_t *answer,
+    unsigned char *status, size_t count);
+int main(int count, char **given)
+{{
+    const size_t n = (size_t)atol(given[count - 1]);
+    unsigned char *call = malloc(n), *status = malloc(n);
+    {name}_real_t *x = malloc(n * sizeof *x), *answer = malloc(n * sizeof *answer);
+    if (fread(call, 1, n, stdin) != n || fread(x, sizeof *x, n, stdin) != n) {{
+        return 2;
+    }}
+    hystgen_harness_{op}(call, x, answer, status, n);
+    fwrite(answer, sizeof *answer, n, stdout);
+    fwrite(status, 1, n, stdout);
+    return 0;
+}}
+"""
+
+
+def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int) -> tuple[Any, Any]:
+    """Calls in any order; codes at random, at the ends, from end to end, and those of a walk."""
+    op = rng.choice(kinds, n).astype(np.uint8)
+    op[rng.random(n) < 0.0005] = slots.OP_INIT
+    info = np.iinfo(real)
+    walk = (info.max * np.sin(np.cumsum(rng.normal(0.0, 0.1, n)))).astype(np.int64)
+    ends = np.array([info.min, info.min + 1, -1, 0, 1, info.max - 1, info.max])
+    kind = (np.arange(n) // 1000) % 4
+    x = np.select(
+        [kind == 0, kind == 1, kind == 2],
+        [rng.integers(info.min, info.max, n, endpoint=True), rng.choice(ends, n), rng.choice(ends[[0, -1]], n)],
+        walk,
+    )
+    return op, x.astype(real)
+
+
+@pytest.mark.parametrize("name", FIXED)
+@BOTH
+def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc and its sanitizers are not installed")
+    one = model(CHAINS[name])
+    own = one.name
+    options = emit_options(one, "inverse" if name in INVERSE_ALONE else "both", arithmetic)
+    written = sources.write(tmp_path, one, options)
+    calls = module.calls_of(one.parameters, one.cascade, options)
+    real, numbers, n = ARITHMETICS[arithmetic].number, one.tables(arithmetic, "loop"), 20_000
+    for op in written.operators:
+        (tmp_path / f"main_{op}.c").write_text(MAIN.format(name=own, op=op))
+        flags = ["-std=c99", "-g", "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-I", tmp_path]
+        files = [*written.module, written.harness, tmp_path / f"main_{op}.c"]
+        subprocess.run(["gcc", *flags, *files, "-o", tmp_path / op], check=True)
+        kinds = [slots.OP_STEP] * 6 + [slots.OP_RESET] + [OPERATIONS[call] for call in calls[op]]
+        kinds += [slots.OP_COMMIT] * (op == "inverse")
+        call, x = wild(np.random.default_rng(5), kinds, real, n)
+        done = subprocess.run([tmp_path / op, str(n)], input=call.tobytes() + x.tobytes(), capture_output=True)
+        assert done.returncode == 0, done.stderr.decode()
+        answer = np.frombuffer(done.stdout, real, n)
+        status = np.frombuffer(done.stdout[n * real.itemsize :], np.uint8)
+        wanted, bits = reference.answers(numbers, op == "inverse", call, x)
+        assert np.array_equal(answer, wanted.astype(real))
+        assert np.array_equal(status, bits)
+
+
+@BOTH
+@pytest.mark.parametrize("name", ["everything", "worn", "quick", "warm"])
+def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every factor of a product stays below 2^51, and every sum below 2^63, in Python's own whole numbers."""
+    one = model(CHAINS[name])
+    numbers = one.tables(arithmetic, "loop")
+    inverse = name in INVERSE_ALONE
+    kinds = [slots.OP_STEP] * 6 + [slots.OP_RESET, slots.OP_SETTLE, slots.OP_OFFSET]
+    kinds += [slots.OP_TEMPERATURE] * (len(numbers.gain) > 0)
+    kinds += [slots.OP_GAIN, slots.OP_TRAVEL] * (len(numbers.ageing.turns) > 0)
+    call, x = wild(np.random.default_rng(8), kinds, ARITHMETICS[arithmetic].number, 4000)
+    plain = factors.times.py_func
+    largest = 0
+
+    def watched(value: Any, mantissa: Any, shift: Any) -> Any:
+        nonlocal largest
+        largest = max(largest, abs(int(value)))
+        return plain(value, mantissa, shift)
+
+    monkeypatch.setattr(factors.times, "py_func", watched)
+    with np.errstate(over="raise"):
+        reference.answers(numbers, inverse, call, x, compiled=False)
+    assert 2**30 < largest < factors.LARGEST
+
+
+@BOTH
+@pytest.mark.parametrize("bits", [20, 28])
+def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None:
+    """tau/T of 2^20 and 2^28: after a step of the drive the state goes where it would go without rounding."""
+    tau = 2.0**bits * T
+    one = model(chain("slow", f"name: creep, time_constants: [{tau}], weights: [0.1]"))
+    numbers, codes = compiled(one, arithmetic)
+    n = 1_000_000
+    v = np.full(n, round(3.0 / float(codes.drive_lsb)))
+    v[0] = -v[0]
+    y, _ = reference.answers(numbers.tables, False, np.full(n, slots.OP_STEP, dtype=np.uint8), v)
+    h = one.without(one.effects).simulate(v * float(codes.drive_lsb)) - one.cascade.output_offset
+    moved = -0.1 * float(h[-1] - h[0]) * math.expm1(-(n - 1) * T / tau) / float(codes.output_lsb)
+    assert moved > 10.0
+    assert abs((float(y[-1]) - float(y[1])) - moved) <= 1.0 + 2e-6 * moved
+
+
+STILL = {
+    "creep": ("name: creep, time_constants: [0.01, 0.1, 0.3], weights: [0.02, 0.03, 0.05]",),
+    "lag": ("name: lag, time_constant: 0.01",),
+    "exact": ("name: lag, time_constant: 4.0e-4",),
+    "lag_and_creep": ("name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]"),
+}
+
+
+@BOTH
+@pytest.mark.parametrize("name", STILL)
+def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
+    """Creep, once it is within rounding, ends in no change at all; behind a lag a code either way is left."""
+    one = model(chain("still", *STILL[name]))
+    numbers, _ = compiled(one, arithmetic)
+    low, high = (int(end) for end in numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    n = 12_000
+    allowed = {"creep": 0, "lag": 2, "exact": 1, "lag_and_creep": 2}[name]
+    for share in np.random.default_rng(0).uniform(0.15, 0.85, 6):
+        u = np.full(n, int(low + (high - low) * share))
+        u[:200] = (low + (high - low) * (0.5 + 0.3 * np.sin(0.1 * np.arange(200)))).astype(int)
+        v, _ = reference.answers(numbers.tables, True, np.full(n, slots.OP_STEP, dtype=np.uint8), u)
+        assert np.ptp(v[-2000:]) <= allowed
+
+
+@BOTH
+def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
+    """Whatever was applied, the next reference is reached to the bound of a step at rest."""
+    one = model(CHAINS["creeping"])
+    numbers, codes = compiled(one, arithmetic)
+    rng = np.random.default_rng(3)
+    u = np.rint(3.0 * np.sin(0.02 * np.arange(800)) / float(codes.output_lsb)).astype(np.int64)
+    calls: list[tuple[int, int]] = []
+    low, high = (int(end) for end in numbers.tables.limits[:2])
+    for k, each in enumerate(u.tolist()):
+        calls.append((slots.OP_STEP, each))
+        if k % 7 == 3:
+            calls.append((slots.OP_COMMIT, int(rng.integers(low, high) * 3 // 4)))
+    op, x = (np.array(column) for column in zip(*calls, strict=True))
+    answer, _ = reference.answers(numbers.tables, True, op.astype(np.uint8), x)
+    applied, free = [], []
+    for i, (each, _) in enumerate(calls):
+        if each == slots.OP_STEP:
+            committed = i + 1 < len(calls) and calls[i + 1][0] == slots.OP_COMMIT
+            applied.append(float(calls[i + 1][1] if committed else answer[i]))
+            free.append(not committed)
+    y = one.simulate(np.array(applied) * float(codes.drive_lsb)) / float(codes.output_lsb)
+    slope = one.cascade.pi.slopes[-1] * float(codes.drive_lsb / codes.output_lsb)
+    assert np.max(np.abs(y - u)[np.array(free)]) <= codes.forward_error + slope
