@@ -440,5 +440,5 @@ def test_a_block_says_what_it_does_to_signals() -> None:
 def test_emit_options_take_it(tmp_path: Path) -> None:
     one = hystgen.load(written(tmp_path, DROOP), [EXAMPLE])
     assert emit_options(one).left_out == ()
-    with pytest.raises(UnsupportedEffectsError, match="not in q15"):
+    with pytest.raises(UnsupportedEffectsError, match="whose block is in floating point; use float32"):
         emit_options(one, arithmetic="q15")
