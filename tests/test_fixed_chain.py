@@ -76,6 +76,13 @@ def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, R
     return Run(t, u, {"temperature": warm}), Run(t, y, {"temperature": warm / degree})
 
 
+STILL = {
+    "creep": ("name: creep, time_constants: [0.01, 0.1, 0.3], weights: [0.02, 0.03, 0.05]",),
+    "lag": ("name: lag, time_constant: 0.01",),
+    "exact": ("name: lag, time_constant: 4.0e-4",),
+    "lag_and_creep": ("name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]"),
+}
+
 BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
@@ -94,13 +101,63 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
-    limited = np.any(np.abs(np.diff(v)) >= max(numbers.tables.number[2:4])) if numbers.tables.slew else False
-    if name not in BRANCHED and not limited:
+    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything"))
+    if name not in BRANCHED and not codes.condition:
         assert np.max(left) <= codes.inverse_rounding
     if name not in INVERSE_ALONE:
         forward = answers(numbers, Run(given.t, v, given.extra), False).astype(float)
         y = one.simulate(v * drive, t=given.t, extra=exact.extra) / float(codes.output_lsb)
         assert np.max(np.abs(forward - y)) <= codes.forward_error
+
+
+@pytest.mark.parametrize("name", ["lag", "exact", "lag_and_creep"])
+@BOTH
+def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
+    one = model(chain("led", *STILL[name]))
+    numbers, codes = compiled(one, arithmetic)
+    drive = float(codes.drive_lsb)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    for seed in range(3):
+        given, exact = record(numbers, codes, seed, 0.5)
+        v = answers(numbers, given, True).astype(float)
+        wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
+        assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits[slots.DRIVE_MAX]
+        assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
+
+
+@pytest.mark.parametrize("name", [name for name in FIXED if name not in BRANCHED])
+@BOTH
+def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
+    """Whatever is limited: each answer of the tables in float64, to which the drives are committed that were sent."""
+    one = model(CHAINS[name])
+    numbers, codes = compiled(one, arithmetic)
+    double = tables.build(one.chain, "float64", T)
+    given, exact = record(numbers, codes, 7, 1.2)
+    op, x, y = [], [], []
+    v = np.empty(N)
+    ahead = numbers.ahead
+    for k in range(N):
+        warm = len(numbers.tables.gain) > 0
+        rows = [(slots.OP_TEMPERATURE, given.extra["temperature"][k], exact.extra["temperature"][k])] * warm
+        rows += [(slots.OP_PUSH if k < ahead else slots.OP_STEP, given.v[k], exact.v[k])]
+        for row in rows:
+            op.append(row[0])
+            x.append(row[1])
+            y.append(row[2])
+    calls = np.array(op, dtype=np.uint8)
+    v, _ = reference.answers(numbers.tables, True, calls, np.array(x))
+    drive = float(codes.drive_lsb)
+    asked, given_to = [], []
+    for call, value, answer in zip(op, y, v.tolist(), strict=True):
+        asked.append(call)
+        given_to.append(value)
+        if call == slots.OP_STEP:
+            asked.append(slots.OP_COMMIT)
+            given_to.append(answer * drive)
+    w, _ = reference.answers(double.tables, True, np.array(asked, dtype=np.uint8), np.array(given_to))
+    low, high = numbers.tables.limits[:2]
+    wanted = np.clip(w[np.array(asked) == slots.OP_STEP] / drive, low, high)
+    assert np.max(np.abs(v[calls == slots.OP_STEP] - wanted)) <= codes.inverse_rounding
 
 
 @BOTH
@@ -226,14 +283,6 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
     moved = -0.1 * float(h[-1] - h[0]) * math.expm1(-(n - 1) * T / tau) / float(codes.output_lsb)
     assert moved > 10.0
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 1.0 + 2e-6 * moved
-
-
-STILL = {
-    "creep": ("name: creep, time_constants: [0.01, 0.1, 0.3], weights: [0.02, 0.03, 0.05]",),
-    "lag": ("name: lag, time_constant: 0.01",),
-    "exact": ("name: lag, time_constant: 4.0e-4",),
-    "lag_and_creep": ("name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]"),
-}
 
 
 @BOTH

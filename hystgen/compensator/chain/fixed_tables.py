@@ -145,7 +145,7 @@ class _Builder:
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
-            bounds.limited, math.ceil(self.sizes.largest * 2**self.bits),
+            bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
         max_rate = self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)
         return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)

@@ -18,8 +18,8 @@ from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers,
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
-STATE_BITS = 61
-"""Bits of a state without its sign."""
+STATE_BITS = 60
+"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
 
 GUARD = 3
 """Bits of a state below the last one in which it stalls: a dead band of at most 1/16 of a signal's last bit."""

@@ -18,8 +18,8 @@ from hystgen.effects.lag.compensator import LagTables
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
-STATE_BITS = 61
-"""Bits of a state without its sign."""
+STATE_BITS = 60
+"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
 
 GUARD = 3
 """Bits of a state below the last one in which it stalls."""
