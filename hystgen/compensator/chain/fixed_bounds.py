@@ -9,7 +9,7 @@ of the plays and in output codes behind them.
 A lag that is led follows its target but for a second difference, so that plays behind it have not seen what they were
 solved for: what they remember differs with the drives, and the lead makes more of that, without a bound but the range
 of the drive. `rounding` is then the difference from a compensator in double precision that has seen the same drives;
-behind a memoryless part while none was limited, since there is nothing beyond the drive's range to which to lead.
+behind a memoryless part while nothing is limited, since there is nothing beyond the drive's range to which to lead.
 """
 
 from __future__ import annotations
@@ -326,7 +326,7 @@ class Bounds:
         led = any(not exact for exact, _ in self.lags)
         if not (led or (self.lags and (not self.reached or self.parts.slew))):
             return ""
-        return "both have seen the same drives" + (", none limited" if not self.reached else "")
+        return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
 
     def rounding(self) -> float:
         """Of the inverse, in drive codes, on the same branch, and under its `condition`."""
