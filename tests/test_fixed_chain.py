@@ -71,9 +71,9 @@ def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, R
     u = np.rint(0.5 * (low + high) + 0.5 * share * (high - low) * np.sin(phase))
     y = u * float(codes.output_lsb)
     degree = 2.0 ** TEMPERATURE_BITS[int(one.tables.limits[slots.CODE_MAX]).bit_length()]
-    warm = np.rint((20.0 + y) * degree)
+    extra = {"temperature": np.rint((20.0 + y) * degree) / degree}
     t = np.arange(N) * T
-    return Run(t, u, {"temperature": warm}), Run(t, y, {"temperature": warm / degree})
+    return Run(t, u, extra), Run(t, y, extra)
 
 
 STILL = {
@@ -136,9 +136,11 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
     op, x, y = [], [], []
     v = np.empty(N)
     ahead = numbers.ahead
+    bits = int(numbers.tables.limits[slots.CODE_MAX]).bit_length()
     for k in range(N):
         warm = len(numbers.tables.gain) > 0
-        rows = [(slots.OP_TEMPERATURE, given.extra["temperature"][k], exact.extra["temperature"][k])] * warm
+        degree = exact.extra["temperature"][k]
+        rows = [(slots.OP_TEMPERATURE, degree * 2.0 ** TEMPERATURE_BITS[bits], degree)] * warm
         rows += [(slots.OP_PUSH if k < ahead else slots.OP_STEP, given.v[k], exact.v[k])]
         for row in rows:
             op.append(row[0])
@@ -325,3 +327,14 @@ def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
     y = one.simulate(np.array(applied) * float(codes.drive_lsb)) / float(codes.output_lsb)
     slope = one.cascade.pi.slopes[-1] * float(codes.drive_lsb / codes.output_lsb)
     assert np.max(np.abs(y - u)[np.array(free)]) <= codes.forward_error + slope
+
+
+def test_the_reference_takes_codes_and_degrees() -> None:
+    one = Model(parse_parameters(CHAINS["warm"], "warm.yaml"))
+    with pytest.raises(ValueError, match="fixed point takes codes, whole numbers from -32768 to 32767"):
+        one.simulate([0.5], "q15", extra={"temperature": [20.0]})
+    numbers, codes = compiled(one, "q15")
+    y = one.inverse().simulate([8000, 8000], "q15", extra={"temperature": [20.0, 60.0]}) * float(codes.drive_lsb)
+    exact = one.inverse().simulate([8000 * float(codes.output_lsb)] * 2, extra={"temperature": [20.0, 60.0]})
+    assert np.max(np.abs(y - exact)) <= codes.inverse_error * float(codes.drive_lsb)
+    assert numbers.tables.fixed

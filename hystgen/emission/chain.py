@@ -78,13 +78,6 @@ class Block:
         return f"hystgen_{self.kind}_{verb}({', '.join([*given, x])})"
 
 
-_FIXED_TABLE = {
-    "creep": ("rest", "resting", "solve", "absorb"),
-    "lag": ("rest", "solve", "absorb"),
-    "lag_exact": ("rest", "solve", "absorb"),
-    "gain": (),
-    "ageing": (),
-}
 _TABLE = {
     "creep": ("rest", "resting", "solve", "absorb"),
     "lag": ("solve", "absorb"),
@@ -93,6 +86,9 @@ _TABLE = {
     "ageing": (),
 }
 """Verbs of a block that read its table."""
+
+_FIXED_TABLE = _TABLE | dict.fromkeys(("lag", "lag_exact"), ("rest", "solve", "absorb"))
+"""In fixed point, where states of a lag have bits below a signal's."""
 
 
 def _entries(values: Iterable[float]) -> str:
