@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import subprocess
 from fractions import Fraction
@@ -23,7 +24,7 @@ from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.emission import module
-from hystgen.emission.calls import emit_options
+from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.parameters.schema import Compensation
@@ -338,3 +339,13 @@ def test_the_reference_takes_codes_and_degrees() -> None:
     exact = one.inverse().simulate([8000 * float(codes.output_lsb)] * 2, extra={"temperature": [20.0, 60.0]})
     assert np.max(np.abs(y - exact)) <= codes.inverse_error * float(codes.drive_lsb)
     assert numbers.tables.fixed
+
+
+@BOTH
+def test_the_selftest_goes_all_over_the_range(arithmetic: str) -> None:
+    text = emitted_files(model(CHAINS["lagging"]), arithmetic=arithmetic)["lagging_selftest.c"]
+    codes = [int(each) for each in re.findall(r"\{'s', \(?(-?\d+)", text)]
+    most = ARITHMETICS[arithmetic].code_max
+    assert len(set(codes)) > 100
+    assert max(codes) > 0.9 * most
+    assert min(codes) < -0.9 * most

@@ -195,13 +195,30 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 
 def chain_products(t: ChainTables) -> dict[str, int]:
-    """Multiplications of the blocks of a model with effects in one step, of each operator."""
+    """Multiplications of the blocks of a model with effects in one step, of each operator; in fixed point a product of
+    a signal takes two."""
+    if t.fixed:
+        return _fixed_products(t)
     lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
     gains = len(t.gain) + len(t.ageing.turns)
-    kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
-    stages = len(kinds) + kinds.count(slots.TANH) * (t.behind.coefficient.shape[1] - 1 if t.fixed else 1)
+    envelopes = sum(int(kind) == slots.TANH for kind in t.behind.stage_kind)
+    stages = len(t.behind.stage_kind) + envelopes
     absorbed = 3 * lags + creeps + 5 * states + gains + sum(4 + 2 * int(n) for n in t.ageing.turns)
     return {"forward": absorbed + stages, "inverse": absorbed + 2 * lags + creeps + gains + stages + len(t.tap)}
+
+
+def _fixed_products(t: ChainTables) -> dict[str, int]:
+    lags, creeps, states = len(t.lag.block), len(t.creep.block), len(t.creep.term)
+    gains = len(t.gain) + len(t.ageing.turns)
+    curves = [int(kind) == slots.TANH for kind in t.behind.kind]
+    stages = sum(t.behind.coefficient.shape[1] if curve else 2 for curve in curves)
+    ageing = sum(6 + 2 * int(n) for n in t.ageing.turns)
+    viscous = 4 * (len(t.threshold) - 1) * t.moving.used
+    absorbed = 2 * (4 * lags + creeps + 3 * states + gains) + ageing + viscous
+    return {
+        "forward": absorbed + stages,
+        "inverse": absorbed + 2 * (2 * lags + creeps + gains + len(t.tap)) + stages,
+    }
 
 
 def _memory(

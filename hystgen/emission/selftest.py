@@ -43,7 +43,7 @@ def operators(numbers: Tables | FixedTables, options: Options) -> list[dict[str,
 def _samples(numbers: Tables | FixedTables, inverse: bool) -> list[dict[str, Any]]:
     def at(low: Any, high: Any, part: float) -> Any:
         """The argument that far along a range: in the arithmetic's own operations, or the nearest code there is."""
-        if isinstance(numbers, FixedTables):
+        if numbers.fixed:
             most = int(numbers.limits[slots.CODE_MAX])
             return min(max(round(int(low) + (int(high) - int(low)) * part), -most - 1), most)
         real = numbers.threshold.dtype.type
