@@ -318,7 +318,7 @@ class _Builder:
     def _creep_tables(self) -> Any:
         scale = 2.0**self.bits
         sizes = [size * scale for size in self.sizes.creeps]
-        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)))
+        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
 
     def _ageing(self, span: float) -> Any:
         rows = [
