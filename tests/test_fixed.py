@@ -222,7 +222,8 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     low, high = (int(x) for x in tables.limits[:2])
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
     reference_code = reference.operations(tables)
-    builder = fixed_tables._Builder(model, arithmetic, "corners", None, None)
+    lsb = fixed_tables.lsbs(model, arithmetic)
+    builder = fixed_tables.Builder(model, arithmetic, "corners", lsb, (False, False))
     builder.build()
     for up in (1, 0) if tables.branches else (1,):
         exact = np.asarray(model.front(codes * float(form.drive_lsb), bool(up)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import subprocess
 from fractions import Fraction
@@ -23,7 +24,7 @@ from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.emission import module
-from hystgen.emission.calls import emit_options
+from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.parameters.schema import Compensation
@@ -71,10 +72,17 @@ def record(one: Compiled, codes: Codes, seed: int, share: float) -> tuple[Run, R
     u = np.rint(0.5 * (low + high) + 0.5 * share * (high - low) * np.sin(phase))
     y = u * float(codes.output_lsb)
     degree = 2.0 ** TEMPERATURE_BITS[int(one.tables.limits[slots.CODE_MAX]).bit_length()]
-    warm = np.rint((20.0 + y) * degree)
+    extra = {"temperature": np.rint((20.0 + y) * degree) / degree}
     t = np.arange(N) * T
-    return Run(t, u, {"temperature": warm}), Run(t, y, {"temperature": warm / degree})
+    return Run(t, u, extra), Run(t, y, extra)
 
+
+STILL = {
+    "creep": ("name: creep, time_constants: [0.01, 0.1, 0.3], weights: [0.02, 0.03, 0.05]",),
+    "lag": ("name: lag, time_constant: 0.01",),
+    "exact": ("name: lag, time_constant: 4.0e-4",),
+    "lag_and_creep": ("name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]"),
+}
 
 BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
@@ -94,13 +102,65 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
-    limited = np.any(np.abs(np.diff(v)) >= max(numbers.tables.number[2:4])) if numbers.tables.slew else False
-    if name not in BRANCHED and not limited:
+    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything"))
+    if name not in BRANCHED and not codes.condition:
         assert np.max(left) <= codes.inverse_rounding
     if name not in INVERSE_ALONE:
         forward = answers(numbers, Run(given.t, v, given.extra), False).astype(float)
         y = one.simulate(v * drive, t=given.t, extra=exact.extra) / float(codes.output_lsb)
         assert np.max(np.abs(forward - y)) <= codes.forward_error
+
+
+@pytest.mark.parametrize("name", ["lag", "exact", "lag_and_creep"])
+@BOTH
+def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
+    one = model(chain("led", *STILL[name]))
+    numbers, codes = compiled(one, arithmetic)
+    drive = float(codes.drive_lsb)
+    ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    for seed in range(3):
+        given, exact = record(numbers, codes, seed, 0.5)
+        v = answers(numbers, given, True).astype(float)
+        wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
+        assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits[slots.DRIVE_MAX]
+        assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
+
+
+@pytest.mark.parametrize("name", [name for name in FIXED if name not in BRANCHED])
+@BOTH
+def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
+    """Whatever is limited: each answer of the tables in float64, to which the drives are committed that were sent."""
+    one = model(CHAINS[name])
+    numbers, codes = compiled(one, arithmetic)
+    double = tables.build(one.chain, "float64", T)
+    given, exact = record(numbers, codes, 7, 1.2)
+    op, x, y = [], [], []
+    v = np.empty(N)
+    ahead = numbers.ahead
+    bits = int(numbers.tables.limits[slots.CODE_MAX]).bit_length()
+    for k in range(N):
+        warm = len(numbers.tables.gain) > 0
+        degree = exact.extra["temperature"][k]
+        rows = [(slots.OP_TEMPERATURE, degree * 2.0 ** TEMPERATURE_BITS[bits], degree)] * warm
+        rows += [(slots.OP_PUSH if k < ahead else slots.OP_STEP, given.v[k], exact.v[k])]
+        for row in rows:
+            op.append(row[0])
+            x.append(row[1])
+            y.append(row[2])
+    calls = np.array(op, dtype=np.uint8)
+    v, _ = reference.answers(numbers.tables, True, calls, np.array(x))
+    drive = float(codes.drive_lsb)
+    asked, given_to = [], []
+    for call, value, answer in zip(op, y, v.tolist(), strict=True):
+        asked.append(call)
+        given_to.append(value)
+        if call == slots.OP_STEP:
+            asked.append(slots.OP_COMMIT)
+            given_to.append(answer * drive)
+    w, _ = reference.answers(double.tables, True, np.array(asked, dtype=np.uint8), np.array(given_to))
+    low, high = numbers.tables.limits[:2]
+    wanted = np.clip(w[np.array(asked) == slots.OP_STEP] / drive, low, high)
+    assert np.max(np.abs(v[calls == slots.OP_STEP] - wanted)) <= codes.inverse_rounding
 
 
 @BOTH
@@ -228,14 +288,6 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 1.0 + 2e-6 * moved
 
 
-STILL = {
-    "creep": ("name: creep, time_constants: [0.01, 0.1, 0.3], weights: [0.02, 0.03, 0.05]",),
-    "lag": ("name: lag, time_constant: 0.01",),
-    "exact": ("name: lag, time_constant: 4.0e-4",),
-    "lag_and_creep": ("name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]"),
-}
-
-
 @BOTH
 @pytest.mark.parametrize("name", STILL)
 def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
@@ -276,3 +328,24 @@ def test_what_was_committed_is_in_the_memory(arithmetic: str) -> None:
     y = one.simulate(np.array(applied) * float(codes.drive_lsb)) / float(codes.output_lsb)
     slope = one.cascade.pi.slopes[-1] * float(codes.drive_lsb / codes.output_lsb)
     assert np.max(np.abs(y - u)[np.array(free)]) <= codes.forward_error + slope
+
+
+def test_the_reference_takes_codes_and_degrees() -> None:
+    one = Model(parse_parameters(CHAINS["warm"], "warm.yaml"))
+    with pytest.raises(ValueError, match="fixed point takes codes, whole numbers from -32768 to 32767"):
+        one.simulate([0.5], "q15", extra={"temperature": [20.0]})
+    numbers, codes = compiled(one, "q15")
+    y = one.inverse().simulate([8000, 8000], "q15", extra={"temperature": [20.0, 60.0]}) * float(codes.drive_lsb)
+    exact = one.inverse().simulate([8000 * float(codes.output_lsb)] * 2, extra={"temperature": [20.0, 60.0]})
+    assert np.max(np.abs(y - exact)) <= codes.inverse_error * float(codes.drive_lsb)
+    assert numbers.tables.fixed
+
+
+@BOTH
+def test_the_selftest_goes_all_over_the_range(arithmetic: str) -> None:
+    text = emitted_files(model(CHAINS["lagging"]), arithmetic=arithmetic)["lagging_selftest.c"]
+    codes = [int(each) for each in re.findall(r"\{'s', \(?(-?\d+)", text)]
+    most = ARITHMETICS[arithmetic].code_max
+    assert len(set(codes)) > 100
+    assert max(codes) > 0.9 * most
+    assert min(codes) < -0.9 * most

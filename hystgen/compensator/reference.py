@@ -31,7 +31,7 @@ from hystgen.effects.kinds import OwnBlock
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
 from hystgen.plays.corners.memory import new_fixed_memory, new_memory
-from hystgen.plays.slots import LOOP
+from hystgen.plays.slots import CODE_MAX, LOOP
 
 
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
@@ -69,6 +69,16 @@ def new_state(t: Tables | FixedTables | ChainTables) -> Any:
         return loop.new_state(t)
     memory = new_fixed_memory if t.fixed else new_memory
     return memory(len(t.threshold) - 1, t.threshold.dtype)
+
+
+def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
+    """Samples as fixed point takes them. Raises ValueError for what is no code."""
+    with np.errstate(invalid="ignore"):  # what is no code is found below
+        found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
+    most = int(t.limits[CODE_MAX])
+    if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):
+        raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
+    return found
 
 
 def answers(

@@ -85,13 +85,9 @@ class Session:
 
     def _samples(self, x: ArrayLike) -> NDArray[Any]:
         given = arguments.signal("u" if self._inverse else "v", x)
-        with np.errstate(invalid="ignore"):  # what is no code is found below
-            samples = np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
         if self.tables.fixed:
-            most = int(self.tables.limits[slots.CODE_MAX])
-            if np.any(given != samples) or np.any(samples < -most - 1) or np.any(samples > most):
-                raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
-        return samples
+            return reference.codes(self.tables, given)
+        return np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
 
     def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
         """A sequence of init, reset, step and commit with their arguments; answers are those of the steps."""

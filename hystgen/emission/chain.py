@@ -104,7 +104,6 @@ def _table(declared: str, entries: Sequence[str]) -> str:
     lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
     return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
-
 def sides(t: ChainTables) -> tuple[list[Block], list[Block]]:
     """The blocks in front of the plays, from the drive on, and those behind them."""
     found: list[list[Block]] = []

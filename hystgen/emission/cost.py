@@ -204,10 +204,19 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 
 def chain_products(t: ChainTables) -> dict[str, int]:
-    """Multiplications of the blocks of a model with effects in one step, of each operator."""
+    """Multiplications of the blocks of a model with effects in one step, of each operator; in fixed point a product of
+    a signal takes two."""
     kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
-    stages = len(kinds) + kinds.count(slots.TANH) * (t.behind.coefficient.shape[1] - 1 if t.fixed else 1)
+    envelopes = kinds.count(slots.TANH)
     absorbed, solved = (sum(each.products[way] for each in blocks.every(t)) for way in (0, 1))
+    if t.fixed:
+        stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.coefficient.shape[1]
+        viscous = 4 * (len(t.threshold) - 1) * t.moving.used
+        return {
+            "forward": absorbed + stages + viscous,
+            "inverse": absorbed + solved + stages + viscous + 2 * len(t.tap),
+        }
+    stages = len(kinds) + envelopes
     return {"forward": absorbed + stages, "inverse": absorbed + solved + stages + len(t.tap)}
 
 

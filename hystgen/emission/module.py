@@ -306,11 +306,11 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    limited = "no drive is limited" if values.limited else "no slew limit acts" if values.variant.slew else ""
-    apart = limited and values.inverse_rounding_error != values.inverse_max_error
+    condition = values.condition or ("no slew limit acts" if values.variant.slew else "")
+    apart = condition and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
         branch = "both take the same branch" if values.branches else ""
-        words = f"the same while {' and '.join(filter(None, [branch, limited]))}"
+        words = f"the same while {' and '.join(filter(None, [branch, condition]))}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 

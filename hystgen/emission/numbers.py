@@ -123,7 +123,7 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
         or any(one["kind"] == "bend" for one in behind),
         "finer": bool(tables.number[ARRIVING_BITS]),
         "saturates": True,
-        "limited": codes.limited,
+        "condition": codes.condition,
         "drive_lsb": _physical(codes.drive_lsb),
         "output_lsb": _physical(codes.output_lsb),
         "forward_max_error": _decimal(codes.forward_error),
@@ -132,7 +132,7 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
         "precision": [
             *_precision(
                 parameters, (codes.drive_lsb, codes.output_lsb), (codes.forward_error, codes.inverse_rounding),
-                " while no drive is limited" if codes.limited else " on the same branch" * plays.branches,
+                f" where {codes.condition}" if codes.condition else " on the same branch" * plays.branches,
             ),
             f"Range: every signal behind the plays stays below 2^{codes.largest.bit_length()}, with "
             f"{tables.number[LEVEL_BITS]} bits below an output code; states of effects below 2^62 (64 bits hold 2^63)",
@@ -157,7 +157,7 @@ def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options
         "stages": stages,
         "fronts": bool(stages),
         "finer": False,
-        "limited": False,
+        "condition": "",
         "envelopes": any(stage["kind"] == "envelope" for stage in stages),
         "forward_max_error": operand(float_tables.upward(bounds.forward, dtype)),
         "inverse_max_error": operand(float_tables.upward(bounds.inverse, dtype)) if options.inverse else "",
@@ -323,7 +323,7 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
         "fronts": bool(numbers.fronts),
         "envelopes": any(isinstance(stage, TanhEnvelope) for stage in cascade.stages),
         "finer": fine > 0,
-        "limited": False,
+        "condition": "",
         "saturates": bool(limits[slots.SATURATED] == limits[slots.CODE_MAX]),
         "drive_lsb": _physical(form.drive_lsb),
         "output_lsb": _physical(form.output_lsb),

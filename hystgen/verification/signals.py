@@ -119,7 +119,7 @@ def suite(
 
     Of a model with effects those of its plays, and calls of its settings among them.
     """
-    plays = tables.plays if isinstance(tables, ChainTables) else tables
+    plays = tables.plays._replace(limits=tables.limits) if isinstance(tables, ChainTables) else tables
     records = _suite(plays, real, inverse, length)
     if isinstance(tables, ChainTables):
         records = itertools.chain(records, _settings(tables, inverse, length))

@@ -6,9 +6,10 @@ operation; a state to bits below that, each rounding kept by it for 1/rate sampl
 absorbed as sent: without a lag the plays are given that, with one `rate/2` codes of it. Errors are in signals in front
 of the plays and in output codes behind them.
 
-Behind a memoryless part there is nothing beyond the drive's range to which a lag could lead, so that while a drive is
-limited the state behind it follows another target than in double precision, and what comes behind is bounded by the
-range alone; `rounding` leaves that out, as it does a lag behind a slew limit.
+A lag that is led follows its target but for a second difference, so that plays behind it have not seen what they were
+solved for: what they remember differs with the drives, and the lead makes more of that, without a bound but the range
+of the drive. `rounding` is then the difference from a compensator in double precision that has seen the same drives;
+behind a memoryless part while nothing is limited, since there is nothing beyond the drive's range to which to lead.
 """
 
 from __future__ import annotations
@@ -241,6 +242,8 @@ class Bounds:
         """In output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         error = self._plays(self._arrival()[0] + short)
+        if self.lags and self.static.branches_differ:  # what arrives comes to rest on either branch
+            error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):
             error = error * numbers.rest + self._creep(j)
         gains, share = self._gains()
@@ -264,8 +267,11 @@ class Bounds:
         gains, share = self._gains()
         late = self._late() * self.sizes.output
         error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.output + self._signal) + late)
-        for j in range(len(self.creeps) - 1, -1, -1):
-            error = self._creep_gain(self.creeps[j]) * (error + self._creep(j) + self._creep_back(j))
+        whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
+        apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds
+        for j, numbers in reversed(list(enumerate(self.creeps))):
+            states = apart * float(sum(numbers.terms[:, creep.WEIGHT]))
+            error = self._creep_gain(numbers) * (error + self._creep(j) + self._creep_back(j) + states)
         return error
 
     def _arriving_error(self) -> float:
@@ -274,9 +280,13 @@ class Bounds:
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         steep = self.static.front_slopes[1]
         solved = float(self.inner.solved()) / self._arriving + steep * float(self.inner.back())
-        solved += steep * (sum(code) + short)
+        slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
+        solved += steep * (sum(code) + short + slowed)
         outer = self.static.pi.slopes[-1]
-        residual = (self._asked() + self._plays(0.0)) * float(self.inner.output_lsb) + outer * solved * self._arriving
+        missed_by = self._plays(0.0) * float(self.inner.output_lsb) + outer * solved * self._arriving
+        for numbers in self.creeps:  # whose states have seen what the plays gave
+            missed_by *= numbers.slope * self._creep_gain(numbers)
+        residual = self._asked() * float(self.inner.output_lsb) + missed_by
         return self._gain() * residual / self._arriving
 
     def _gain(self) -> float:
@@ -302,7 +312,7 @@ class Bounds:
         """An error of the drive, in signals in front of the plays, in drive codes."""
         own = SECOND_ORDER * self._led(error) / 2.0**self._fine
         whole = float(self.inner.drive[1] - self.inner.drive[0])
-        return upward(Fraction(min(own + DOUBLE * whole + self.slowed * whole, whole)))
+        return upward(Fraction(min(own + DOUBLE * whole, whole)))
 
     def hold(self) -> int:
         """Signals in front of the plays by which the drive steps back by rounding alone."""
@@ -311,17 +321,20 @@ class Bounds:
         return math.floor(2.0 * self._arriving_error())
 
     @property
-    def limited(self) -> bool:
-        """Whether a limit of the drive in front of a lag leaves the inverse with no bound but the range."""
-        return bool(self.lags) and (not self.reached or bool(self.parts.slew))
+    def condition(self) -> str:
+        """What `rounding` holds for where drives in front of a lag can part without a bound but the range."""
+        led = any(not exact for exact, _ in self.lags)
+        if not (led or (self.lags and (not self.reached or self.parts.slew))):
+            return ""
+        return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
 
     def rounding(self) -> float:
-        """Of the inverse, in drive codes, on the same branch, and while no drive is limited where it is `limited`."""
+        """Of the inverse, in drive codes, on the same branch, and under its `condition`."""
         return self._codes(self._arriving_error())
 
     def inverse(self) -> float:
         """The same with what another branch and limits make."""
-        if self.limited:
+        if self.condition:
             return float(self.inner.drive[1] - self.inner.drive[0])
         if not self.static.branches_differ:
             return self.rounding()

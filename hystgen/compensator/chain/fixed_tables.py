@@ -150,7 +150,7 @@ class _Builder:
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
-            bounds.limited, math.ceil(self.sizes.largest * 2**self.bits),
+            bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
         max_rate = self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)
         return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)
@@ -323,7 +323,7 @@ class _Builder:
     def _creep_tables(self) -> Any:
         scale = 2.0**self.bits
         sizes = [size * scale for size in self.sizes.creeps]
-        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)))
+        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
 
     def _ageing(self, span: float) -> Any:
         rows = [

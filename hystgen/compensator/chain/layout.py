@@ -145,7 +145,7 @@ class Codes:
     """What fixed point makes of a model with effects: physical units a code, bounds in codes, and ranges.
 
     `forward_error` in output codes, `inverse_error` and the part of it on the same branch, `inverse_rounding`, in drive
-    codes; `limited`: whether that holds only while no drive is limited; `largest`: bound of every signal.
+    codes; `condition`: what else that holds for, in words; `largest`: bound of every signal.
     """
 
     drive_lsb: Fraction
@@ -153,7 +153,7 @@ class Codes:
     forward_error: float
     inverse_error: float
     inverse_rounding: float
-    limited: bool
+    condition: str
     largest: int
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
+from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.base import Run
 from hystgen.effects.thermal.model import COLUMN
@@ -15,8 +16,12 @@ from hystgen.plays import slots
 
 
 def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
-    """Answers (N,) for the drives or references in `record.v`; a preview sees what follows, the last sample stays."""
-    x, t = record.v, compiled.tables
+    """Answers (N,) for the drives or references in `record.v`; a preview sees what follows, the last sample stays.
+
+    Fixed point takes and gives codes, temperatures apart, which are in degC. Raises ValueError for what is no code.
+    """
+    t = compiled.tables
+    x = reference.codes(t, record.v) if t.fixed else record.v
     ahead = compiled.ahead if inverse else 0
     later = np.append(x[ahead:], np.full(min(ahead, len(x)), x[-1:])) if ahead else x
     calls = [np.full(min(ahead, len(x)), slots.OP_PUSH, dtype=np.uint8)]
@@ -24,7 +29,11 @@ def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
     if len(t.gain):
         op = np.tile(np.array([slots.OP_TEMPERATURE, slots.OP_STEP], dtype=np.uint8), len(x))
         calls.append(op)
-        given.append(np.column_stack([record.extra[COLUMN], later]).ravel())
+        warm = record.extra[COLUMN]
+        if t.fixed:
+            most = int(t.limits[slots.CODE_MAX])
+            warm = np.clip(np.rint(warm * 2.0 ** TEMPERATURE_BITS[most.bit_length()]), -most, most)
+        given.append(np.column_stack([warm, later]).ravel())
     else:
         calls.append(np.full(len(x), slots.OP_STEP, dtype=np.uint8))
         given.append(later)

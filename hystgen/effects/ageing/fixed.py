@@ -22,7 +22,7 @@ SHARE_BITS = 20
 """Fraction bits of the share of a piece: a gain changes along one by a hundredth, so that it has 27."""
 
 LONGEST = 2**61
-"""Drive codes that a travel is counted to at most."""
+"""Drive codes that a travel is counted to at most, 5e8 times a range in q31; beyond, the gain keeps its last value."""
 
 
 KIND = Kind(
@@ -34,7 +34,8 @@ KIND = Kind(
 def constants(t: AgeingTables) -> Iterator[Constants]:
     """The numbers of each gain."""
     for each, number in zip(floating.constants(t), t.number, strict=True):
-        yield replace(each, kind=KIND, table=number[-1:], counts=(*each.counts, int(number[0])))
+        counts = (*each.counts, int(number[0]))
+        yield replace(each, kind=KIND, table=number[-1:], counts=counts, products=(8 + 2 * each.counts[1], 2))
 
 
 def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
@@ -42,20 +43,22 @@ def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables
     it. Raises OverflowError."""
     piece: list[list[int]] = []
     number: list[list[int]] = []
+    first = [0]
     for pieces, _ in rows:
+        last = 0
         for row in pieces.tolist():
             length = 1.0 / row[floating.INVERSE_LENGTH] / lsb
             drop = max(0, round(length).bit_length() + 1 - (MOST.bit_length() - 1))
             begin = round(row[floating.BEGIN] / lsb)
             if begin + length >= LONGEST:
-                raise OverflowError("no room")
+                break
             curve = [round(c * ONE) for c in row[floating.C0 :]]
             piece.append([begin, *factor(2.0**SHARE_BITS / length * 2.0**drop), drop, *curve])
-        last = pieces[-1, floating.BEGIN] + 1.0 / pieces[-1, floating.INVERSE_LENGTH]
-        number.append([bits, 0, 0, 0, round(last / lsb)])
-    first = np.cumsum([0, *(len(pieces) for pieces, _ in rows)]).astype(np.int64)
+            last = begin + round(length)
+        number.append([bits, 0, 0, 0, last])
+        first.append(len(piece))
     return AgeingTables(
-        first,
+        np.array(first, dtype=np.int64),
         np.array(piece, dtype=np.int64).reshape(-1, 8),
         np.array(number, dtype=np.int64).reshape(-1, 5),
         np.array([turns for _, turns in rows], dtype=np.int64),

@@ -22,8 +22,8 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
-STATE_BITS = 61
-"""Bits of a state without its sign."""
+STATE_BITS = 60
+"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
 
 GUARD = 3
 """Bits of a state below the last one in which it stalls: a dead band of at most 1/16 of a signal's last bit."""
@@ -36,19 +36,21 @@ KIND = Kind(
 
 def constants(t: CreepTables) -> Iterator[Constants]:
     """The numbers of each block."""
-    yield from (replace(each, kind=KIND) for each in floating.constants(t))
+    for each in floating.constants(t):
+        yield replace(each, kind=KIND, products=(2 + 6 * len(each.rows), 2))
 
 
-def guard(effect: CreepNumbers, size: float) -> tuple[int, int]:
+def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     """Bits of the states below a signal's, and those dropped before a product, for inputs up to `size`.
 
-    Raises OverflowError where the slowest state would stall with a signal's own last bit.
+    `code`: bits of a signal below an output code. Raises OverflowError where the slowest state would stall more than a
+    quarter of a code from where it goes.
     """
     slowest = float(np.min(effect.terms[:, 0]))
     states = max(float(np.sum(effect.terms[:, 3])) * size, 1.0)
     wanted = max(math.ceil(-math.log2(slowest)), 0) + GUARD
     bits = min(wanted, STATE_BITS - math.ceil(math.log2(states)) - 1)
-    if bits < 0:
+    if bits < 0 or bits + code < wanted - GUARD + 1:
         raise OverflowError("no room")
     return bits, max(0, math.ceil(math.log2(states)) + bits + 2 - (LARGEST.bit_length() - 1))
 
@@ -58,12 +60,12 @@ def lifted(late: float, bits: int) -> int:
     return max(0, math.frexp(late)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 
-def tables(blocks: list[tuple[CreepNumbers, float]]) -> CreepTables:
-    """All creep blocks of a model, each with the largest size of its input. Raises OverflowError."""
+def tables(blocks: list[tuple[CreepNumbers, float]], code: int) -> CreepTables:
+    """All creep blocks of a model, each with the largest size of its input; `code` as for `guard`, which may raise."""
     block: list[list[int]] = []
     term: list[list[int]] = []
     for numbers, size in blocks:
-        bits, drop = guard(numbers, size)
+        bits, drop = guard(numbers, size, code)
         direct = numbers.rest - math.fsum(numbers.terms[:, 3].tolist())
         given = (direct, 1.0 / numbers.slope, 1.0 / numbers.rest)
         block.append([*(part for x in given for part in factor(x)), bits, drop])

@@ -21,8 +21,8 @@ from hystgen.effects.lag.compensator import LagTables
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
-STATE_BITS = 61
-"""Bits of a state without its sign."""
+STATE_BITS = 60
+"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
 
 GUARD = 3
 """Bits of a state below the last one in which it stalls."""
@@ -38,7 +38,7 @@ EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb",
 def constants(t: LagTables) -> Iterator[Constants]:
     """The numbers of each lag."""
     for each, exact in zip(floating.constants(t), t.exact, strict=True):
-        yield replace(each, kind=EXACT_KIND if exact else KIND)
+        yield replace(each, kind=EXACT_KIND if exact else KIND, products=(8, 4))
 
 
 class Sizes:

@@ -29,7 +29,7 @@ KIND = Kind("gain", reading=(), own=("solve", "absorb"), letters="ffwwwb", memor
 
 def constants(t: Reals) -> Iterator[Constants]:
     """The numbers of each gain."""
-    yield from (Constants(KIND, row, (1, 1)) for row in t)
+    yield from (Constants(KIND, row, (2, 2)) for row in t)
 
 
 def tables(rows: list[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
