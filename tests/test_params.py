@@ -1084,6 +1084,7 @@ def test_schema_is_valid() -> None:
     jsonschema.Draft202012Validator.check_schema(schema())
     made = schema()
     assert made["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert made["$id"] == f"urn:hystgen:parameters:{made['properties']['hystgen']['const']}"
     assert made["title"] == "hystgen parameter file"
     for example in made["examples"]:
         VALIDATOR.validate(example)

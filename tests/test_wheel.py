@@ -1,4 +1,4 @@
-"""The built wheel, installed with its dependencies in an environment of its own, far from the checkout."""
+"""What is published: the source archive and the wheel, the latter also installed in an environment of its own."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+import tarfile
 import tomllib
 import venv
 import zipfile
@@ -42,11 +43,17 @@ def run(*command: object, folder: Path, code: int = 0) -> subprocess.CompletedPr
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built from the source archive and in isolation: what pyproject.toml asks for has to suffice."""
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Source archive and the wheel built from it, in isolation: what pyproject.toml asks for has to suffice."""
     folder = tmp_path_factory.mktemp("dist")
     run(sys.executable, "-m", "build", "--outdir", folder, ROOT, folder=folder)
-    (made,) = folder.glob("*.whl")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(dist: Path) -> Path:
+    """The wheel."""
+    (made,) = dist.glob("*.whl")
     return made
 
 
@@ -88,6 +95,27 @@ def test_wheel_holds_the_package_its_templates_and_its_c_and_nothing_else(wheel:
     meta = email.message_from_bytes(packed[about + "METADATA"])
     assert (meta["Name"], meta["Version"]) == ("hystgen", PROJECT["version"])
     assert meta["License-Expression"] == "MIT"
+
+
+def test_the_source_archive_holds_the_project_and_nothing_that_was_made(dist: Path) -> None:
+    (made,) = dist.glob("*.tar.gz")
+    top = f"hystgen-{PROJECT['version']}/"
+    with tarfile.open(made) as archive:
+        found = {member.name.removeprefix(top): member for member in archive.getmembers() if member.isfile()}
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    tracked = {name for name in listed.split("\0") if name and (ROOT / name).is_file()}
+    assert found.keys() - tracked <= {"PKG-INFO"}
+    assert tracked - found.keys() == set()
+    assert all(member.mode & 0o111 == (ROOT / name).stat().st_mode & 0o111
+               for name, member in found.items() if name != "PKG-INFO")  # fmt: skip
+
+
+def test_the_index_would_take_both(dist: Path, wheel: Path) -> None:
+    files = sorted(map(str, dist.iterdir()))
+    assert len(files) == 2
+    done = run(sys.executable, "-m", "twine", "check", "--strict", *files, folder=dist)
+    assert done.stdout.count("PASSED") == 2
+    assert run(Path(sys.executable).with_name("check-wheel-contents"), wheel, folder=dist).stdout.endswith("OK\n")
 
 
 @pytest.mark.parametrize(("name", "options"), [

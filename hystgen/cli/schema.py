@@ -11,6 +11,8 @@ from hystgen.basics import console
 def schema() -> None:
     """Print the JSON Schema of the parameter file.
 
+    Editors use it if the file begins with  # yaml-language-server: $schema=hystgen.schema.json
+
     Example: hystgen schema > hystgen.schema.json
     """
     import json

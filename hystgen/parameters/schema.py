@@ -31,6 +31,9 @@ MAX_UNIT = 40
 
 STAGE_KINDS = ("dead_zone", "tanh")
 
+SCHEMA_ID = "urn:hystgen:parameters:1"
+"""Name of the JSON Schema of format 1; a URN, since it says what the schema is and not where it is kept."""
+
 _MEMBER = "\0member "
 MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
 """Names of union members: steps of pydantic's locations that are no keys of the file."""
@@ -306,6 +309,7 @@ def schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of the parameter file in its YAML form, for editors."""
     made = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": SCHEMA_ID,
         **_tidy(Parameters.model_json_schema()),
         "title": "hystgen parameter file",
         "description": "One hysteresis model and how to emit it.",
