@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, extras, parallel
+from hystgen.basics import arguments, parallel
 from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.disturbances import Cleaned
 from hystgen.diagnosis.data.items import Item, rms
@@ -70,7 +70,6 @@ def diagnose(
     from hystgen.effects import Effect
     from hystgen.model import as_model
 
-    extras.require_fit("diagnose")
     model = as_model(parameters)
     given, unit = model.parameters.model.effects, model.parameters.units.output
     fitted, others = several(records), several(holdout)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, extras, parallel
+from hystgen.basics import arguments, parallel
 from hystgen.basics.progress import Progress
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
@@ -96,7 +96,6 @@ def identify(
     actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
     """
-    extras.require_fit("identify")
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
