@@ -11,12 +11,19 @@ JOBS := 2
 
 .PHONY: demo test check prove lint fuzz check-bounds blind track clean
 
+# What the demo needs of the package, and a compiler in case there is none
+$(VENV)/demo: pyproject.toml
+	@echo "installing hystgen with what it fits, plots and compiles with, into $(VENV) .."
+	@test -e $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --disable-pip-version-check --editable '.[fit,plot,zig]'
+	@touch $@
+
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
-	touch $@
+	touch $(VENV)/demo $@
 
-demo: $(VENV)/ready
+demo: $(VENV)/demo
 	mkdir -p examples/out
 	$(BIN)/hystgen identify examples/stage_recording.csv --holdout examples/stage_holdout.csv \
 	    -o examples/out/stage.yaml --units V,um --plot examples/out/stage.png --report examples/out/report

@@ -35,9 +35,9 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import linalg, signal
 
 from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import extras
 from hystgen.basics.checks import finite
 from hystgen.cascade import PI, Cascade, InverseCascade
 from hystgen.compensator import fixed_tables
@@ -143,6 +143,7 @@ class Loop:
     compensator: object = None
 
     def __post_init__(self) -> None:
+        extras.require_fit("a closed loop")
         given = self.sample_time
         if not (isinstance(given, numbers.Real) and math.isfinite(given) and given > 0.0):
             raise ValueError(f"the sample time {self.sample_time!r} is not positive; give seconds per sample")
@@ -209,6 +210,8 @@ class Loop:
 
 def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, Array, float]:
     """State space of a continuous system with held input, or of a discrete one."""
+    from scipy import linalg, signal
+
     if not isinstance(system, signal.lti | signal.dlti):
         try:
             system = signal.lti(*system)
@@ -240,6 +243,8 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
 
 
 def _block(part: object, sample_time: float, what: str) -> Block:
+    from scipy import signal
+
     if isinstance(part, PIController):
         return _PI(part, sample_time)
     if isinstance(part, signal.dlti):

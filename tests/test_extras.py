@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import json
+import re
 import shlex
 import sys
 import tomllib
@@ -26,7 +28,10 @@ def words(extra: str) -> list[str]:
     return command[start + 1 :]
 
 
-@pytest.mark.parametrize("extra", ["plot", "formats", "zig", "targets", "fleet"])
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+@pytest.mark.parametrize("extra", sorted(PROJECT["optional-dependencies"]))
 def test_from_a_checkout_the_checkout_is_installed(extra: str) -> None:
     """Not a package of that name from an index, on which there may be another one or none."""
     option, place = words(extra)
@@ -61,6 +66,36 @@ def test_pip_is_that_of_the_python_that_runs(tmp_path: Path, monkeypatch: pytest
     assert extras.install("plot").startswith(f"{shlex.quote(sys.executable)} -m pip install ")
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
     assert extras.install("plot").startswith("pip install ")
+
+
+def required(requirements: list[str]) -> set[str]:
+    """Names of the distributions, those of extras of this package among them."""
+    found = set()
+    for text in requirements:
+        name, named = re.match(r"([\w.-]+)(?:\[([\w,-]+)\])?", text).groups()
+        if name == PROJECT["name"]:
+            for extra in named.split(","):
+                found |= required(PROJECT["optional-dependencies"][extra])
+        else:
+            found.add(name)
+    return found
+
+
+def test_the_packages_of_the_extra_fit_are_those_that_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert required(["hystgen[fit]"]) == set(extras.FIT)
+    assert not set(extras.FIT) & required(PROJECT["dependencies"])
+    extras.require_fit("this")
+    find = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "joblib" else find(name))
+    with pytest.raises(extras.MissingExtraError) as caught:
+        extras.require_fit("this")
+    assert str(caught.value) == f"this needs joblib; install the extra with: {extras.install('fit')}"
+
+
+def test_all_is_every_extra_for_users() -> None:
+    for extra in PROJECT["optional-dependencies"]:
+        if extra != "dev":
+            assert required([f"hystgen[{extra}]"]) <= required(["hystgen[all]"]), extra
 
 
 def test_no_hint_is_written_by_hand() -> None:

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from modelfiles import CHAINS, FILES
 
 import hystgen
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import extras
+from hystgen.basics import jit as jitting
 from hystgen.basics.jit import Jit, jit, plain
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.verification.comparison import expected_records
 
 pytestmark = pytest.mark.thorough
 
@@ -42,6 +50,35 @@ def test_plain_is_python_all_the_way_down() -> None:
     with pytest.raises((OverflowError, TypeError, ValueError)):
         tripled(LARGE)
     assert tripled.py_func(LARGE) == 3 * LARGE
+
+
+def test_without_numba_everything_is_python_and_that_is_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(jitting, "_has_numba", lambda: False)
+    monkeypatch.setattr(jitting, "announce", said.append)
+    assert (sixfold(LARGE), tripled(LARGE)) == (6 * LARGE, 3 * LARGE)
+    (text,) = said
+    assert extras.install("fit") in text
+
+
+@pytest.mark.parametrize(("name", "arithmetic", "engine"), [
+    ("mixed", "float32", "corners"), ("mixed", "q15", "corners"), ("everything", "float32", "loop"),
+])  # fmt: skip
+def test_without_numba_the_bit_reference_gives_the_same_bits(
+    name: str, arithmetic: str, engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Over the records of `verify`, and without a warning of numpy."""
+    tables = Model(parse_parameters({**FILES, **CHAINS}[name])).tables(arithmetic, engine)
+    found = []
+    for has_numba in (True, False):
+        monkeypatch.setattr(jitting, "_has_numba", lambda there=has_numba: there)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            found.append(expected_records(tables, ARITHMETICS[arithmetic].number, True, 100))
+    assert len(found[0]) > 10
+    for compiled, interpreted in zip(*found, strict=True):
+        assert interpreted.answer.tobytes() == compiled.answer.tobytes(), compiled.name
+        assert interpreted.status.tobytes() == compiled.status.tobytes(), compiled.name
 
 
 def test_a_factory_makes_functions_of_what_it_is_given() -> None:

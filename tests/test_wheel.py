@@ -19,6 +19,7 @@ import pytest
 from modelfiles import FILES
 
 import hystgen
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.emission.calls import emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -185,6 +186,40 @@ def test_declared_dependencies_suffice_for_every_module(python: Path, tmp_path: 
     optional = {re.split(r"[^\w-]", word)[0] for words in extras.values() for word in words}
     optional |= {"elftools"} if "pyelftools" in optional else set()  # a distribution and its package differ in name
     assert set(missing) <= optional
+
+
+def test_without_extras_models_are_emitted_verified_shown_and_run(python: Path, tmp_path: Path) -> None:
+    """The other tests of this environment emit and show; the bit reference computes without numba."""
+    (tmp_path / "mixed.yaml").write_text(FILES["mixed"])
+    program = python.with_name("hystgen")
+    for arithmetic in ("float32", "q15"):
+        (tmp_path / "drive.csv").write_text("t,v\n0,0\n1,1\n2,-1\n")
+        run(program, "simulate", "mixed.yaml", "drive.csv", "-o", f"{arithmetic}.csv", "--arithmetic", arithmetic,
+            folder=tmp_path)  # fmt: skip
+    code = (
+        "import hystgen, importlib.util, sys; assert not importlib.util.find_spec('numba');"
+        "report = hystgen.verify('mixed.yaml', arithmetic=sys.argv[1], operator='both', length=500);"
+        "print(report.table());"
+        "sys.exit(not report.ok)"
+    )
+    if compilers.available():
+        for arithmetic in ARITHMETICS:
+            assert "bits equal" in run(python, "-c", code, arithmetic, folder=tmp_path).stdout
+
+
+@pytest.mark.parametrize("command", [
+    ["identify", "plain.csv", "-o", "made.yaml"],
+    ["identify", "--batch", "plain.csv", "-o", "made"],
+    ["diagnose", "plain.yaml", "plain.csv", "-o", "made"],
+    ["track", "plain.yaml", "plain.csv"],
+])  # fmt: skip
+def test_what_needs_an_extra_names_it_and_leaves_nothing(command: list[str], python: Path, tmp_path: Path) -> None:
+    (tmp_path / "plain.yaml").write_text(FILES["plain"])
+    (tmp_path / "plain.csv").write_text("t,v,y\n" + "".join(f"{k},{k % 5},{k % 5}\n" for k in range(200)))
+    before = tree(tmp_path)
+    done = run(python.with_name("hystgen"), *command, folder=tmp_path, code=2)
+    assert re.fullmatch(r"error: \w+ needs scipy, numba, .*; install the extra with: .*\[fit\]\S*\n", done.stderr)
+    assert tree(tmp_path) == before
 
 
 def test_plots_are_an_extra_and_its_absence_is_told(python: Path, tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
-"""How to install an extra of this package into the Python that runs it."""
+"""The extras of this package: what needs one says so, and how to install it into the Python that runs."""
 
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import json
 import shlex
 import shutil
@@ -10,6 +11,20 @@ import sys
 import urllib.parse
 import urllib.request
 from pathlib import Path
+
+FIT = ("scipy", "numba", "joblib", "threadpoolctl", "rich")
+"""Packages of the extra `fit`, without which nothing is fitted."""
+
+
+class MissingExtraError(ImportError):
+    """Something needs an extra that is not installed; the message has the command that installs it."""
+
+
+def require_fit(what: str) -> None:
+    """Raise MissingExtraError where `what` cannot be done because packages of the extra `fit` are not installed."""
+    missing = [name for name in FIT if importlib.util.find_spec(name) is None]
+    if missing:
+        raise MissingExtraError(f"{what} needs {', '.join(missing)}; install the extra with: {install('fit')}")
 
 
 def install(extra: str) -> str:

@@ -4,7 +4,8 @@
     def followed(state, x, r): ...
 
 `followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python that
-stands there, as `followed.py_func` is anywhere. Numba is imported with the first call that needs it.
+stands there, as `followed.py_func` is anywhere. Numba is imported with the first call that needs it; where it is not
+installed everything runs as Python, with the same bits.
 
 Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
 in a helper can never leave a stale caller behind. The cache saves time and is never needed: where no folder can be
@@ -17,15 +18,21 @@ import contextlib
 import contextvars
 import functools
 import hashlib
+import importlib.util
 import inspect
 import types
 from collections.abc import Callable, Iterator
 from typing import Any, Generic, ParamSpec, TypeVar, overload
 
+import numpy as np
+
+from hystgen.basics import extras
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# Called once, with a message to the user, before the first function that is not in the cache is compiled
+# Called once, with a message to the user, before the first function that is not in the cache is compiled, or runs as
+# Python because there is no numba
 announce: Callable[[str], None] | None = None
 
 ONCE = "compiling for this machine, once: about 20 s"
@@ -33,6 +40,12 @@ EVERY_TIME = (
     "compiling for this machine: about 20 s, every time, since no folder for the result can be written to; set "
     "NUMBA_CACHE_DIR to one that can"
 )
+
+
+def interpreted() -> str:
+    """The message where there is no numba."""
+    return f"computing in Python, which takes longer than compiled; to have it compiled: {extras.install('fit')}"
+
 
 # The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
@@ -42,10 +55,14 @@ _plain = contextvars.ContextVar("plain", default=False)
 
 @contextlib.contextmanager
 def plain() -> Iterator[None]:
-    """Inside, functions run as plain Python, for short signals: there is nothing to compile or to load."""
+    """Inside, functions run as plain Python, for short signals: there is nothing to compile or to load.
+
+    Numbers overflow and become NaN without a warning, as they do in compiled code.
+    """
     before = _plain.set(True)
     try:
-        yield
+        with np.errstate(all="ignore"):
+            yield
     finally:
         _plain.reset(before)
 
@@ -60,8 +77,13 @@ class Jit(Generic[P, R]):
         """options of numba, which looks here for those of a function that others call"""
 
     def __call__(self, *given: P.args, **named: P.kwargs) -> R:
-        function = self.py_func if _plain.get() else self.dispatcher
-        return function(*given, **named)
+        if _plain.get():
+            return self.py_func(*given, **named)
+        if _has_numba():
+            return self.dispatcher(*given, **named)  # type: ignore[no-any-return]
+        _announce(interpreted)
+        with plain():
+            return self.py_func(*given, **named)
 
     @functools.cached_property
     def dispatcher(self) -> Any:
@@ -147,16 +169,25 @@ def _cache_folder() -> str | None:
 
 
 @functools.cache
+def _has_numba() -> bool:
+    return importlib.util.find_spec("numba") is not None
+
+
+def _announce(text: Callable[[], str]) -> None:
+    global announce
+    if announce:
+        announce(text())
+        announce = None
+
+
+@functools.cache
 def _listen() -> None:
     """Have `announce` called when numba starts to compile."""
     from numba.core import event
 
     class FirstCompilation(event.Listener):
         def on_start(self, _: Any) -> None:
-            global announce
-            if announce:
-                announce(ONCE if _cache_folder() else EVERY_TIME)
-                announce = None
+            _announce(lambda: ONCE if _cache_folder() else EVERY_TIME)
 
         def on_end(self, _: Any) -> None:
             pass

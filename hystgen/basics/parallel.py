@@ -18,6 +18,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from hystgen.basics import extras
+
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import ForkProcess
@@ -219,7 +221,11 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
 
 def one_thread() -> Any:
     """Context in which linear algebra uses a single thread: on small matrices several wait for each other."""
-    import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    try:
+        import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
+        from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    except ImportError:
+        extras.require_fit("a fit")
+        raise
 
     return threadpool_limits(1)

@@ -18,7 +18,8 @@ process (`parallel`)."""
 class Progress:
     """Context manager; `tick` counts work, in the unit of `total`, under a `title`.
 
-    A `total` of 0 is one that is not known. Silent unless `shown`, stderr is a terminal and time has passed.
+    A `total` of 0 is one that is not known. Silent unless `shown`, stderr is a terminal, time has passed, and rich is
+    installed.
     """
 
     def __init__(self, total: float, shown: bool, title: str) -> None:
@@ -47,9 +48,12 @@ class Progress:
             return
         self._next = now + OFTEN
         if self._bar is None:
-            from rich.console import Console
-            from rich.progress import Progress as Bar
-
+            try:
+                from rich.console import Console
+                from rich.progress import Progress as Bar
+            except ImportError:  # of the extra `fit`
+                self._shown = False
+                return
             self._bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
             self._bar.start()
             self._task = self._bar.add_task(self._title, total=self._total or None)

@@ -33,6 +33,7 @@ class Failed(click.ClickException):
 
 def guarded(path: str, action: Callable[[], Any]) -> Any:
     """Run `action` and turn what it may raise into a message and an exit code."""
+    from hystgen.basics.extras import MissingExtraError
     from hystgen.basics.problems import (
         FormatError,
         NotInvertibleError,
@@ -60,11 +61,11 @@ def guarded(path: str, action: Callable[[], Any]) -> Any:
         raise Failed(str(located(path, error.problems)), 2) from None
     except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
         raise
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MissingExtraError) as error:
         raise Failed(f"error: {_reason(error)}", 2) from None
 
 
-def _reason(error: ValueError | OSError) -> str:
+def _reason(error: Exception) -> str:
     """The text of an error; for errors of the system the file and the reason."""
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)

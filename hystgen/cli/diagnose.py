@@ -79,12 +79,14 @@ def diagnose(
     if max_rate is not None:
         raise click.UsageError("--max-rate is for drives; give --plan with it")
     from hystgen import diagnosis
+    from hystgen.basics import extras
     from hystgen.effects import load_user_effects
     from hystgen.emission import files
     from hystgen.report import diagnosis as report
     from hystgen.report import drawing
 
     model = load_model(params, effects)
+    guarded(params, partial(extras.require_fit, "diagnose"))
     guarded(params, drawing.require)
     keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], (params, *data, *holdout))
     guarded(output, partial(files.check, Path(output), diagnosis.Diagnosis.FILES))

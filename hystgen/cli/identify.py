@@ -46,7 +46,7 @@ def identify(
     Example: hystgen identify --batch 'units/*.csv' -o params/
     """
     from hystgen import identification
-    from hystgen.basics import writing
+    from hystgen.basics import extras, writing
     from hystgen.report import identification as pages
 
     drive, _, displacement = (units or "").partition(",")
@@ -88,6 +88,7 @@ def identify(
         from hystgen.identification import settings
         from hystgen.report import plots
 
+        extras.require_fit("identify")  # before anything is read
         for file in (output, plot):
             if file:
                 writing.check_writable(file)

@@ -35,9 +35,11 @@ def track(
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """
     from hystgen import records, tracking
+    from hystgen.basics import extras
     from hystgen.report import plots
 
     model = load_model(params, effects)
+    guarded(params, partial(extras.require_fit, "track"))
     visited = history_values(history)
     if plot:
         keep_inputs([plot], [params, *data])

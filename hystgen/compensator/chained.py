@@ -7,14 +7,15 @@ ahead: a delay and a mode take the reference before its time.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
+from hystgen.basics import extras
 from hystgen.basics.problems import EffectsError, NotInvertibleError, UnsupportedEffectsError
 from hystgen.chain.blocks import Block
 from hystgen.chain.chain import Chain
@@ -46,6 +47,14 @@ TAKEN_IN = frozenset({
     "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",
     "sensor_nonlinearity", "noncongruent",
 })  # fmt: skip
+
+
+@functools.cache
+def _brentq() -> Any:
+    extras.require_fit("running the inverse of plays that an effect bends or moves")
+    from scipy.optimize import brentq
+
+    return brentq
 
 
 class Actuator:
@@ -126,7 +135,7 @@ class Actuator:
             far = w + way
             if (self.total(self.moved(far)) - y) * (before - y) <= 0.0:
                 scale = max(abs(w), abs(far))
-                return float(brentq(lambda x: self.total(self.moved(x)) - y, w, far, xtol=1e-16 * scale, rtol=1e-15))
+                return float(_brentq()(lambda x: self.total(self.moved(x)) - y, w, far, xtol=1e-16 * scale, rtol=1e-15))
             way *= 2.0
         raise EffectsError(f"no input of the plays gives {y:g}")
 

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from hystgen import identification
-from hystgen.basics import arguments, writing
+from hystgen.basics import arguments, extras, writing
 from hystgen.basics.progress import Progress
 from hystgen.basics.version import __version__
 from hystgen.emission import files
@@ -164,6 +164,7 @@ def identify_batch(
     is marked. Raises ValueError for arguments that fit no unit, FileNotFoundError where a source leads to no file,
     workers.SchedulerError, an OSError, for a scheduler that cannot be used.
     """
+    extras.require_fit("identify_batch")
     output = arguments.path("output", output)
     options = _complete(options)
     identification.check_options(**options)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hystgen.basics import extras
 from hystgen.basics.checks import Array
 
 Slope = Callable[[float, float], float]
@@ -29,6 +30,7 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
     By LSODA (scipy), with a call for each move between two turning points, where the slope jumps; the slope is asked at
     inputs of the move alone. Raises ValueError where the integration fails.
     """
+    extras.require_fit("this plant")
     from scipy.integrate import ODEintWarning, odeint
 
     path = np.concatenate([[0.0], v])

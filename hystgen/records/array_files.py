@@ -10,6 +10,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from hystgen.basics import extras
 from hystgen.records.columns import Column, Step, column, from_number, is_named
 from hystgen.records.reading import Reading, Table, one_dimension
 
@@ -73,8 +74,12 @@ def _npy_vector(archive: Any, name: str) -> NDArray[Any]:
 
 def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
     """Read a MATLAB file up to v7: vectors, and fields of structs as `struct.field`."""
-    from scipy.io import whosmat
-
+    try:
+        from scipy.io import whosmat
+    except ImportError:
+        raise reading.refuse(
+            f"MATLAB .mat files need the package scipy; {extras.install('formats')}, or export CSV or .npz"
+        ) from None
     with reading.parsing("a MATLAB v5 .mat file"):
         columns: list[Column] = []
         ignored: list[str] = []
