@@ -716,7 +716,8 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     fitted = Fitted(form, np.empty(0), weights, 0.0)
     ready = preparing.Prepared([item], [item], [], [], (0.0, 100.0), places)
     given = hystgen.load(_model(tmp_path))
-    extended = hystgen.Model(_extended(given.parameters, given.cascade, fitted, ready, ()))
+    outcome = selection.Outcome(fitted, fitted, (), ())
+    extended = hystgen.Model(_extended(given.parameters, given.cascade, outcome, ready, ()))
     (found,) = extended.chain.simulate([run], [0.0])
     # weights are written with ten digits; each multiplies up to 100, and the offset is the mean of what that leaves
     assert np.max(np.abs(found - predicted)) <= 2.0 * 0.5e-9 * np.sum(weights) * 100.0
