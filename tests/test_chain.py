@@ -71,6 +71,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
     return Run(np.arange(n) * T, np.clip(np.float32(u).astype(float), low, high), {"temperature": 20.0 + u})
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(("name", "arithmetic"), EVERY)
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     report = hystgen.verify(noisy(name), arithmetic, operator(name), compiler=["gcc"], length=1500)
@@ -205,6 +206,7 @@ def test_ageing_leaves_the_gain_of_one_sample() -> None:
     assert 0.0 < left <= np.max(np.abs(run.v)) * (steep * step + ageing.TABLE_ERROR)
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("seed", [11, 12])
 def test_stays_within_its_bounds(name: str, seed: int) -> None:
@@ -486,6 +488,7 @@ def test_only_what_the_model_has_is_emitted() -> None:
     assert {"travel", "set_travel", "set_gain"} <= calls
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize(("name", "arithmetic"), [pair for pair in EVERY if pair[1] != "float64"])
 def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
     one = noisy(name)

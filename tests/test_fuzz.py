@@ -69,7 +69,7 @@ def changed_entry(text: str) -> str:
 
 def loose_clamp(text: str) -> str:
     """A committed drive a little beyond the range is accepted."""
-    found = re.sub(r"v > PLAIN_DRIVE_MAX\s*\?", "v > 1.001f * PLAIN_DRIVE_MAX ?", text)
+    found = re.sub(r"least > PLAIN_DRIVE_MAX\s*\?", "least > 1.001f * PLAIN_DRIVE_MAX ?", text)
     assert found != text
     return found
 
