@@ -47,6 +47,7 @@ UNITS = (
     ("aged", "float32", "loop"),
     ("viscous", "float32", "loop"),
     ("dilated", "float64", "loop"),
+    ("dashpot", "float32", "loop"),
     ("bumpy", "float32", "loop"),
     ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
