@@ -35,10 +35,10 @@ R = TypeVar("R")
 # Python because there is no numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling for this machine, once: about 20 s"
+ONCE = "compiling for this machine, once: about 20 s, for C of models with effects two minutes"
 EVERY_TIME = (
-    "compiling for this machine: about 20 s, every time, since no folder for the result can be written to; set "
-    "NUMBA_CACHE_DIR to one that can"
+    "compiling for this machine: about 20 s, for C of models with effects two minutes, every time, since no folder for "
+    "the result can be written to; set NUMBA_CACHE_DIR to one that can"
 )
 
 
