@@ -2,6 +2,15 @@
 
 #define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's output, in sums */
 
+/* Field by field: for a whole structure a compiler may call memcpy. */
+HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
+    to->output = from->output;
+    to->input = from->input;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x) {
     return here->rising ? x : -x;

@@ -9,6 +9,7 @@ int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *
                       unsigned int pieces, unsigned int degree, int32_t x);
 hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w, int32_t drive_min,
                                int32_t drive_max, bool *limited);
+void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from);
 void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_place_t *here,
                            hystgen_corner_t *corner, hystgen_kink_t *kink, int32_t to);
 int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here,

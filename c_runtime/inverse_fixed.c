@@ -31,7 +31,7 @@ HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t n
 
 /* Any other sample than a usual one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
-    self->undo = self->here;
+    hystgen_copy_place(&self->undo, &self->here);
     self->usual = false;
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
@@ -95,12 +95,12 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     if (self->usual) {
-        self->undo = self->here;
+        hystgen_copy_place(&self->undo, &self->here);
         self->undo.input = self->before;
         const int64_t way = (int64_t)self->here.input - self->before;
         self->undo.output -= way * (int64_t)hystgen_model_curve.segment[self->here.k].slope;
     }
-    self->here = self->undo;
+    hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);
     self->repeat = false;
     hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink,
@@ -109,7 +109,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step) {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
-    self->undo = self->here;
+    hystgen_copy_place(&self->undo, &self->here);
     hystgen_inverse_stay(self);
     self->before = 0;
     self->reference = 0;

@@ -2,7 +2,7 @@
 
 /* The next step begins here. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self) {
-    self->undo = self->here;
+    hystgen_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -54,7 +54,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     if (v != applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    self->here = self->undo;
+    hystgen_copy_place(&self->here, &self->undo);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     self->repeat = false;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 937c3e1d701ba8447f193d14567740dda61dcac3e059be61228c1a0fb47df840, without this line
+ * Text: sha256 061c9ddfaacf1ae5679dd0d3b6caaae85d397da142fda85ab339cef96003b83f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -87,6 +87,15 @@ static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int sh
 }
 
 #define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's output, in sums */
+
+/* Field by field: for a whole structure a compiler may call memcpy. */
+static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
+    to->output = from->output;
+    to->input = from->input;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline int64_t curved_along(const curved_place_t *here, int64_t x) {
@@ -456,7 +465,7 @@ static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved
 
 /* The next step begins here. */
 static void curved_inverse_keep(curved_inverse_t *self) {
-    self->undo = self->here;
+    curved_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -508,7 +517,7 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
     if (v != applied) {
         self->status |= CURVED_STATUS_INPUT_CLAMPED;
     }
-    self->here = self->undo;
+    curved_copy_place(&self->here, &self->undo);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
     self->repeat = false;
