@@ -9,12 +9,14 @@ from typing import Any
 from hystgen.basics.jit import jit
 
 LOW_BITS = 20
-"""Bits of the part of a number that is multiplied apart."""
+"""Bits of the part of a number that is multiplied apart, so that the rest has 31: products of either fit 64 bits."""
 
 LARGEST = 2**51
 """Numbers that are multiplied are smaller: their upper part then has 31 bits, as a mantissa has."""
 
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
+"""Bits of a mantissa without its sign, and shifts: a product drops at least a bit, to be rounded, and at most 62."""
+
 BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
 """Factors are smaller."""
 
