@@ -25,7 +25,7 @@ from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.text import literal
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import Model
-from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.files import parameters_sha256, parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, host, signals, sources
 
@@ -500,6 +500,22 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
     assert " \\\n" in text[: text.index("Parameters:")]
     assert read.options == {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}
     assert not read.edited
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_files_name_their_licence_and_headers_what_made_them(layout: str, tmp_path: Path) -> None:
+    """By a line that licence scanners look for, and by macros that a firmware can log."""
+    files = emitted_files(model("plain"), layout=layout)
+    for name, text in files.items():
+        assert text.splitlines()[0] == "/* SPDX-License-Identifier: 0BSD", name
+        (tmp_path / name).write_text(text)
+    (tmp_path / "main.c").write_text(
+        '#include <stdio.h>\n#include "plain.h"\n'
+        "int main(void) { return puts(PLAIN_HYSTGEN_VERSION), puts(PLAIN_PARAMS_SHA256), 0; }\n"
+    )
+    subprocess.run(["cc", "-I", tmp_path, "-o", tmp_path / "main", tmp_path / "main.c"], check=True)
+    shown = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.split()
+    assert shown == [hystgen.__version__, parameters_sha256(model("plain").parameters)]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
