@@ -25,10 +25,10 @@ from recordings import brute_output, brute_plays, noisy, wander, write_csv
 from scipy.stats import binned_statistic
 
 import hystgen
-from hystgen.basics import extras
+from hystgen.basics import drawing, extras
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
-from hystgen.report import drawing, fit_figures
+from hystgen.report import fit_figures
 from hystgen.report import identification as pages
 from hystgen.report.fit_figures import Shown
 

@@ -9,15 +9,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 from hystgen import diagnosis
-from hystgen.basics import parallel
+from hystgen.basics import drawing, parallel
+from hystgen.basics.drawing import label
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure
 from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
 from hystgen.diagnosis.search.acceptance import is_noise
-from hystgen.report import drawing
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
-from hystgen.report.drawing import label
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
 
 if TYPE_CHECKING:
@@ -36,13 +35,14 @@ P = ParamSpec("P")
 def _with_page(find: Callable[P, Diagnosis]) -> Callable[P, Diagnosis]:
     @functools.wraps(find)
     def found(*given: P.args, **named: P.kwargs) -> Diagnosis:
-        return replace(find(*given, **named), page=html)
+        figures = {name: functools.partial(draw, width=WIDE) for name, draw in FIGURES.items()}
+        return replace(find(*given, **named), page=html, figures=figures)
 
     return found
 
 
 diagnose = _with_page(diagnosis.diagnose)
-"""`hystgen.diagnose`: what the search finds, with a page to write."""
+"""`hystgen.diagnose`: what the search finds, with a page to write and figures to draw."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:

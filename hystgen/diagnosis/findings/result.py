@@ -7,18 +7,20 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import arguments, display, drawing
 from hystgen.diagnosis.findings import kinds
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Structure
 from hystgen.diagnosis.search import acceptance
 
 if TYPE_CHECKING:
+    from hystgen.model import Model
     from hystgen.parameters.files import Parameters
 
 Array = NDArray[np.float64]
@@ -117,12 +119,13 @@ class Signals:
     after: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """A finished diagnosis: its `result`, and `parameters` with the effects added.
 
     `notes`: what was done to the records, one sentence each; `signals`: the records with their errors; `page`: makes
-    `report.html` of this and the text of the parameter file, None where no report is written.
+    `report.html` of this and the text of the parameter file, None where no report is written; `figures`: what draws
+    each figure of the page, by name.
     """
 
     result: Result
@@ -131,7 +134,33 @@ class Diagnosis:
     signals: tuple[Signals, ...] = field(compare=False)
     page: Callable[[Diagnosis, str], str] | None = field(default=None, compare=False, repr=False)
 
+    figures: Mapping[str, Callable[[Diagnosis], Any]] = field(default_factory=dict, compare=False)
+
     FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
+
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.name for effect in self.result.effects)
+        return f"<Diagnosis {self.parameters.name}: {self.verdict}{': ' if effects else ''}{effects}>"
+
+    def _repr_html_(self) -> str:
+        first = next(iter(self.figures.values()), None)
+        return display.block(repr(self), self.sentence(), None if first is None else partial(first, self))
+
+    @property
+    def model(self) -> Model:
+        """The model with the effects that were found, to simulate, invert and emit."""
+        from hystgen.model import Model
+
+        return Model(self.parameters)
+
+    def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Any:
+        """A figure of the report, by default how each effect shrinks the held-out error.
+
+        `which`: gap, overlay, records, time, against or frequency. Returns matplotlib's Figure, which a notebook shows;
+        with `path`, a .png or .svg, it is written there as well. Raises ValueError, PlotError, OSError.
+        """
+        arguments.choice("which", which, tuple(self.figures))
+        return drawing.picture(partial(self.figures[which], self), path)
 
     @cached_property
     def content(self) -> dict[str, Any]:
