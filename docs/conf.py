@@ -34,6 +34,8 @@ copybutton_prompt_is_regexp = True
 
 html_theme = "furo"
 html_title = f"hystgen {release}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False
 pygments_style = "default"
