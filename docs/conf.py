@@ -29,6 +29,7 @@ autodoc_member_order = "bysource"
 breathe_default_project = "emitted"
 breathe_domain_by_extension = {"h": "c"}
 breathe_show_include = False
+breathe_show_define_initializer = True
 copybutton_prompt_text = r"\$ |>>> "
 copybutton_prompt_is_regexp = True
 

@@ -211,9 +211,9 @@ class Arithmetics(Generated):
 
 
 def for_doxygen(header: str) -> str:
-    """What a header declares, its comments marked as Doxygen wants them."""
+    """What a header declares, its comments marked as Doxygen wants them, but those above a group of macros."""
     declared = header[header.index('extern "C" {') + len('extern "C" {') :]
-    marked = re.sub(r"^( *)/\* ", r"\1/** ", declared, flags=re.MULTILINE)
+    marked = re.sub(r"^( *)/\* (?!.*\*/\n#define)", r"\1/** ", declared, flags=re.MULTILINE)
     marked = re.sub(r"(?<=\S)( +)/\* ", r"\1/**< ", marked)
     return re.sub(r"^#(?:ifdef|endif|ifndef).*\n|^}$\n", "", marked, flags=re.MULTILINE)
 
