@@ -165,8 +165,8 @@ class EffectKeys(Generated):
                 word = f"`{shape.selector}: {own['const']}`: " if "const" in own else ""
                 yield f"{word}{' '.join((shape.__doc__ or '').split())}\n"
                 yield keys(definitions[shape.__name__], {}, ("name", shape.selector))
-                how = f", {cell(shape.compensation)}" if shape.compensation else ""
-                yield f"Compensation: {shape.compensated}{how}.\n"
+                how, word = cell(shape.compensation), shape.compensated
+                yield f"Compensation: {how if how.startswith(word) else f'{word}; {how}'.rstrip('; ')}.\n"
 
 
 class StatusBits(Generated):

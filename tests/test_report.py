@@ -236,6 +236,7 @@ class TestPage:
         assert f"{low:.3g} to {high:.3g} um, {100 * low / row.output_range:.3g}" in lead
         assert "it is invertible" in lead
         assert "hystgen emit axis.yaml -o firmware/\n" in lead
+        assert "Your next step: write the C." in lead
 
     def test_counts_are_those_put_in(self, page: Page, fitted: tuple[Fit, Record, Record]) -> None:
         first, other = table(page, "What was done to the data")

@@ -70,7 +70,18 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
     ]
     warnings = [Text(f"Mind the inverse: {said}.") for said in found.warnings]
-    return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence()), *warnings], sections)
+    top = [Text(found.sentence()), *warnings, _next_step(found)]
+    return page(f"{found.parameters.name}: diagnosis", top, sections)
+
+
+def _next_step(found: Diagnosis) -> Text:
+    """What to do with the diagnosis, and the command."""
+    if found.verdict == "unexplained" and not found.result.effects:
+        plan = "hystgen diagnose --plan params.yaml -o plan/"
+        return Text("Your next step: record drives in which every effect shows.", plan)
+    if found.not_emitted():
+        return Text("Your next step: see what the model would leave.", "hystgen track params.yaml RECORDS")
+    return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
 
 
 def _drawn(found: Diagnosis, name: str, width: float) -> bytes:

@@ -167,7 +167,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     if fit.warnings:
         said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {counted(len(fit.warnings), 'warning')} below.")
     command = f"hystgen emit {parameter_file} -o firmware/{operator}"
-    return [*(Text(text) for text in said), Text("To get the C code, run:", command)]
+    return [*(Text(text) for text in said), Text("Your next step: write the C.", command)]
 
 
 def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> list[Section]:
