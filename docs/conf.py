@@ -15,13 +15,6 @@ project_copyright = "the hystgen maintainers, MIT licence"
 release = version = __version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_click", "sphinx_copybutton", "breathe", "generated"]
-nitpicky = True
-nitpick_ignore_regex = [  # types of the standard library and of others, which have no page here
-    ("py:.*", r"(?!hystgen).*"),
-    ("py:.*", r"hystgen\.(basics|chain|compensator|diagnosis|effects|emission|parameters|plays|verification)\..*"),
-    ("cpp:identifier|c:identifier", ".*"),
-]
-
 myst_heading_anchors = 3
 default_role = "code"  # docstrings have names in single backquotes
 autodoc_typehints = "none"  # signatures have them

@@ -59,10 +59,10 @@ def diagnose(
     """Find what a nominal model is missing.
 
     `parameters`: a `Model`, a parameter file, or what `identify` found; `records`: measured, to be fitted, each as
-    `identify` takes them; `holdout`: records with other
-    waveforms that judge; without them, or where too little of them can be compared, every third record, or the end of
-    one, is held out. `history`: drive values visited before every record, ignored where the starts of the records
-    contradict it; `rest`: seconds of pause after them. `effects`: further effects that take part.
+    `identify` takes them; `holdout`: records with other waveforms that judge; without them, or where too little of them
+    can be compared, every third record, or the end of one, is held out. `history`: drive values visited before every
+    record, ignored where the starts of the records contradict it; `rest`: seconds of pause after them. `effects`:
+    further effects that take part.
 
     The nominal model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
     weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance does
