@@ -3,7 +3,7 @@
 #define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's output, in sums */
 
 /* Field by field: for a whole structure a compiler may call memcpy. */
-HYSTGEN_APART void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
+HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
     to->output = from->output;
     to->input = from->input;
     to->k = from->k;
