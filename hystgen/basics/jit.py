@@ -88,7 +88,7 @@ class Jit(Generic[P, R]):
     @functools.cached_property
     def entry(self) -> Any:
         """The function compiled by numba, to be called from Python."""
-        return self._dispatcher("entry", {})
+        return self._dispatcher("entry", self.targetoptions)
 
     @functools.cached_property
     def inner(self) -> Any:
@@ -96,9 +96,9 @@ class Jit(Generic[P, R]):
 
         What takes a model's tables apart for it would be more code than the function itself.
         """
-        return self._dispatcher("inner", {"no_cpython_wrapper": True, "no_cfunc_wrapper": True})
+        return self._dispatcher("inner", {**self.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
-    def _dispatcher(self, kind: str, options: dict[str, bool]) -> Any:
+    def _dispatcher(self, kind: str, options: dict[str, Any]) -> Any:
         import numba
 
         _listen()
@@ -109,7 +109,7 @@ class Jit(Generic[P, R]):
         )
         twin.__module__ = function.__module__
         twin.__qualname__ = f"{function.__name__}_{kind}_{self.mark}"
-        made = numba.njit(**self.targetoptions, **options)(twin)
+        made = numba.njit(**options)(twin)
         with contextlib.suppress(RuntimeError):  # no folder that can be written to
             made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
         return made
