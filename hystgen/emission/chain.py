@@ -205,7 +205,7 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
         ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
         ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
-        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""), ("HALF", moving.HALF, ""),
+        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
         ("SEEN", moving.SEEN, "share of a step's way at which the input counts as standing still"),
     )  # fmt: skip
     constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 c12861602b6f808d265f3953f83501192eb0e5b0eabc736cc86ddaa71fd3a753, without this line
+ * Text: sha256 3942c0745dcbe9c41d5028f065f82a062bde6da4c11a5edd369c86cb1a58435d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -464,7 +464,7 @@ static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved
 }
 
 /* The next step begins here. */
-static void curved_inverse_keep(curved_inverse_t *self) {
+CURVED_APART void curved_inverse_keep(curved_inverse_t *self) {
     curved_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 607bbd33e5c591c2fa113032de389ee907dcd6cd398d8618763198b0fbb1c3b2, without this line
+ * Text: sha256 bc071703631b22b01aae267fa5f299e2e3e27d01684141a12df1548d11c6e474, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -17,11 +17,8 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-#define PLAIN_HALF 0.5f
-
-/* Whether each operation of a number is a call of a library. */
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define PLAIN_SOFT_FLOAT
+#define PLAIN_SOFT_FLOAT /* each operation of a number is a call of a library */
 #endif
 
 #if defined(__GNUC__)
@@ -53,6 +50,14 @@ typedef struct {
     uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
     plain_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } plain_start_t;
+
+static void plain_copy_place(plain_place_t *to, const plain_place_t *from) {
+    to->input = from->input; /* field by field: for a whole structure a compiler may call memcpy */
+    to->output = from->output;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
 
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
@@ -184,15 +189,12 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        if (t->segment[c->top].reach > room) {
-            /* gains fall from segment to segment: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) { /* gains fall: the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
         m->from = -plain_along(m, from);
         m->base = c->output;
-        if (k == 0 && from <= t->range[!rising]) {
-            m->behind = m->from; /* back to the corner it is the same line */
-        }
+        m->behind = k == 0 && from <= t->range[!rising] ? m->from : input; /* the same line back */
     }
     m->begin = plain_along(m, begin);
     m->start = plain_along(m, start);
@@ -201,12 +203,9 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     if (plain_along(m, output) > t->limit[rising]) {
         return false;
     }
-    if (plain_along(m, output) < plain_along(m, m->here.output)) {
-        cap = x; /* by rounding: no move leads back */
-    } else {
-        m->here.output = output;
-    }
-    cap = t->range[rising] < cap ? t->range[rising] : cap;
+    const bool back = plain_along(m, output) < plain_along(m, m->here.output); /* by rounding */
+    m->here.output = back ? m->here.output : output;
+    cap = back ? x : t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = plain_along(m, cap);
     m->next = plain_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -242,15 +241,19 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
                              plain_corner_t *corner, const plain_start_t *start) {
     unsigned int k;
-    corner[0] = start->bottom;
+    corner[0].output = start->bottom.output;
+    corner[0].pass[0] = start->bottom.pass[0];
+    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].top = start->bottom.top;
+    corner[0].rose = start->bottom.rose;
     m->here.depth = 1;
     for (k = start->bottom.top - 1u; k > 0; --k) {
         const plain_real_t *center = start->center[start->step > 0 ? k : 0u];
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = center[0] + plain_along(m, t->segment[k].way * PLAIN_HALF);
-        m->here.output = center[1] + plain_along(m, t->segment[k].reach * PLAIN_HALF);
+        m->here.input = center[0] + plain_along(m, t->segment[k].way / 2);
+        m->here.output = center[1] + plain_along(m, t->segment[k].reach / 2);
         plain_leave_corner(t, m, corner);
     }
     m->here.k = 0;
@@ -288,7 +291,7 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
     plain_plays_t *m = &self->plays;
     plain_real_t x = u - PLAIN_OFFSET;
     unsigned int bits = 0;
-    self->undo = m->here;
+    plain_copy_place(&self->undo, &m->here);
     if (!(u >= PLAIN_OUTPUT_MIN && u <= PLAIN_OUTPUT_MAX)) {
         bits = u >= -FLT_MAX && u <= FLT_MAX ? PLAIN_STATUS_INPUT_CLAMPED : PLAIN_STATUS_HELD;
         x = (u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX) - PLAIN_OFFSET;
@@ -336,7 +339,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
         return m->here.output;
     }
     if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
-        self->undo = m->here;
+        plain_copy_place(&self->undo, &m->here);
         self->before = x;
         if (plain_move_in_block(&plain_inverse_curve, m, x)) {
             return m->here.output;
@@ -357,13 +360,12 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
         self->returned = m->here.output;
     }
     self->committed = true;
-    if (self->before < m->here.input || self->before > m->here.input) {
-        /* the last step went on along its line */
-        self->undo = m->here;
+    if (self->before < m->here.input || self->before > m->here.input) { /* it went along a line */
+        plain_copy_place(&self->undo, &m->here);
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
-    m->here = self->undo;
+    plain_copy_place(&m->here, &self->undo);
     plain_forget_line(m);
     plain_move_to_output(&plain_inverse_curve, m, self->corner, v);
     self->before = m->here.input;
@@ -373,7 +375,7 @@ PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, const plain_start_t 
     plain_start(&plain_inverse_curve, &self->plays, self->corner, start);
     plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
                          plain_clamp_drive(self->plays.here.output));
-    self->undo = self->plays.here;
+    plain_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;

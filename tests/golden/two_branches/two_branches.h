@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 7bdcc0f501bac834085207aa437f964983fdf538fff59a1ae406aebfa6387515, without this line
+ * Text: sha256 01c234b0bc70928b0a5a0d0c23ae2434a0a742ee836279d5c6abd54aa6dcfbd0, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -177,11 +177,8 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-#define TWO_BRANCHES_HALF 0.5f
-
-/* Whether each operation of a number is a call of a library. */
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define TWO_BRANCHES_SOFT_FLOAT
+#define TWO_BRANCHES_SOFT_FLOAT /* each operation of a number is a call of a library */
 #endif
 
 #if defined(__GNUC__)
@@ -389,6 +386,14 @@ static two_branches_real_t two_branches_envelope_inverse(const two_branches_enve
     return (two_branches_atanh(argument) - e->a2) * e->inverse_a1;
 }
 
+static void two_branches_copy_place(two_branches_place_t *to, const two_branches_place_t *from) {
+    to->input = from->input; /* field by field: for a whole structure a compiler may call memcpy */
+    to->output = from->output;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
                                                      two_branches_real_t x) {
@@ -529,15 +534,12 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        if (t->segment[c->top].reach > room) {
-            /* gains fall from segment to segment: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) { /* gains fall: the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
         m->from = -two_branches_along(m, from);
         m->base = c->output;
-        if (k == 0 && from <= t->range[!rising]) {
-            m->behind = m->from; /* back to the corner it is the same line */
-        }
+        m->behind = k == 0 && from <= t->range[!rising] ? m->from : input; /* the same line back */
     }
     m->begin = two_branches_along(m, begin);
     m->start = two_branches_along(m, start);
@@ -546,12 +548,10 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     if (two_branches_along(m, output) > t->limit[rising]) {
         return false;
     }
-    if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
-        cap = x; /* by rounding: no move leads back */
-    } else {
-        m->here.output = output;
-    }
-    cap = t->range[rising] < cap ? t->range[rising] : cap;
+    /* by rounding */
+    const bool back = two_branches_along(m, output) < two_branches_along(m, m->here.output);
+    m->here.output = back ? m->here.output : output;
+    cap = back ? x : t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = two_branches_along(m, cap);
     m->next = two_branches_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -612,15 +612,19 @@ TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_br
                                            two_branches_corner_t *corner,
                                            const two_branches_start_t *start) {
     unsigned int k;
-    corner[0] = start->bottom;
+    corner[0].output = start->bottom.output;
+    corner[0].pass[0] = start->bottom.pass[0];
+    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].top = start->bottom.top;
+    corner[0].rose = start->bottom.rose;
     m->here.depth = 1;
     for (k = start->bottom.top - 1u; k > 0; --k) {
         const two_branches_real_t *center = start->center[start->step > 0 ? k : 0u];
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = center[0] + two_branches_along(m, t->segment[k].way * TWO_BRANCHES_HALF);
-        m->here.output = center[1] + two_branches_along(m, t->segment[k].reach * TWO_BRANCHES_HALF);
+        m->here.input = center[0] + two_branches_along(m, t->segment[k].way / 2);
+        m->here.output = center[1] + two_branches_along(m, t->segment[k].reach / 2);
         two_branches_leave_corner(t, m, corner);
     }
     m->here.k = 0;
@@ -714,7 +718,7 @@ TWO_BRANCHES_APART two_branches_real_t
 
 /* The next step begins here. */
 static void two_branches_inverse_keep(two_branches_inverse_t *self) {
-    self->undo = self->plays.here;
+    two_branches_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -728,7 +732,7 @@ static void two_branches_inverse_arrive(two_branches_inverse_t *self, two_branch
 /* The actuator has gone to v in place of where the last step led. */
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
                                                      two_branches_real_t v) {
-    self->plays.here = self->undo;
+    two_branches_copy_place(&self->plays.here, &self->undo);
     two_branches_forget_line(&self->plays);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
