@@ -4,9 +4,11 @@
    applied goes through all of them forwards, a reference backwards, so that the memory is the
    actuator's and nothing else. Which blocks there are, the model's own functions say:
 
-   drive_side    lag: in front of the memoryless part and the plays
-   output_side   creep, ageing, heat, gain: behind the plays
-   displaced     saturation, offsets and drift, behind everything
+   waited, slewed   delay and slew limit: of the forward operator, and the inverse has none of a
+                    delay, whose reference comes ahead of its time
+   drive_side       lag: in front of the memoryless part and the plays
+   output_side      creep, ageing, heat, gain: behind the plays; forwards the modes of the stage too
+   displaced        saturation, offsets and drift, behind everything
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
@@ -31,7 +33,12 @@ static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
     if (moving) {
         hystgen_forward_travelled(self, v);
     }
-    const hystgen_signal_t x = hystgen_entered_drive(v);
+    const hystgen_reach_t late = hystgen_forward_waited(self, v);
+    const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
+    if (reached < late || reached > late) {
+        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
+    }
+    const hystgen_signal_t x = hystgen_entered_drive((hystgen_real_t)reached);
     const hystgen_signal_t a = moving ? hystgen_forward_drive_side_absorb(self, x)
                                       : hystgen_forward_drive_side_rest(self, x);
     self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
@@ -231,11 +238,7 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    const hystgen_reach_t reached = hystgen_forward_slewed(self, inside);
-    if (reached < inside || reached > inside) {
-        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
-    }
-    hystgen_forward_absorb(self, (hystgen_real_t)reached);
+    hystgen_forward_absorb(self, inside);
     self->answer =
         hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
     return self->answer;

@@ -24,6 +24,12 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
+    int64_t before; /* input of the last sample */
+    int64_t off;    /* output less input */
+    int64_t rate;   /* of that, per radian of the mode */
+} hystgen_mode_t;
+
+typedef struct {
     int32_t gain;
     int32_t inverse;
     int64_t offset;

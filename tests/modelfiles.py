@@ -104,7 +104,7 @@ CHAINS = {
 }  # fmt: skip
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
-INVERSE_ALONE = ("straight", "viscous_twin", "late", "drifting_late", "everything")
+INVERSE_ALONE = ("viscous_twin",)
 
 FLOAT_ALONE = (
     "drifting", "drifting_late", "heated", "viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot",

@@ -93,7 +93,8 @@ def _blocks(values: SimpleNamespace) -> list[str]:
     if not values.variant.chain:
         return []
     blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
-    return [file for file in blocks if not file.startswith("preview") or len(values.numbers.tap)]
+    missing = {"preview": not len(values.numbers.tap), "delay": not values.numbers.delay.samples}
+    return [file for file in blocks if not missing.get(file.split(".")[0].split("_")[0])]
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:

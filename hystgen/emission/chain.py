@@ -104,10 +104,10 @@ def _table(declared: str, entries: Sequence[str]) -> str:
     lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
     return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
-def sides(t: ChainTables) -> tuple[list[Block], list[Block]]:
-    """The blocks in front of the plays, from the drive on, and those behind them."""
+def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
+    """The blocks of an operator in front of the plays, from the drive on, and those behind them."""
     found: list[list[Block]] = []
-    for side in blocks.sides(t):
+    for side in blocks.sides(t, operator):
         counts: Counter[str] = Counter()
         found.append([])
         for constants in side:
@@ -242,10 +242,10 @@ class Glue:
 def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
-    before, after = sides(t)
+    named = {op: sides(t, op) for op in operators}
     clocks = [Block(constants, "clock") for constants in drift.constants(t.clock)]
     functions = [
-        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, clocks)
+        line for op in operators for line in _functions(op, *named[op], behind, len(t.tap) > 0, clocks)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -254,8 +254,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "forward": every,
         "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
-    arrays = [text for block in (*before, *after, *clocks) for text in block.arrays(prefix)]
-    if len(t.tap):
+    own = {op: [*before, *after, *clocks] for op, (before, after) in named.items()}
+    largest = max(own.values(), key=len)  # the forward operator has what the inverse has, and modes
+    arrays = [text for block in largest for text in block.arrays(prefix)]
+    if "forward" in operators and t.delay.samples and t.fixed:
+        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{_entries(t.delay.share, 'f')[1:-1]}}};\n")
+    if "inverse" in operators and len(t.tap):
         arrays.append(
             constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
             if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
@@ -269,6 +273,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
     constants += [("LEAD", operand(row[drift.MOST_AHEAD]), "samples that references come ahead") for row in t.clock]
+    constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
+    if t.delay.samples and not t.fixed:
+        constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
     if isinstance(t.moving, FixedMovingTables):
@@ -277,9 +284,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
-    both, n = [*before, *after, *clocks], len(t.threshold) - 1
+    n = len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
-    fields = {op: instance(op, both, len(t.tap), n, kept, searched) for op in operators}
+    fields = {op: instance(op, t, own[op], n, kept, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
@@ -308,12 +315,14 @@ _PLAYS = "play 0 is the input of the plays"
 _KEPT = "; behind them what each has lost"
 
 
-def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int, moving: bool) -> list[Field]:
+def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
-    inverse = op == "inverse"
+    inverse, taps = op == "inverse", len(t.tap)
+    slew, waiting = t.slew and not inverse, 0 if inverse else t.delay.samples
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
+        *([Field("real", "reached", "what the amplifier made of it")] if slew else []),
         Field("fine", "drive", "what arrived of it in front of the plays"),
         Field("signal", "level", "sum of the plays"),
         Field("signal", "output", "what the output side made of it"),
@@ -321,6 +330,7 @@ def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int,
         Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
         *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
+        *([Field("real", "waiting", "drives", waiting), Field("status", "oldest", "of them")] if waiting else []),
         Field("flag", "ascending", "direction of the drive's last move"),
         Field("flag", "moving", "a drive was applied"),
         *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from hystgen.arithmetic.factors import error as missed
+from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.layout import ChainTables, Parts
@@ -29,6 +30,8 @@ from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.resonance import fixed as resonance_fixed
+from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS
@@ -40,12 +43,14 @@ DOUBLE = 2.0**-40
 @dataclass(frozen=True)
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes: forwards the sum of the plays, the input of each
-    creep and of each saturation, and the output; back what is left of a reference behind each saturation, the target
-    that the output side is given, and the sum that is asked of the plays."""
+    creep, mode and saturation, the output if modes stand still, and the output; back what is left of a reference behind
+    each saturation, the target that the output side is given, and the sum that is asked of the plays."""
 
     plays: float
     creeps: list[float]
+    modes: list[float]
     saturations: list[float]
+    still: float
     output: float
     undone: list[float]
     target: float
@@ -54,7 +59,8 @@ class Sizes:
     @property
     def largest(self) -> float:
         """Of all of them."""
-        return max(self.plays, *self.creeps, *self.saturations, self.output, *self.undone, self.target, self.asked)
+        forwards = (self.plays, *self.creeps, *self.modes, *self.saturations, self.output)
+        return max(*forwards, *self.undone, self.target, self.asked)
 
 
 @dataclass(frozen=True)
@@ -89,6 +95,7 @@ class Bounds:
     drop: int
     creeps: list[CreepNumbers]
     lags: list[tuple[bool, tuple[float, float, float, float]]]
+    modes: list[ModeNumbers]
     taps: list[float]
     bends: list[Bend]
     ends: tuple[float, float]
@@ -121,7 +128,7 @@ class Bounds:
         state = 2.0**-bits * self._signal
         found = 0.0
         for rate, _, late, weight in numbers.terms.tolist():
-            scale = 2.0 ** (bits - creep_fixed.lifted(late, bits))
+            scale = 2.0 ** (bits - lifted(late, bits))
             found += state * (0.5 / rate + 2.0**drop) + 0.5 * self._signal / scale / rate
             found += 0.5 * self._signal + missed(weight) * size + 2.0 * size * missed(late * scale) / scale / rate
             found += 2.0 * weight * size * missed(rate * 2.0**drop) / 2.0**drop / rate
@@ -241,15 +248,19 @@ class Bounds:
     def forward(self) -> float:
         """In output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        error = self._plays(self._arrival()[0] + short)
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
+        error = self._plays(self._arrival()[0] + short + waited)
         if self.lags and self.static.branches_differ:  # what arrives comes to rest on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):
             error = error * numbers.rest + self._creep(j)
         gains, share = self._gains()
-        error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.output + self._signal))
+        error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.still + self._signal))
         if self.parts.ageing:
-            error += ageing.TABLE_ERROR * self.sizes.output
+            error += ageing.TABLE_ERROR * self.sizes.still
+        for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
+            scale = 2.0**self.bits
+            error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
         there = self._saturation()[2]
         return upward(Fraction(SECOND_ORDER * (error + there + 0.5 + self._signal) + DOUBLE * self.sizes.output))
 
@@ -265,8 +276,8 @@ class Bounds:
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
             error = error * math.fsum(map(abs, self.taps)) + own
         gains, share = self._gains()
-        late = self._late() * self.sizes.output
-        error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.output + self._signal) + late)
+        late = self._late() * self.sizes.still
+        error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds
         for j, numbers in reversed(list(enumerate(self.creeps))):

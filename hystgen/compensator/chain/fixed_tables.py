@@ -34,13 +34,13 @@ from hystgen.compensator.chain.layout import (
     LEVEL_DROP,
     MOST_CODE,
     OFFSET,
-    SAMPLES_A_SWEEP,
     SHARE_BITS,
     VERIFIED_SHARE,
     ChainTables,
     Codes,
     Compiled,
     Parts,
+    fastest,
     output_range,
     taps_of,
 )
@@ -50,8 +50,12 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing import fixed as ageing_fixed
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep import fixed as creep_fixed
+from hystgen.effects.delay import compensator as delay
+from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.saturation.fixed import Saturations
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
@@ -101,6 +105,7 @@ class _Builder:
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
         self.taps = taps_of(self.parts, seconds, how)
         self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
+        self.modes = [resonance.numbers(each, seconds) for each in self.parts.modes]
         self.lags = [lag.numbers(each, seconds) for each in self.parts.lags]
         self.given = (lsb[0] is not None, lsb[1] is not None)
 
@@ -128,6 +133,8 @@ class _Builder:
             self._need(lambda: moving.build_fixed(plays, static, self.parts.plays, self.seconds), "rate_dependence"),
             self._need(self._lags, "a lag"),
             self._need(self._creep_tables, "creep"),
+            self._need(self._delay, "a delay"),
+            self._need(self._mode_tables, "resonance"),
             self._need(lambda: self._ageing(span), "ageing"),
             self._need(self._gains, "a temperature"),
             HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
@@ -138,13 +145,15 @@ class _Builder:
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
         )
-        step = min((self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)) * self.seconds, span)
-        slowed = 0.0
+        max_rate, slowed = fastest(static, self.parts, self.seconds, self.how), 0.0
         if self.parts.slew:
             slowed = max(1.0 - math.floor(rate) / float(rate) for rate in self.rates())
+            max_rate = min(max_rate, math.floor(min(self.rates())) * float(self.drive_lsb) / self.seconds)
+        step = min(max_rate * self.seconds, span)
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
-            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags, weights,
+            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
+            self.modes, weights,
             self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
@@ -152,7 +161,6 @@ class _Builder:
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
-        max_rate = self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)
         return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)
 
     # ------------------------------------------------------------ refusals
@@ -192,13 +200,18 @@ class _Builder:
             size *= thermal.LARGEST_GAIN
         for _ in self.parts.thermal:
             size = size * thermal.LARGEST_GAIN + span
+        still = size
+        modes = []
+        for mode in self.modes:
+            modes.append(size)
+            size = size * mode.largest * slack + 1.0
         saturations = [size] * len(self.parts.saturations)
-        output = size + abs(self._code(static.output_offset)) + span
+        beside = abs(self._code(static.output_offset)) + span
         back = float(self.about.code_max) + abs(self._code(static.output_offset)) + span + 1.0
         undone = [back]
         for effect in reversed(self.parts.saturations):
             if isinstance(effect, TanhSaturation):
-                back = self.led_back(effect, settled, size)
+                back = self.led_back(effect, settled, still)
             elif isinstance(effect, HardSaturation):
                 back = min(back, self._code(effect.level) + 1.0)
             elif isinstance(effect, Stops):
@@ -214,7 +227,7 @@ class _Builder:
         for each, inside in zip(reversed(self.creeps), reversed(creeps), strict=True):
             moved = inside + (asked + inside * each.rest) / each.slope
             asked = max(moved, asked / each.rest) * slack + 1.0
-        return Sizes(plays, creeps, saturations, output, undone, target, asked)
+        return Sizes(plays, creeps, modes, saturations, still + beside, size + beside, undone, target, asked)
 
     def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
         """Largest input to which a displacement is led back: any that the model has at rest at least."""
@@ -324,6 +337,15 @@ class _Builder:
         scale = 2.0**self.bits
         sizes = [size * scale for size in self.sizes.creeps]
         return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
+
+    def _delay(self) -> DelayTables:
+        waited, waiting = delay.numbers(self.parts.delay, self.seconds)
+        return DelayTables(np.array(factor(waited) if waiting else (), dtype=np.int64), waiting)
+
+    def _mode_tables(self) -> Any:
+        scale = 2.0**self.bits
+        pairs = zip(self.modes, self.sizes.modes, strict=True)
+        return resonance_fixed.tables([resonance_fixed.row(one, size * scale) for one, size in pairs])
 
     def _ageing(self, span: float) -> Any:
         rows = [

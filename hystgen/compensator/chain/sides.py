@@ -7,185 +7,233 @@ change with time, so that their order makes no difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.chain.own import OwnTables
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.thermal.compensator import heat_absorb, heat_solve
-from hystgen.plays.slots import Reals
+
+Function = Callable[..., Any]
 
 
 class Blocks(NamedTuple):
-    """What the blocks of a chain do in one arithmetic, each function as in the C of the same name."""
+    """What the blocks of a chain do in one arithmetic: modules with functions named as in the C, and functions."""
 
-    lag: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # rest, absorb, solve
-    creep: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # and resting
-    ageing: tuple[Callable[..., Any], Callable[..., Any]]  # absorb, solve
-    ageing_settings: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # move, set, set_travel
-    gain: tuple[Callable[..., Any], Callable[..., Any]]
-    gain_settings: tuple[Callable[..., Any], Callable[..., Any]]  # reset, heat
-    saturation: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
-    target: Callable[..., Any]  # of the preview's line
-    front: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
-    plays: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # follow, started, inverse input
-    finer: Callable[..., Any]  # what has to arrive, with bits below an input of the plays
+    lag: ModuleType
+    creep: ModuleType
+    ageing: ModuleType
+    thermal: ModuleType
+    resonance: ModuleType
+    saturation: tuple[Function, Function]  # forward, inverse
+    target: Function  # of the preview's line
+    delayed: Function  # drive, of the line of those that wait
+    front: tuple[Function, Function]  # forward, inverse
+    plays: tuple[Function, Function, Function]  # follow, started, inverse input
+    finer: Function  # what has to arrive, with bits below an input of the plays
 
 
 class Sides(NamedTuple):
     """What both sides of the plays do, of tables, state and a number."""
 
-    drive_rest: Callable[..., Any]
-    drive_absorb: Callable[..., Any]
-    drive_solve: Callable[..., Any]
-    output_rest: Callable[..., Any]
-    output_absorb: Callable[..., Any]
-    output_resting: Callable[..., Any]
-    output_solve: Callable[..., Any]
+    drive_rest: Function
+    drive_absorb: Function
+    drive_solve: Function
+    output_rest: Function
+    output_absorb: Function
+    output_resting: Function
+    output_solve: Function
 
 
-def _one(block: OwnBlock, verb: str, j: int) -> Callable[..., Any]:
-    """What block `j` of the user's own does."""
-    function = block.compiled[verb]
-    if verb == "resting":
+class _Kind(NamedTuple):
+    """Blocks of one kind: how many there are, of tables and state, and the verbs, of tables, state, which one, and a
+    number; `solve` and `resting` are None for what the forward operator alone has."""
+
+    count: Function
+    rest: Function
+    absorb: Function
+    solve: Function | None
+    resting: Function | None
+
+
+def _every(count: Function, verb: Function, backwards: bool) -> Function:
+    """What all blocks of a kind do one after the other."""
+    if backwards:
 
         @jit
-        def resting(t: OwnTables, s: Reals, y: Any) -> Any:  # noqa: ARG001  as of every block
-            return function(t.number[t.first[j] : t.first[j + 1]], y)
-
-        return resting
-
-    @jit
-    def call(t: OwnTables, s: Reals, x: Any) -> Any:
-        return function(t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]], x)
-
-    return call
-
-
-def _through(calls: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """What blocks do one after the other."""
-    if not calls:
-
-        @jit(inline=True)
-        def nothing(t: OwnTables, s: Reals, x: Any) -> Any:  # noqa: ARG001  as of any blocks
+        def back(t: ChainTables, s: Any, x: Any) -> Any:
+            for j in range(count(t, s) - 1, -1, -1):
+                x = verb(t, s, j, x)
             return x
 
-        return nothing
+        return back
+
+    @jit
+    def through(t: ChainTables, s: Any, x: Any) -> Any:
+        for j in range(count(t, s)):
+            x = verb(t, s, j, x)
+        return x
+
+    return through
+
+
+def _through(calls: Sequence[Function]) -> Function:
+    """What one function does after the other."""
     if len(calls) == 1:
         return calls[0]
     first, behind = calls[0], _through(calls[1:])
 
     @jit
-    def both(t: OwnTables, s: Reals, x: Any) -> Any:
+    def both(t: ChainTables, s: Any, x: Any) -> Any:
         return behind(t, s, first(t, s, x))
 
     return both
 
 
+def _own(block: OwnBlock, j: int) -> _Kind:
+    """Block `j` of the user's own."""
+
+    @jit
+    def one(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
+        return 1
+
+    def call(function: Function) -> Function:
+        @jit
+        def verb(t: ChainTables, s: Any, _: int, x: Any) -> Any:
+            numbers = t.own.number[t.own.first[j] : t.own.first[j + 1]]
+            return function(numbers, s.own[t.own.place[j] : t.own.place[j + 1]], x)
+
+        return verb
+
+    resting_of = block.compiled["resting"]
+
+    @jit
+    def resting(t: ChainTables, s: Any, _: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+        return resting_of(t.own.number[t.own.first[j] : t.own.first[j + 1]], y)
+
+    rest, absorb, solve = (call(block.compiled[verb]) for verb in ("rest", "absorb", "solve"))
+    return _Kind(one, rest, absorb, solve, resting)
+
+
+def _lags(lag: ModuleType) -> _Kind:
+    @jit
+    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
+        return len(t.lag.exact)
+
+    def call(function: Function) -> Function:
+        @jit
+        def verb(t: ChainTables, s: Any, j: int, x: Any) -> Any:
+            return function(t.lag, s.lag, j, x)
+
+        return verb
+
+    return _Kind(count, call(lag.lag_rest), call(lag.lag_absorb), call(lag.lag_solve), None)
+
+
+def _creeps(creep: ModuleType) -> _Kind:
+    @jit
+    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
+        return len(t.creep.block)
+
+    def call(function: Function) -> Function:
+        @jit
+        def verb(t: ChainTables, s: Any, j: int, x: Any) -> Any:
+            return function(t.creep, s.creep, j, x)
+
+        return verb
+
+    verbs = (creep.creep_rest, creep.creep_absorb, creep.creep_solve, creep.creep_resting)
+    return _Kind(count, *map(call, verbs))
+
+
+def _ageing(ageing: ModuleType) -> _Kind:
+    absorb_of, solve_of = ageing.ageing_absorb, ageing.ageing_solve
+
+    @jit
+    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
+        return len(t.ageing.turns)
+
+    @jit
+    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        return absorb_of(s.ageing, j, x)
+
+    @jit
+    def solve(t: ChainTables, s: Any, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+        return solve_of(s.ageing, j, y)
+
+    return _Kind(count, absorb, absorb, solve, solve)
+
+
+def _heats() -> _Kind:
+    @jit
+    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
+        return len(t.heat.turns)
+
+    @jit
+    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        return heat_absorb(s.heat, j, x)
+
+    @jit
+    def solve(t: ChainTables, s: Any, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+        return heat_solve(s.heat, j, y)
+
+    return _Kind(count, absorb, absorb, solve, solve)
+
+
+def _gains(thermal: ModuleType) -> _Kind:
+    absorb_of, solve_of = thermal.gain_absorb, thermal.gain_solve
+
+    @jit
+    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
+        return len(t.gain)
+
+    @jit
+    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        return absorb_of(s.gain, j, x)
+
+    @jit
+    def solve(t: ChainTables, s: Any, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+        return solve_of(s.gain, j, y)
+
+    return _Kind(count, absorb, absorb, solve, solve)
+
+
+def _modes(resonance: ModuleType) -> _Kind:
+    rest_of, absorb_of = resonance.mode_rest, resonance.mode_absorb
+
+    @jit
+    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  the inverse has no memory of them
+        return len(s.mode)
+
+    @jit
+    def rest(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        return rest_of(s.mode, j, x)
+
+    @jit
+    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:
+        return absorb_of(t.mode, s.mode, j, x)
+
+    return _Kind(count, rest, absorb, None, None)
+
+
 def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
     """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them."""
-    lag_rest, lag_absorb, lag_solve = blocks.lag
-    creep_rest, creep_absorb, creep_solve, creep_resting = blocks.creep
-    ageing_absorb, ageing_solve = blocks.ageing
-    gain_absorb, gain_solve = blocks.gain
+    ahead = [_own(block, j) for j, block in enumerate(drives)]
+    behind = [_own(block, len(drives) + j) for j, block in enumerate(outputs)]
+    before = [_lags(blocks.lag), *ahead]
+    after = [
+        _creeps(blocks.creep), *behind, _ageing(blocks.ageing), _heats(), _gains(blocks.thermal),
+        _modes(blocks.resonance),
+    ]  # fmt: skip
 
-    def own(verb: str, given: Sequence[OwnBlock], begin: int, backwards: bool = False) -> Callable[..., Any]:
-        calls = [_one(block, verb, begin + j) for j, block in enumerate(given)]
-        return _through(calls[::-1] if backwards else calls)
-
-    own_drive_rest, own_drive_absorb = own("rest", drives, 0), own("absorb", drives, 0)
-    own_drive_solve = own("solve", drives, 0, backwards=True)
-    ahead = len(drives)
-    own_output_rest, own_output_absorb = own("rest", outputs, ahead), own("absorb", outputs, ahead)
-    own_output_resting = own("resting", outputs, ahead, backwards=True)
-    own_output_solve = own("solve", outputs, ahead, backwards=True)
-
-    @jit
-    def drive_side_rest(t: ChainTables, s: Any, v: Any) -> Any:
-        """Everything in front of the plays settles at drive v; what arrives there."""
-        x = v
-        for j in range(len(t.lag.exact)):
-            x = lag_rest(t.lag, s.lag, j, x)
-        return own_drive_rest(t.own, s.own, x)
-
-    @jit
-    def drive_side_absorb(t: ChainTables, s: Any, v: Any) -> Any:
-        """The drive is v at this sample; what arrives in front of the plays."""
-        x = v
-        for j in range(len(t.lag.exact)):
-            x = lag_absorb(t.lag, s.lag, j, x)
-        return own_drive_absorb(t.own, s.own, x)
-
-    @jit
-    def drive_side_solve(t: ChainTables, s: Any, y: Any) -> Any:
-        """The drive that leads to y in front of the plays."""
-        x = own_drive_solve(t.own, s.own, y)
-        for j in range(len(t.lag.exact) - 1, -1, -1):
-            x = lag_solve(t.lag, s.lag, j, x)
-        return x
-
-    @jit
-    def output_side_rest(t: ChainTables, s: Any, h: Any) -> Any:
-        """Everything behind the plays settles at their sum h; the output."""
-        x = h
-        for j in range(len(t.creep.block)):
-            x = creep_rest(t.creep, s.creep, j, x)
-        x = own_output_rest(t.own, s.own, x)
-        for j in range(len(t.ageing.turns)):
-            x = ageing_absorb(s.ageing, j, x)
-        for j in range(len(t.heat.turns)):
-            x = heat_absorb(s.heat, j, x)
-        for j in range(len(t.gain)):
-            x = gain_absorb(s.gain, j, x)
-        return x
-
-    @jit
-    def output_side_absorb(t: ChainTables, s: Any, h: Any) -> Any:
-        """The sum of the plays is h at this sample; the output."""
-        x = h
-        for j in range(len(t.creep.block)):
-            x = creep_absorb(t.creep, s.creep, j, x)
-        x = own_output_absorb(t.own, s.own, x)
-        for j in range(len(t.ageing.turns)):
-            x = ageing_absorb(s.ageing, j, x)
-        for j in range(len(t.heat.turns)):
-            x = heat_absorb(s.heat, j, x)
-        for j in range(len(t.gain)):
-            x = gain_absorb(s.gain, j, x)
-        return x
-
-    @jit
-    def output_side_resting(t: ChainTables, s: Any, y: Any) -> Any:
-        """The sum of the plays that gives the output y once everything has settled."""
-        x = y
-        for j in range(len(t.gain) - 1, -1, -1):
-            x = gain_solve(s.gain, j, x)
-        for j in range(len(t.heat.turns) - 1, -1, -1):
-            x = heat_solve(s.heat, j, x)
-        for j in range(len(t.ageing.turns) - 1, -1, -1):
-            x = ageing_solve(s.ageing, j, x)
-        x = own_output_resting(t.own, s.own, x)
-        for j in range(len(t.creep.block) - 1, -1, -1):
-            x = creep_resting(t.creep, s.creep, j, x)
-        return x
-
-    @jit
-    def output_side_solve(t: ChainTables, s: Any, y: Any) -> Any:
-        """The sum of the plays that gives the output y at this sample."""
-        x = y
-        for j in range(len(t.gain) - 1, -1, -1):
-            x = gain_solve(s.gain, j, x)
-        for j in range(len(t.heat.turns) - 1, -1, -1):
-            x = heat_solve(s.heat, j, x)
-        for j in range(len(t.ageing.turns) - 1, -1, -1):
-            x = ageing_solve(s.ageing, j, x)
-        x = own_output_solve(t.own, s.own, x)
-        for j in range(len(t.creep.block) - 1, -1, -1):
-            x = creep_solve(t.creep, s.creep, j, x)
-        return x
+    def verb(kinds: Sequence[_Kind], name: str) -> Function:
+        calls = [(kind.count, getattr(kind, name)) for kind in kinds]
+        backwards = name in ("solve", "resting")
+        every = [_every(count, call, backwards) for count, call in calls if call is not None]
+        return _through(every[::-1] if backwards else every)
 
     return Sides(
-        drive_side_rest, drive_side_absorb, drive_side_solve, output_side_rest, output_side_absorb,
-        output_side_resting, output_side_solve,
-    )  # fmt: skip
+        *(verb(before, name) for name in ("rest", "absorb", "solve")),
+        *(verb(after, name) for name in ("rest", "absorb", "resting", "solve")),
+    )

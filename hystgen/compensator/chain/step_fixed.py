@@ -27,11 +27,13 @@ from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import MOVING, ChainState, Codes
 from hystgen.compensator.layout import FixedTables
-from hystgen.effects.ageing.fixed import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
-from hystgen.effects.creep.fixed import creep_absorb, creep_rest, creep_resting, creep_solve
-from hystgen.effects.lag.fixed import lag_absorb, lag_rest, lag_solve
+from hystgen.effects.ageing import fixed as ageing
+from hystgen.effects.creep import fixed as creep
+from hystgen.effects.delay.compensator import fixed_delayed
+from hystgen.effects.lag import fixed as lag
+from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.saturation.fixed import saturated, unsaturated
-from hystgen.effects.thermal.fixed import gain_absorb, gain_heat, gain_reset, gain_solve
+from hystgen.effects.thermal import fixed as thermal
 from hystgen.front import curve
 from hystgen.plays.fixed import loop_solve, nearest, over_slope
 from hystgen.plays.loop import loop_absorb, loop_output
@@ -189,18 +191,9 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 
 BLOCKS = Blocks(
-    (lag_rest, lag_absorb, lag_solve),
-    (creep_rest, creep_absorb, creep_solve, creep_resting),
-    (ageing_absorb, ageing_solve),
-    (ageing_move, ageing_set, ageing_set_travel),
-    (gain_absorb, gain_solve),
-    (gain_reset, gain_heat),
-    (saturated, unsaturated),
-    preview_target,
-    (front_forward, front_inverse),
-    (follow, started, inverse_input),
-    finer,
-)
+    lag, creep, ageing, thermal, resonance, (saturated, unsaturated), preview_target, fixed_delayed,
+    (front_forward, front_inverse), (follow, started, inverse_input), finer,
+)  # fmt: skip
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
 )  # fmt: skip

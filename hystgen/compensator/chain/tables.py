@@ -11,6 +11,7 @@ from hystgen.compensator.chain.layout import Compiled, Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import SHAPES as AGEING
 from hystgen.effects.base import USER, Effect, Place
+from hystgen.effects.delay import compensator as delay
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.model import SelfHeating
 from hystgen.parameters.schema import Compensation
@@ -47,8 +48,11 @@ def refusals(
     low, high = chain.cascade.input_range
     parts = Parts.of(chain.effects)
     for effect in chain.effects:
-        if operator != "inverse" and effect.name in ("delay", "resonance"):
-            yield effect, "only the inverse has it; emit the inverse alone"
+        if operator != "inverse" and effect.name == "delay" and parts.delay > delay.MOST_SAMPLES * seconds:
+            yield effect, (
+                f"{parts.delay / seconds:.6g} samples, and the forward operator keeps {delay.MOST_SAMPLES} at most; "
+                "emit the inverse alone"
+            )
         elif effect.name == "drift" and "drift" not in how.compensate:
             yield effect, (
                 "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
