@@ -42,4 +42,12 @@ typedef struct {
     bool own; /* the gain follows the travel */
 } hystgen_ageing_t;
 
+typedef struct {
+    int64_t whole;  /* drift in signals, */
+    int64_t part;   /* and the part of one, in units of the table */
+    int64_t lead;   /* samples that the next reference is ahead */
+    int64_t gained; /* by the change in a sample since the start */
+    int64_t count;
+} hystgen_clock_t;
+
 #endif

@@ -91,6 +91,16 @@ typedef struct {
     uint8_t bits;  /* of a gain below a code that sets it */
 } hystgen_ageing_table_t;
 
+/* Drift over time: its change in the first sample, and what that changes by from sample to sample.
+ */
+typedef struct {
+    int64_t slope;
+    int64_t change;
+    int64_t samples; /* after which it stays where it is */
+    int64_t farthest;
+    uint8_t bits; /* of slope and change below those of a signal */
+} hystgen_clock_table_t;
+
 /* A smooth limit, or the way back from it, as polynomials. */
 typedef struct {
     const int32_t *knot;

@@ -107,7 +107,7 @@ CHAINS = {
 INVERSE_ALONE = ("viscous_twin",)
 
 FLOAT_ALONE = (
-    "drifting", "drifting_late", "heated", "viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot",
+    "heated", "viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot",
 )  # fmt: skip
-"""Those with a clock or own heat, or whose plays are bent, have a nonlinear dashpot or do not all relax with one time
+"""Those with own heat, or whose plays are bent, have a nonlinear dashpot or do not all relax with one time
 constant, which fixed point does not have."""

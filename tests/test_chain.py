@@ -584,7 +584,7 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
     for name in FLOAT_ALONE:
-        what = "a clock and for own heat" if name in ("drifting", "drifting_late", "heated") else "plays that"
+        what = "own heat" if name == "heated" else "plays that"
         with pytest.raises(UnsupportedEffectsError, match=f"in fixed point there is no C for {what}"):
             emit_options(model(name), arithmetic="q15", operator="inverse")
     assert emit_options(model("viscous"), arithmetic="q31", allow_partial=True).left_out

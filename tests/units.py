@@ -51,6 +51,7 @@ UNITS = (
     ("bumpy", "float32", "loop"),
     ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
+    ("late", "q31", "loop"),
     ("relaxing", "float32", "loop"),
     ("lagging", "q15", "loop"),
     ("quick", "q31", "loop"),
@@ -59,6 +60,7 @@ UNITS = (
     ("straight", "q31", "loop"),
     ("relaxing", "q15", "loop"),
     ("drifting", "float32", "loop"),
+    ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""

@@ -26,6 +26,7 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.effects.drift import compensator as drift
+from hystgen.effects.drift import fixed as drift_fixed
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
 from hystgen.plays import slots
@@ -243,7 +244,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
     named = {op: sides(t, op) for op in operators}
-    clocks = [Block(constants, "clock") for constants in drift.constants(t.clock)]
+    clocks = [Block(constants, "clock") for constants in blocks.clocks(t)]
     functions = [
         line for op in operators for line in _functions(op, *named[op], behind, len(t.tap) > 0, clocks)
     ]
@@ -272,7 +273,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_FALLING": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
-    constants += [("LEAD", operand(row[drift.MOST_AHEAD]), "samples that references come ahead") for row in t.clock]
+    farthest = (drift_fixed if t.fixed else drift).MOST_AHEAD
+    constants += [("LEAD", operand(row[farthest]), "samples that references come ahead") for row in t.clock]
     constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
     if t.delay.samples and not t.fixed:
         constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
@@ -398,7 +400,7 @@ def _functions(
     )
     if inverse:
         lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
-        lines = [f"const hystgen_real_t lead = {lead};"] * len(clocks)
+        lines = [f"const hystgen_signal_t lead = {lead};"] * len(clocks)
         lines.append(f"hystgen_signal_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
         lines += [
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
@@ -411,7 +413,7 @@ def _functions(
         )
         put = [
             line for each in clocks
-            for line in (f"const hystgen_real_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
+            for line in (f"const hystgen_signal_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
                          f"self->{each.name}.lead = lead > HYSTGEN_LEAD ? HYSTGEN_LEAD : lead;")
         ]  # fmt: skip
         put.append("hystgen_preview_put(self->line, &self->filled, y);")

@@ -11,6 +11,7 @@ from hystgen.effects.ageing import fixed as ageing_fixed
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.drift import compensator as drift
+from hystgen.effects.drift import fixed as drift_fixed
 from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
@@ -39,4 +40,9 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constant
 
 def every(t: ChainTables, operator: str) -> list[Constants]:
     """These, and the clock of a drift."""
-    return [*itertools.chain(*sides(t, operator)), *drift.constants(t.clock)]
+    return [*itertools.chain(*sides(t, operator)), *clocks(t)]
+
+
+def clocks(t: ChainTables) -> list[Constants]:
+    """The clock of a drift, where there is one."""
+    return drift_fixed.constants(t.clock) if t.fixed else drift.constants(t.clock)

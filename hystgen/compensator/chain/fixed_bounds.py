@@ -82,8 +82,8 @@ class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
     `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
-    whole codes; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
-    `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
+    whole codes; `drifted`: error of drifts in signals; `reached`: whether all that is asked in front of the plays can
+    be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
     """
 
     static: StaticModel
@@ -96,6 +96,7 @@ class Bounds:
     creeps: list[CreepNumbers]
     lags: list[tuple[bool, tuple[float, float, float, float]]]
     modes: list[ModeNumbers]
+    drifted: float
     taps: list[float]
     bends: list[Bend]
     ends: tuple[float, float]
@@ -261,8 +262,8 @@ class Bounds:
         for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
             scale = 2.0**self.bits
             error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
-        there = self._saturation()[2]
-        return upward(Fraction(SECOND_ORDER * (error + there + 0.5 + self._signal) + DOUBLE * self.sizes.output))
+        beside = self._saturation()[2] + 0.5 + (1.0 + self.drifted) * self._signal
+        return upward(Fraction(SECOND_ORDER * (error + beside) + DOUBLE * self.sizes.output))
 
     def _asked(self) -> float:
         """Error of the sum that the inverse asks of the plays, in output codes."""
@@ -270,7 +271,7 @@ class Bounds:
         low, high = (end / float(self.inner.output_lsb) for end in self.ends)
         limits = self.tables.limits
         short = max(high - float(limits[3]), float(limits[2]) - low, 0.0)
-        error = slope * (short + self._signal) + back
+        error = slope * (short + (1.0 + self.drifted) * self._signal) + back
         if self.taps:
             size = max(self.sizes.undone)
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)

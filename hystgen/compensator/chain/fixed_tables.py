@@ -52,6 +52,8 @@ from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.delay import compensator as delay
 from hystgen.effects.delay.compensator import DelayTables
+from hystgen.effects.drift import fixed as drift
+from hystgen.effects.drift.fixed import ClockNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
 from hystgen.effects.resonance import compensator as resonance
@@ -138,7 +140,7 @@ class _Builder:
             self._need(lambda: self._ageing(span), "ageing"),
             self._need(self._gains, "a temperature"),
             HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
-            np.zeros((0, 8), np.int64),
+            self._need(self._clock_tables, "drift"),
             OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
             behind,
             self._need(self._tap, "the preview"),
@@ -153,7 +155,7 @@ class _Builder:
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
-            self.modes, weights,
+            self.modes, sum(each.error for each in self.clocks), weights,
             self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
@@ -206,8 +208,8 @@ class _Builder:
             modes.append(size)
             size = size * mode.largest * slack + 1.0
         saturations = [size] * len(self.parts.saturations)
-        beside = abs(self._code(static.output_offset)) + span
-        back = float(self.about.code_max) + abs(self._code(static.output_offset)) + span + 1.0
+        away = abs(self._code(static.output_offset)) + span * (1 + len(self.parts.drift))
+        back = float(self.about.code_max) + away + 1.0
         undone = [back]
         for effect in reversed(self.parts.saturations):
             if isinstance(effect, TanhSaturation):
@@ -227,7 +229,7 @@ class _Builder:
         for each, inside in zip(reversed(self.creeps), reversed(creeps), strict=True):
             moved = inside + (asked + inside * each.rest) / each.slope
             asked = max(moved, asked / each.rest) * slack + 1.0
-        return Sizes(plays, creeps, modes, saturations, still + beside, size + beside, undone, target, asked)
+        return Sizes(plays, creeps, modes, saturations, still + away, size + away, undone, target, asked)
 
     def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
         """Largest input to which a displacement is led back: any that the model has at rest at least."""
@@ -337,6 +339,17 @@ class _Builder:
         scale = 2.0**self.bits
         sizes = [size * scale for size in self.sizes.creeps]
         return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
+
+    @cached_property
+    def clocks(self) -> list[ClockNumbers]:
+        """Drifts that are counted, for references as far ahead as they may come."""
+        ahead = self.how.preview if self.how.preview is not None else max(self.taps.ahead, 0) if self.taps else 0
+        signal = self.output_lsb / 2**self.bits
+        farthest = float(self.signal(self.high - self.low))
+        return [drift.numbers(each, self.seconds, signal, farthest, ahead) for each in self.parts.drift]
+
+    def _clock_tables(self) -> Any:
+        return np.array([one.table for one in self.clocks], dtype=np.int64).reshape(-1, 7)
 
     def _delay(self) -> DelayTables:
         waited, waiting = delay.numbers(self.parts.delay, self.seconds)

@@ -77,7 +77,7 @@ class ChainTables(NamedTuple):
     ageing: AgeingTables
     gain: Reals  # (k, 8)
     heat: HeatTables
-    clock: Reals  # (k, 8)
+    clock: Reals  # (k, 8), in fixed point (k, 7)
     own: OwnTables
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview

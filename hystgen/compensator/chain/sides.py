@@ -26,6 +26,7 @@ class Blocks(NamedTuple):
     ageing: ModuleType
     thermal: ModuleType
     resonance: ModuleType
+    drift: ModuleType
     saturation: tuple[Function, Function]  # forward, inverse
     target: Function  # of the preview's line
     delayed: Function  # drive, of the line of those that wait

@@ -28,7 +28,6 @@ from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
 from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
 from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
-from hystgen.effects.drift.compensator import LEAD, MOST_AHEAD, ONE, clock_drift, clock_start, clock_tick
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.thermal.compensator import heat_move, heat_reset
 from hystgen.plays import loop
@@ -86,7 +85,7 @@ class ChainState(NamedTuple):
     ageing: AgeingState
     gain: Reals  # (k, 3)
     heat: Reals  # (k, 5)
-    clock: Reals  # (k, 3)
+    clock: Reals  # (k, 3), in fixed point (k, 5)
     mode: Reals  # (k, 3), of the forward operator
     waiting: Waiting  # of the forward operator
     own: Reals  # (m,)
@@ -108,7 +107,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
         np.zeros((len(t.heat.turns), 5), dtype),
-        np.zeros((len(t.clock), 3), dtype),
+        np.zeros((len(t.clock), 5 if t.fixed else 3), dtype),
         np.zeros((modes, 3), dtype),
         Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),
         np.zeros(t.own.place[-1], dtype),
@@ -139,6 +138,9 @@ def made_of(
     ageing, thermal = blocks.ageing, blocks.thermal
     ageing_move, ageing_set, ageing_set_travel = ageing.ageing_move, ageing.ageing_set, ageing.ageing_set_travel
     gain_reset, gain_heat = thermal.gain_reset, thermal.gain_heat
+    drift = blocks.drift
+    clock_start, clock_tick, clock_drift = drift.clock_start, drift.clock_tick, drift.clock_drift
+    LEAD, MOST_AHEAD, ONE = drift.LEAD, drift.MOST_AHEAD, drift.ONE
     saturated, unsaturated = blocks.saturation
     preview_target, delayed = blocks.target, blocks.delayed
     front_forward, front_inverse = blocks.front

@@ -30,6 +30,7 @@ from hystgen.compensator.layout import FixedTables
 from hystgen.effects.ageing import fixed as ageing
 from hystgen.effects.creep import fixed as creep
 from hystgen.effects.delay.compensator import fixed_delayed
+from hystgen.effects.drift import fixed as drift
 from hystgen.effects.lag import fixed as lag
 from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.saturation.fixed import saturated, unsaturated
@@ -191,7 +192,7 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 
 BLOCKS = Blocks(
-    lag, creep, ageing, thermal, resonance, (saturated, unsaturated), preview_target, fixed_delayed,
+    lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
     (front_forward, front_inverse), (follow, started, inverse_input), finer,
 )  # fmt: skip
 CODES = Codes(

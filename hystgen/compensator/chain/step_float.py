@@ -22,6 +22,7 @@ from hystgen.compensator.chain.step import MOVING, ChainState, Codes
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.delay.compensator import delayed
+from hystgen.effects.drift import compensator as drift
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.thermal import compensator as thermal
@@ -110,7 +111,7 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 
 BLOCKS = Blocks(
-    lag, creep, ageing, thermal, resonance, (saturated, unsaturated), preview_target, delayed,
+    lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
     (front_forward, front_inverse), (follow, started, inverse_input), finer,
 )  # fmt: skip
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)
