@@ -59,6 +59,8 @@ UNITS = (
     ("worn", "q15", "loop"),
     ("straight", "q31", "loop"),
     ("relaxing", "q15", "loop"),
+    ("wider", "q31", "loop"),
+    ("viscous_twin", "q15", "loop"),
     ("drifting", "float32", "loop"),
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),

@@ -215,11 +215,18 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     return arrays, [*constants, *counts]
 
 
-def _relaxing(t: FixedMovingTables, prefix: str) -> list[str]:
-    """Tables of viscous plays in fixed point."""
+def _fixed_moving(t: FixedMovingTables, prefix: str) -> list[str]:
+    """Tables of plays that depend on the rate in fixed point."""
+    kind = f"static const {prefix}_factor_t {prefix}"
+    if not t.scanned:
+        names = ("late", "kept") if t.moves == moving.RELAXING else ("wider",)
+        return [
+            constant(f"{prefix}_factor_t {prefix}_{name}[{len(rows)}]", [f"    {_entries(row, 'f')}," for row in rows])
+            for name, rows in zip(names, (t.first, t.second), strict=False)
+        ]
     return [
-        *(f"static const {prefix}_factor_t {prefix}_relaxing_{name} = {{{_entries(row, 'f')[1:-1]}}};\n"
-          for name, row in (("late", t.late), ("kept", t.kept))),
+        *(f"{kind}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
+          for name, rows in (("late", t.first), ("kept", t.second))),
         table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
         table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
         table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
@@ -281,11 +288,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
     if isinstance(t.moving, FixedMovingTables):
-        arrays += _relaxing(t.moving, prefix) if t.moving.used else []
+        arrays += _fixed_moving(t.moving, prefix) if t.moving.used else []
+        constants.append(("LARGEST_INPUT", operand(t.moving.farthest), "of the plays, for a search"))
     elif t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
-    searched = t.moving.used and not t.moving.scanned
+    searched = t.moving.used and not t.moving.scanned and not t.fixed
     n = len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
     fields = {op: instance(op, t, own[op], n, kept, searched) for op in operators}

@@ -218,10 +218,16 @@ class Variant:
             slew = "chain_slew.c" if self.slew else "chain_free.c"
             delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
             kept = () if self.moves == "dashpot" else ("moved_kept.c",)
-            moving = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
-            ending = "_fixed" * self.fixed
-            alone = "relaxing" if self.moves else "plays"
-            plays = moving if self.bends else (f"chain_{alone}{ending}.c",)
+            bent = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
+            searched = ("moved_searched_fixed.c",) if self.bends else ()
+            moving = ("stretched_fixed.c", f"moved_{self.moves}_fixed.c", *searched, "chain_moving_fixed.c")
+            plays: tuple[str, ...]
+            if not self.moves and not self.bends:
+                plays = ("chain_plays_fixed.c" if self.fixed else "chain_plays.c",)
+            elif self.fixed:
+                plays = moving
+            else:
+                plays = bent if self.bends else ("chain_relaxing.c",)
             finer = "chain_finer.c" if self.finer else "chain_whole.c"
             return (start, f"loop_{front}.c", delay, slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
         return (

@@ -17,12 +17,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 from hystgen.arithmetic.factors import error as missed
 from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.layout import ChainTables, Parts
+from hystgen.compensator.chain.moving import DILATED, least_dilated
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
@@ -104,6 +106,7 @@ class Bounds:
     reached: bool
     largest_step: float
     finer: int
+    seconds: float
 
     @property
     def _fine(self) -> int:
@@ -228,23 +231,48 @@ class Bounds:
         rounded = bool(self.static.stages) or self._fine > 0
         return here, code * rounded
 
-    def _viscous(self) -> float:
-        """What roundings, and contacts inside a step, make of the sum of viscous plays, in output codes."""
+    @cached_property
+    def _shares(self) -> list[tuple[float, float]]:
+        """Factors of how each play moves, as in `FixedMovingTables`."""
+        t = self.tables.moving
+        return [
+            (float(m) / 2.0 ** int(shift), float(n) / 2.0 ** int(second))
+            for (m, shift), (n, second) in zip(t.first[1:].tolist(), t.second[1:].tolist(), strict=True)
+        ]
+
+    def _moved(self) -> float:
+        """What roundings, and contacts inside a step, make of the sum of plays that depend on the rate, in codes."""
         t = self.tables.moving
         if not t.used:
             return 0.0
-        late, kept = (float(row[0]) / 2.0 ** int(row[1]) for row in (t.late, t.kept))
-        low, high = self.inner.hull
-        wrong = 2.0 * float(high - low) * (2.0**-30 * (late + kept))
-        play = (1.0 + wrong) / min(late, 1.0) * float(self.inner.step) + 0.25 * self.largest_step
-        slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * float(high - low)
-        return math.fsum(self.static.pi.weights[1:]) * play / float(self.inner.output_lsb) + slopes
+        travel, step = float(self.inner.hull[1] - self.inner.hull[0]), float(self.inner.step)
+        plays = []
+        for first, second in self._shares:
+            if t.moves == DILATED:
+                plays.append((1.0 + 2.0**-30 * first * travel) * step)
+            elif first < 1.0:
+                wrong = 2.0 * travel * (2.0**-30 * (first + second))
+                plays.append((1.0 + wrong) / first * step + 0.25 * self.largest_step)
+            else:
+                plays.append(step)
+        slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
+        found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], plays, strict=True))
+        return found / float(self.inner.output_lsb) + slopes
+
+    @cached_property
+    def _steepest(self) -> float:
+        """Largest change of the sum of the plays for one of their input, at all samples."""
+        if self.tables.moving.moves != DILATED:
+            return float(self.static.pi.slopes[-1])
+        first, *others = map(abs, self.static.pi.weights)
+        more = (p * (1.0 + 2.0 * wider) for p, (wider, _) in zip(others, self._shares, strict=True))
+        return float(first + math.fsum(more))
 
     def _plays(self, arriving: float) -> float:
         """Error of the sum of the plays for one of what arrives in front of the memoryless part, in output codes."""
-        steep = self.static.front_slopes[1] * self.static.pi.slopes[-1] / float(self.inner.output_lsb)
+        steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
-        return float(self.inner.sum_error()) + self._viscous() + steep * arriving * self._arriving + level
+        return float(self.inner.sum_error()) + self._moved() + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
         """In output codes."""
@@ -291,11 +319,12 @@ class Bounds:
         code = self._arrival()
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         steep = self.static.front_slopes[1]
-        solved = float(self.inner.solved()) / self._arriving + steep * float(self.inner.back())
+        t = self.tables.moving
+        solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
+        solved = solution / self._arriving + steep * float(self.inner.back())
         slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         solved += steep * (sum(code) + short + slowed)
-        outer = self.static.pi.slopes[-1]
-        missed_by = self._plays(0.0) * float(self.inner.output_lsb) + outer * solved * self._arriving
+        missed_by = self._plays(0.0) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
         for numbers in self.creeps:  # whose states have seen what the plays gave
             missed_by *= numbers.slope * self._creep_gain(numbers)
         residual = self._asked() * float(self.inner.output_lsb) + missed_by
@@ -303,6 +332,8 @@ class Bounds:
 
     def _gain(self) -> float:
         """Largest change of the drive in front of the memoryless part for one of the plays' sum."""
+        if self.tables.moving.moves == DILATED:  # for plays that have seen the same drives
+            return 1.0 / least_dilated(self.static, self.parts.plays, self.seconds) / self.static.front_slopes[0]
         if self.tables.moving.used:  # as in floating point: each play is stretched further than it would be
             return 2.0 / self.static.pi.weights[0] / self.static.front_slopes[0]
         return float(self.inner.gain())
@@ -336,7 +367,8 @@ class Bounds:
     def condition(self) -> str:
         """What `rounding` holds for where drives in front of a lag can part without a bound but the range."""
         led = any(not exact for exact, _ in self.lags)
-        if not (led or (self.lags and (not self.reached or self.parts.slew))):
+        dilated = self.tables.moving.moves == DILATED
+        if not (led or dilated or (self.lags and (not self.reached or self.parts.slew))):
             return ""
         return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
 

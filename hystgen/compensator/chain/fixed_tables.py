@@ -132,7 +132,7 @@ class _Builder:
         tables = ChainTables(
             plays,
             limits,
-            self._need(lambda: moving.build_fixed(plays, static, self.parts.plays, self.seconds), "rate_dependence"),
+            self._need(lambda: self._moving(plays), "rate_dependence"),
             self._need(self._lags, "a lag"),
             self._need(self._creep_tables, "creep"),
             self._need(self._delay, "a delay"),
@@ -157,6 +157,7 @@ class _Builder:
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
             self.modes, sum(each.error for each in self.clocks), weights,
             self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
+            self.seconds,
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
@@ -249,6 +250,14 @@ class _Builder:
 
     # ------------------------------------------------------------ constants
 
+    @property
+    def _farthest(self) -> int:
+        """Largest input that is asked of the plays."""
+        return int(max(map(abs, self.inner.hull)) + self.inner.margin)
+
+    def _moving(self, plays: Any) -> Any:
+        return moving.build_fixed(plays, self.static, self.parts.plays, self.seconds, self._farthest)
+
     def _limits(self, plays: Any) -> Any:
         """Those of the whole chain."""
         limits = plays.copy()
@@ -277,8 +286,7 @@ class _Builder:
         found[2], found[3] = self.slew(span)
         found[4] = round(VERIFIED_SHARE * (self.about.code_max + 1))
         found[LEVEL_BITS], found[LEVEL_DROP] = self.bits, self.drop
-        hull = max(map(abs, self.inner.hull)) + self.inner.margin
-        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * hull >> self.drop, LARGEST)
+        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * self._farthest >> self.drop, LARGEST)
         found[LEAST_CODE] = self.inner.drive[0] - 2 * span
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits

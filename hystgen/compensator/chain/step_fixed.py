@@ -22,7 +22,7 @@ from hystgen.compensator.chain.layout import (
     TRAVEL_BITS,
     ChainTables,
 )
-from hystgen.compensator.chain.moving import fixed_relaxing_follow
+from hystgen.compensator.chain.moving import PLAIN, fixed_moved_follow, fixed_moved_input
 from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import MOVING, ChainState, Codes
@@ -57,7 +57,7 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
     return w, 0
 
 
-# ---------------------------------------------------------------- chain_plays_fixed.c or chain_relaxing_fixed.c
+# ---------------------------------------------------------------- chain_plays_fixed.c or chain_moving_fixed.c
 
 
 @jit
@@ -69,8 +69,8 @@ def started(t: ChainTables, s: ChainState) -> Any:
 @jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
     """The plays follow their input w; their sum."""
-    if t.moving.scanned and s.flags[MOVING]:
-        total = fixed_relaxing_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
+    if t.moving.moves != PLAIN and s.flags[MOVING]:
+        total = fixed_moved_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
         return nearest(total, t.number[LEVEL_DROP])
     loop_absorb(t.plays, s.plays, w)
     return started(t, s)
@@ -84,9 +84,9 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
         inside = t.number[LARGEST_LEVEL]
     elif inside < -t.number[LARGEST_LEVEL]:
         inside = -t.number[LARGEST_LEVEL]
-    if t.moving.scanned and s.flags[MOVING]:
-        s.plays.play[0] = s.plays.play[1]
-        return loop_solve(t.moving.relaxed, s.plays, inside << t.number[LEVEL_DROP])
+    if t.moving.moves != PLAIN and s.flags[MOVING]:
+        given = inside << t.number[LEVEL_DROP]
+        return fixed_moved_input(t.moving, t.plays.threshold, t.plays.weight, s.plays, given)
     return loop_solve(t.plays, s.plays, inside << t.number[LEVEL_DROP])
 
 

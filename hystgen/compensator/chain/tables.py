@@ -86,4 +86,4 @@ def refusals(
     without = list(moving.problems(chain.cascade, parts.plays))
     yield from without
     if ARITHMETICS[arithmetic].fixed and not without:
-        yield from moving.beyond_fixed(chain.cascade, parts.plays, seconds)
+        yield from moving.beyond_fixed(parts.plays)
