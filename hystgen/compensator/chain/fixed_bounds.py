@@ -257,7 +257,7 @@ class Bounds:
                 plays.append(step)
         slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
         found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], plays, strict=True))
-        return found / float(self.inner.output_lsb) + slopes
+        return float(found / float(self.inner.output_lsb) + slopes)
 
     @cached_property
     def _steepest(self) -> float:
