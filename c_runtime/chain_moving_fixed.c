@@ -34,7 +34,7 @@ static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_
 }
 
 /* Input of the plays at which their sum is h. */
-static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
     const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
                                     : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
                                                                  : h;

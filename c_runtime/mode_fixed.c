@@ -4,8 +4,8 @@
    and the rate of that, with bits below those of a signal. */
 
 /* A number in units of the states times a factor. */
-static int64_t hystgen_mode_scaled(const hystgen_mode_table_t *t, int64_t x,
-                                   const hystgen_factor_t *f) {
+HYSTGEN_APART int64_t hystgen_mode_scaled(const hystgen_mode_table_t *t, int64_t x,
+                                          const hystgen_factor_t *f) {
     return hystgen_times(x >> t->drop, f);
 }
 
@@ -24,17 +24,16 @@ static int64_t hystgen_mode_rest(hystgen_mode_t *self, int64_t x) {
 }
 
 /* The input is x at this sample. Returns the output. */
-static int64_t hystgen_mode_absorb(const hystgen_mode_table_t *t, hystgen_mode_t *self, int64_t x) {
+HYSTGEN_APART int64_t hystgen_mode_absorb(const hystgen_mode_table_t *t, hystgen_mode_t *self,
+                                          int64_t x) {
     const int64_t change = x - self->before;
     const int64_t off = self->off;
-    const int64_t rate = self->rate;
-    const int64_t turned =
-        hystgen_mode_scaled(t, off, &t->keep) + hystgen_mode_scaled(t, rate, &t->turn);
-    const int64_t late = hystgen_mode_entered(t, change, &t->late);
-    self->off = off + (turned + (late - change * ((int64_t)1 << t->bits)));
-    self->rate =
-        rate + (hystgen_mode_scaled(t, rate, &t->swing) - hystgen_mode_scaled(t, off, &t->turn) +
-                hystgen_mode_entered(t, change, &t->push));
     self->before = x;
-    return x + hystgen_nearest(self->off, t->bits);
+    self->off +=
+        hystgen_mode_scaled(t, off, &t->keep) + hystgen_mode_scaled(t, self->rate, &t->turn);
+    self->rate +=
+        hystgen_mode_scaled(t, self->rate, &t->swing) - hystgen_mode_scaled(t, off, &t->turn);
+    self->off += hystgen_mode_entered(t, change, &t->late) - change * ((int64_t)1 << t->bits);
+    self->rate += hystgen_mode_entered(t, change, &t->push);
+    return self->before + hystgen_nearest(self->off, t->bits);
 }

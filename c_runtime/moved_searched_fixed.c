@@ -3,7 +3,7 @@
 /* Plays that have to be searched for, in fixed point: each moves in its own way (hystgen_moved). */
 
 /* What the plays give once their input has gone to w. */
-static hystgen_sum_t hystgen_moved_sum(const hystgen_play_t *play, hystgen_reach_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_moved_sum(const hystgen_play_t *play, hystgen_reach_t w) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     hystgen_sum_t sum = (hystgen_sum_t)t->weight[0] * w;
     unsigned int i;

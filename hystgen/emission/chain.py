@@ -215,7 +215,7 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     return arrays, [*constants, *counts]
 
 
-def _fixed_moving(t: FixedMovingTables, prefix: str) -> list[str]:
+def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> list[str]:
     """Tables of plays that depend on the rate in fixed point."""
     kind = f"static const {prefix}_factor_t {prefix}"
     if not t.scanned:
@@ -224,9 +224,12 @@ def _fixed_moving(t: FixedMovingTables, prefix: str) -> list[str]:
             constant(f"{prefix}_factor_t {prefix}_{name}[{len(rows)}]", [f"    {_entries(row, 'f')}," for row in rows])
             for name, rows in zip(names, (t.first, t.second), strict=False)
         ]
-    return [
-        *(f"{kind}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
-          for name, rows in (("late", t.first), ("kept", t.second))),
+    factors = [
+        f"{kind}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
+        for name, rows in (("late", t.first), ("kept", t.second))
+    ]
+    return factors if not inverse else [
+        *factors,
         table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
         table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
         table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
@@ -288,7 +291,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
     if isinstance(t.moving, FixedMovingTables):
-        arrays += _fixed_moving(t.moving, prefix) if t.moving.used else []
+        arrays += _fixed_moving(t.moving, prefix, "inverse" in operators) if t.moving.used else []
         constants.append(("LARGEST_INPUT", operand(t.moving.farthest), "of the plays, for a search"))
     elif t.moving.used:
         more, numbers = _moving(t.moving, prefix)

@@ -106,7 +106,7 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
     curves, counts = _curves(plays, name, prefix, options) if plays.fronts else ([], [])
     pointers = _fixed_loop_pointers(plays, name, options)
     own = [_loop_tables(pointers, plays, name, prefix)]
-    if tables.moving.scanned:
+    if tables.moving.scanned and options.inverse:
         others = [f"{name}_relaxing_{part}" for part in ("slope", "reciprocal", "shift")]
         own.append(_loop_tables([*pointers[:2], *others, *pointers[5:]], plays, name, prefix, "relaxing"))
     about = _limits(plays, [*_fixed_constants(plays), *counts, *glue.constants])
