@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.own import OwnTables
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.thermal.compensator import heat_absorb, heat_solve
+from hystgen.plays.slots import Reals
 
 Function = Callable[..., Any]
 
@@ -47,194 +49,157 @@ class Sides(NamedTuple):
     output_solve: Function
 
 
-class _Kind(NamedTuple):
-    """Blocks of one kind: how many there are, of tables and state, and the verbs, of tables, state, which one, and a
-    number; `solve` and `resting` are None for what the forward operator alone has."""
-
-    count: Function
-    rest: Function
-    absorb: Function
-    solve: Function | None
-    resting: Function | None
-
-
-def _every(count: Function, verb: Function, backwards: bool) -> Function:
-    """What all blocks of a kind do one after the other."""
-    if backwards:
-
-        @jit
-        def back(t: ChainTables, s: Any, x: Any) -> Any:
-            for j in range(count(t, s) - 1, -1, -1):
-                x = verb(t, s, j, x)
-            return x
-
-        return back
+def _each(verb: Function) -> Function:
+    """What n blocks of a kind do one after the other, of their tables and memory."""
 
     @jit
-    def through(t: ChainTables, s: Any, x: Any) -> Any:
-        for j in range(count(t, s)):
+    def through(t: Any, s: Any, n: int, x: Any) -> Any:
+        for j in range(n):
             x = verb(t, s, j, x)
         return x
 
     return through
 
 
+def _back(verb: Function) -> Function:
+    """The same from the last one to the first."""
+
+    @jit
+    def through(t: Any, s: Any, n: int, x: Any) -> Any:
+        for j in range(n - 1, -1, -1):
+            x = verb(t, s, j, x)
+        return x
+
+    return through
+
+
+def _tabled(verb: Function) -> Function:
+    """A verb that takes no tables, as one that does."""
+
+    @jit(inline=True)
+    def call(t: Any, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        return verb(s, j, x)
+
+    return call
+
+
+def _one(block: OwnBlock, verb: str, j: int) -> Function:
+    """What block `j` of the user's own does."""
+    function = block.compiled[verb]
+    if verb == "resting":
+
+        @jit
+        def resting(t: OwnTables, s: Reals, y: Any) -> Any:  # noqa: ARG001  as of every block
+            return function(t.number[t.first[j] : t.first[j + 1]], y)
+
+        return resting
+
+    @jit
+    def call(t: OwnTables, s: Reals, x: Any) -> Any:
+        return function(t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]], x)
+
+    return call
+
+
 def _through(calls: Sequence[Function]) -> Function:
-    """What one function does after the other."""
+    """What blocks of the user's own do one after the other."""
+    if not calls:
+
+        @jit(inline=True)
+        def nothing(t: OwnTables, s: Reals, x: Any) -> Any:  # noqa: ARG001  as of any blocks
+            return x
+
+        return nothing
     if len(calls) == 1:
         return calls[0]
     first, behind = calls[0], _through(calls[1:])
 
     @jit
-    def both(t: ChainTables, s: Any, x: Any) -> Any:
+    def both(t: OwnTables, s: Reals, x: Any) -> Any:
         return behind(t, s, first(t, s, x))
 
     return both
 
 
-def _own(block: OwnBlock, j: int) -> _Kind:
-    """Block `j` of the user's own."""
-
-    @jit
-    def one(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
-        return 1
-
-    def call(function: Function) -> Function:
-        @jit
-        def verb(t: ChainTables, s: Any, _: int, x: Any) -> Any:
-            numbers = t.own.number[t.own.first[j] : t.own.first[j + 1]]
-            return function(numbers, s.own[t.own.place[j] : t.own.place[j + 1]], x)
-
-        return verb
-
-    resting_of = block.compiled["resting"]
-
-    @jit
-    def resting(t: ChainTables, s: Any, _: int, y: Any) -> Any:  # noqa: ARG001  as of every block
-        return resting_of(t.own.number[t.own.first[j] : t.own.first[j + 1]], y)
-
-    rest, absorb, solve = (call(block.compiled[verb]) for verb in ("rest", "absorb", "solve"))
-    return _Kind(one, rest, absorb, solve, resting)
-
-
-def _lags(lag: ModuleType) -> _Kind:
-    @jit
-    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
-        return len(t.lag.exact)
-
-    def call(function: Function) -> Function:
-        @jit
-        def verb(t: ChainTables, s: Any, j: int, x: Any) -> Any:
-            return function(t.lag, s.lag, j, x)
-
-        return verb
-
-    return _Kind(count, call(lag.lag_rest), call(lag.lag_absorb), call(lag.lag_solve), None)
-
-
-def _creeps(creep: ModuleType) -> _Kind:
-    @jit
-    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
-        return len(t.creep.block)
-
-    def call(function: Function) -> Function:
-        @jit
-        def verb(t: ChainTables, s: Any, j: int, x: Any) -> Any:
-            return function(t.creep, s.creep, j, x)
-
-        return verb
-
-    verbs = (creep.creep_rest, creep.creep_absorb, creep.creep_solve, creep.creep_resting)
-    return _Kind(count, *map(call, verbs))
-
-
-def _ageing(ageing: ModuleType) -> _Kind:
-    absorb_of, solve_of = ageing.ageing_absorb, ageing.ageing_solve
-
-    @jit
-    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
-        return len(t.ageing.turns)
-
-    @jit
-    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
-        return absorb_of(s.ageing, j, x)
-
-    @jit
-    def solve(t: ChainTables, s: Any, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
-        return solve_of(s.ageing, j, y)
-
-    return _Kind(count, absorb, absorb, solve, solve)
-
-
-def _heats() -> _Kind:
-    @jit
-    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
-        return len(t.heat.turns)
-
-    @jit
-    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
-        return heat_absorb(s.heat, j, x)
-
-    @jit
-    def solve(t: ChainTables, s: Any, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
-        return heat_solve(s.heat, j, y)
-
-    return _Kind(count, absorb, absorb, solve, solve)
-
-
-def _gains(thermal: ModuleType) -> _Kind:
-    absorb_of, solve_of = thermal.gain_absorb, thermal.gain_solve
-
-    @jit
-    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  as of every kind
-        return len(t.gain)
-
-    @jit
-    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
-        return absorb_of(s.gain, j, x)
-
-    @jit
-    def solve(t: ChainTables, s: Any, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
-        return solve_of(s.gain, j, y)
-
-    return _Kind(count, absorb, absorb, solve, solve)
-
-
-def _modes(resonance: ModuleType) -> _Kind:
-    rest_of, absorb_of = resonance.mode_rest, resonance.mode_absorb
-
-    @jit
-    def count(t: ChainTables, s: Any) -> int:  # noqa: ARG001  the inverse has no memory of them
-        return len(s.mode)
-
-    @jit
-    def rest(t: ChainTables, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
-        return rest_of(s.mode, j, x)
-
-    @jit
-    def absorb(t: ChainTables, s: Any, j: int, x: Any) -> Any:
-        return absorb_of(t.mode, s.mode, j, x)
-
-    return _Kind(count, rest, absorb, None, None)
-
-
 def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
-    """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them."""
-    ahead = [_own(block, j) for j, block in enumerate(drives)]
-    behind = [_own(block, len(drives) + j) for j, block in enumerate(outputs)]
-    before = [_lags(blocks.lag), *ahead]
-    after = [
-        _creeps(blocks.creep), *behind, _ageing(blocks.ageing), _heats(), _gains(blocks.thermal),
-        _modes(blocks.resonance),
-    ]  # fmt: skip
+    """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them.
 
-    def verb(kinds: Sequence[_Kind], name: str) -> Function:
-        calls = [(kind.count, getattr(kind, name)) for kind in kinds]
-        backwards = name in ("solve", "resting")
-        every = [_every(count, call, backwards) for count, call in calls if call is not None]
-        return _through(every[::-1] if backwards else every)
+    Modes have memory in the forward operator alone, so that the inverse passes over them.
+    """
+    lag, creep, mode = blocks.lag, blocks.creep, blocks.resonance
+    lag_rest, lag_absorb, lag_solve = _each(lag.lag_rest), _each(lag.lag_absorb), _back(lag.lag_solve)
+    creep_rest, creep_absorb = _each(creep.creep_rest), _each(creep.creep_absorb)
+    creep_solve, creep_resting = _back(creep.creep_solve), _back(creep.creep_resting)
+    ageing_absorb, ageing_solve = (
+        _each(_tabled(blocks.ageing.ageing_absorb)), _back(_tabled(blocks.ageing.ageing_solve))
+    )  # fmt: skip
+    heats_absorb, heats_solve = _each(_tabled(heat_absorb)), _back(_tabled(heat_solve))
+    gain_absorb, gain_solve = _each(_tabled(blocks.thermal.gain_absorb)), _back(_tabled(blocks.thermal.gain_solve))
+    mode_rest, mode_absorb = _each(_tabled(mode.mode_rest)), _each(mode.mode_absorb)
+
+    def own(verb: str, given: Sequence[OwnBlock], begin: int) -> Function:
+        calls = [_one(block, verb, begin + j) for j, block in enumerate(given)]
+        return _through(calls[::-1] if verb in ("solve", "resting") else calls)
+
+    own_drive_rest, own_drive_absorb, own_drive_solve = (own(verb, drives, 0) for verb in ("rest", "absorb", "solve"))
+    ahead = len(drives)
+    own_output_rest, own_output_absorb = (own(verb, outputs, ahead) for verb in ("rest", "absorb"))
+    own_output_resting, own_output_solve = (own(verb, outputs, ahead) for verb in ("resting", "solve"))
+
+    @jit
+    def drive_side_rest(t: ChainTables, s: Any, v: Any) -> Any:
+        """Everything in front of the plays settles at drive v; what arrives there."""
+        return own_drive_rest(t.own, s.own, lag_rest(t.lag, s.lag, len(t.lag.exact), v))
+
+    @jit
+    def drive_side_absorb(t: ChainTables, s: Any, v: Any) -> Any:
+        """The drive is v at this sample; what arrives in front of the plays."""
+        return own_drive_absorb(t.own, s.own, lag_absorb(t.lag, s.lag, len(t.lag.exact), v))
+
+    @jit
+    def drive_side_solve(t: ChainTables, s: Any, y: Any) -> Any:
+        """The drive that leads to y in front of the plays."""
+        return lag_solve(t.lag, s.lag, len(t.lag.exact), own_drive_solve(t.own, s.own, y))
+
+    @jit(inline=True)
+    def gains_absorb(t: ChainTables, s: Any, x: Any) -> Any:
+        """What gains make of x."""
+        x = ageing_absorb(t.ageing, s.ageing, len(t.ageing.turns), x)
+        x = heats_absorb(t.heat, s.heat, len(t.heat.turns), x)
+        return gain_absorb(t.gain, s.gain, len(t.gain), x)
+
+    @jit(inline=True)
+    def gains_solve(t: ChainTables, s: Any, y: Any) -> Any:
+        """What gains make y of."""
+        y = gain_solve(t.gain, s.gain, len(t.gain), y)
+        y = heats_solve(t.heat, s.heat, len(t.heat.turns), y)
+        return ageing_solve(t.ageing, s.ageing, len(t.ageing.turns), y)
+
+    @jit
+    def output_side_rest(t: ChainTables, s: Any, h: Any) -> Any:
+        """Everything behind the plays settles at their sum h; the output."""
+        x = own_output_rest(t.own, s.own, creep_rest(t.creep, s.creep, len(t.creep.block), h))
+        return mode_rest(t.mode, s.mode, len(s.mode), gains_absorb(t, s, x))
+
+    @jit
+    def output_side_absorb(t: ChainTables, s: Any, h: Any) -> Any:
+        """The sum of the plays is h at this sample; the output."""
+        x = own_output_absorb(t.own, s.own, creep_absorb(t.creep, s.creep, len(t.creep.block), h))
+        return mode_absorb(t.mode, s.mode, len(s.mode), gains_absorb(t, s, x))
+
+    @jit
+    def output_side_resting(t: ChainTables, s: Any, y: Any) -> Any:
+        """The sum of the plays that gives the output y once everything has settled."""
+        x = own_output_resting(t.own, s.own, gains_solve(t, s, y))
+        return creep_resting(t.creep, s.creep, len(t.creep.block), x)
+
+    @jit
+    def output_side_solve(t: ChainTables, s: Any, y: Any) -> Any:
+        """The sum of the plays that gives the output y at this sample."""
+        x = own_output_solve(t.own, s.own, gains_solve(t, s, y))
+        return creep_solve(t.creep, s.creep, len(t.creep.block), x)
 
     return Sides(
-        *(verb(before, name) for name in ("rest", "absorb", "solve")),
-        *(verb(after, name) for name in ("rest", "absorb", "resting", "solve")),
-    )
+        drive_side_rest, drive_side_absorb, drive_side_solve, output_side_rest, output_side_absorb,
+        output_side_resting, output_side_solve,
+    )  # fmt: skip
