@@ -280,6 +280,30 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
         assert np.max(np.abs(forward - one.simulate(v, t=run.t, extra=run.extra))) <= bound.forward
 
 
+@pytest.mark.parametrize("name", ["lagging", "everything", "dilated", "wider"])
+def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> None:
+    """Where only that is promised: float64 to which the drives are committed that float32 sent."""
+    one = model(name, CHAINS[name].replace(BRANCHES, ""))
+    numbers, double = compiled(one, "float32"), compiled(one, "float64")
+    bound = bounds.chain_bounds(numbers, "float32")
+    assert bounds.condition(numbers)
+    run = record(numbers, 3, 400, 1.0)
+    warm = len(numbers.tables.gain) > 0
+    pairs = [(slots.OP_TEMPERATURE, 20.0)] * warm + [(slots.OP_PUSH, float(u)) for u in run.v[: numbers.ahead]]
+    pairs += [(slots.OP_STEP, float(u)) for u in run.v[numbers.ahead :]]
+    with jit.plain():
+        op, x = (np.array(column) for column in zip(*pairs, strict=True))
+        v, _ = reference.answers(numbers.tables, True, op.astype(np.uint8), x)
+        seen = []
+        for (call, value), answer in zip(pairs, v.tolist(), strict=True):
+            seen += [(call, value)] + [(slots.OP_COMMIT, answer)] * (call == slots.OP_STEP)
+        op_seen, x_seen = (np.array(column) for column in zip(*seen, strict=True))
+        w, _ = reference.answers(double.tables, True, op_seen.astype(np.uint8), x_seen)
+    steps = op == slots.OP_STEP
+    assert np.max(np.abs(v[steps] - w[op_seen == slots.OP_STEP])) <= bound.rounding
+    assert bound.rounding < 0.1 * np.ptp(one.cascade.input_range), "it says more than the range"
+
+
 def test_slow_states_neither_stall_nor_drift() -> None:
     """tau/T of 2^28: after a step of the drive the state goes where it would go without rounding."""
     seconds, tau = 1e-3, 2.0**28 * 1e-3

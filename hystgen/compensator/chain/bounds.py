@@ -137,9 +137,10 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]
     return error, error + float(np.sum(p)) * steep * width
 
 
-def _one(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
+def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:
     """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for, for one
-    arithmetic and without the plays' own; `emitted` as for `_moving`."""
+    arithmetic and without the plays' own; `emitted` as for `_moving`, `same`: of compensators whose states have seen
+    the same drives."""
     u = float(np.finfo(kind).eps) / 2
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
@@ -174,7 +175,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
     for j in range(len(t.creep.block)):
         rounding, back_gain = _creep(compiled, j, size, u)
         forward = forward * float(t.creep.block[j, creep.REST]) + rounding
-        inverse = back_gain * (inverse + rounding)
+        inverse = (1.0 / float(t.creep.block[j, creep.SLOPE]) if same else back_gain) * (inverse + rounding)
         size *= float(t.creep.block[j, creep.REST])
     for each, (there_own, _) in zip(compiled.own[t.own.ahead :], roundings, strict=True):
         forward = forward * each.forward.largest + there_own
@@ -186,8 +187,12 @@ def _one(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
     return forward + ringing * there + 3.0 * u * ringing * sizes.displacement, inverse
 
 
-def _lags(compiled: Compiled, error: float, u: float) -> float:
-    """The error of the drive, for one of what is in front of the plays."""
+def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
+    """The error of the drive, for one of what is in front of the plays; `same` as for `_one`.
+
+    States that have seen the same drives pass on `goal/rate`, and of the target before, which followed from targets,
+    `W = theta^2 e + theta (1 - theta) W`.
+    """
     drive = _sizes(compiled).drive
     for each in reversed(compiled.own[: compiled.tables.own.ahead]):
         error = each.passed(error) + each.rounding(drive, u)[1]
@@ -198,9 +203,32 @@ def _lags(compiled: Compiled, error: float, u: float) -> float:
             continue
         theta = float(row[lag.THETA])
         states = u * drive * (5.0 + u / rate)
-        goal = (1.0 + 2.0 * theta) / (1.0 - theta) * (error + states) + 6.0 * u * drive
-        error = (goal + states) * (2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
+        farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
+        before = lag.shifted(theta) if same else farthest
+        goal = before * error + farthest * states + 6.0 * u * drive
+        error = (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
     return error
+
+
+def _seen_by_creep(compiled: Compiled) -> float:
+    """What the states of creep, which see what the plays give, make of an error of what they are asked for."""
+    t, found = compiled.tables.creep, 1.0
+    for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
+        found *= slope * _creep(compiled, j, 0.0, 0.0)[1]
+    return max(found, 1.0)
+
+
+def condition(compiled: Compiled) -> str:
+    """What `rounding` holds for where drives can part without a bound but the range, in words; "" where they cannot.
+
+    A lag that is led follows its target but for a second difference, so that plays and creep behind it have not seen
+    what was solved for; what they remember differs with the drives, and the lead makes more of that. Thresholds that
+    grow with the rate make more of a difference of the drives before.
+    """
+    led = not all(compiled.tables.lag.exact)
+    remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
+    dilated = compiled.tables.moving.moves == moving.DILATED
+    return "both have seen the same drives" if dilated or (led and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
@@ -210,18 +238,24 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     pi = static.pi
     gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
     if compiled.tables.moving.used:
-        gain = 2.0 / moving.least_slope(static, compiled.parts.plays) / static.front_slopes[0]
+        least = moving.least_slope(static, compiled.parts.plays) / 2.0
+        if compiled.tables.moving.moves == moving.DILATED:
+            least = min(least, moving.least_dilated(static, compiled.parts.plays, compiled.seconds))
+        gain = 1.0 / least / static.front_slopes[0]
         pairs = zip(_moving(compiled, arithmetic, True), _moving(compiled, "float64", False), strict=True)
         there, back = (sum(each) for each in pairs)
         plays = ErrorBounds(plays.forward + there, plays.inverse + gain * back, plays.rounding + gain * back)
     u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
-    ways = _one(compiled, arithmetic, True), _one(compiled, "float64", False)
+    same = bool(condition(compiled))
+    ways = _one(compiled, arithmetic, True, same), _one(compiled, "float64", False, same)
     forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]
+    seen = 1.0 if same else _seen_by_creep(compiled)
     inverse, rounding = (
-        min(SECOND_ORDER * _lags(compiled, own + gain * asked, u), whole) for own in (plays.inverse, plays.rounding)
+        min(SECOND_ORDER * _lags(compiled, seen * own + gain * asked, u, same), whole)
+        for own in (plays.inverse, plays.rounding)
     )
-    if compiled.tables.slew and len(compiled.tables.lag.exact):
+    if same or (compiled.tables.slew and len(compiled.tables.lag.exact)):
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
     rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])

@@ -145,9 +145,10 @@ class Bounds:
         moved = self.sizes.asked + size * numbers.rest
         return numbers.slope * (missed(1.0 / numbers.slope) * moved + 0.5 * self._signal)
 
-    @staticmethod
-    def _creep_gain(numbers: CreepNumbers) -> float:
+    def _creep_gain(self, numbers: CreepNumbers) -> float:
         """Largest gain of its inverse, as in `hystgen.compensator.chain.bounds`."""
+        if self.condition:
+            return 1.0 / numbers.slope
         total, late = (float(sum(numbers.terms[:, column])) for column in (creep.WEIGHT, creep.LATE))
         around = numbers.rest - 2.0 * total + 2.0 * late
         return 1.0 / around if around > 0.0 else 2.0 / numbers.slope - 1.0 / numbers.rest
@@ -323,7 +324,7 @@ class Bounds:
         solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
         solved = solution / self._arriving + steep * float(self.inner.back())
         slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
-        solved += steep * (sum(code) + short + slowed)
+        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # what both have seen, or not
         missed_by = self._plays(0.0) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
         for numbers in self.creeps:  # whose states have seen what the plays gave
             missed_by *= numbers.slope * self._creep_gain(numbers)
@@ -344,11 +345,13 @@ class Bounds:
             exact, (rate, second, late, _) = self.lags[j]
             _, kept, answer = self._lag(j, *self._lag_sizes()[j])
             code = 0.5 * 2.0**self._fine if j == 0 else 0.5
-            if exact:
-                error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
+            if not exact:  # whose states have seen the same drives
+                goal = lag.shifted(second) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
+                error = (goal + kept) / rate + answer + code
+            elif self.condition:
+                error = (error + kept) / late + answer + code
             else:
-                goal = (1.0 + 2.0 * second) / (1.0 - second) * (error + kept + rate * code)
-                error = (goal + kept) * (2.0 - rate) / rate + (2.0 - rate) * code + answer
+                error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
         return error
 
     def _codes(self, error: float) -> float:
