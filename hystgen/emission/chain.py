@@ -256,7 +256,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     named = {op: sides(t, op) for op in operators}
     clocks = [Block(constants, "clock") for constants in blocks.clocks(t)]
     functions = [
-        line for op in operators for line in _functions(op, *named[op], behind, len(t.tap) > 0, clocks)
+        line for op in operators for line in _functions(op, t, *named[op], behind, clocks)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -370,14 +370,14 @@ def _function(comment: str, head: str, lines: Sequence[str]) -> str:
 
 def _functions(
     op: str,
+    t: ChainTables,
     before: Sequence[Block],
     after: Sequence[Block],
     behind: Sequence[dict[str, Any]],
-    ahead: bool,
     clocks: Sequence[Block],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
-    inverse = op == "inverse"
+    inverse, ahead = op == "inverse", len(t.tap) > 0
     self_t = f"hystgen_{op}_t *self"
 
     def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
@@ -448,6 +448,8 @@ def _functions(
         f"static void hystgen_{op}_settings_init({self_t})",
         [
             "self->offset = 0;",
+            *(["self->reached = 0;"] if t.slew and not inverse else []),
+            *(["hystgen_delay_rest(self->waiting, &self->oldest, 0);"] if t.delay.samples and not inverse else []),
             *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
             *(f"self->{each.name}.lead = 0;" for each in clocks),
             *(f"hystgen_heat_init(&self->{each.name});" for each in heat),
