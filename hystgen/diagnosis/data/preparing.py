@@ -208,8 +208,8 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
 def contradicted(items: Sequence[Item], fitted: Model) -> OtherHistory | None:
     """The finding where the starts, which depend on the history, are off by far more than the rest, else None.
 
-    `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. Of a session only
-    the first record begins behind the history.
+    `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. The history precedes
+    every one of them, of a session too.
     """
     return _off(*_parts(items, fitted, False))
 
@@ -229,7 +229,7 @@ def _parts(items: Sequence[Item], fitted: Model, own: bool) -> tuple[list[Array]
     """Errors that depend on the history, and errors that do not; `own`: with the offset of the latter."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
-        if item.history is None or (item.session is not None and item.part.start):
+        if item.history is None:
             continue
         end = settled(item.run.v, fitted.reach)
         if own and np.isfinite(e[end:]).any():
