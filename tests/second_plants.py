@@ -376,7 +376,7 @@ FOREIGN = {each.__name__: each for each in (other_axis, room, changing_weights, 
 # Cases ------------------------------------------------------------------------------------------------------
 
 
-def unabsorbed(made: Session, y: Sequence[Array], v: Sequence[Array]) -> float:
+def unabsorbed(y: Sequence[Array], v: Sequence[Array]) -> float:
     """rms that plays with weights of any sign and an offset a record leave: a plain linear fit behind the first move.
 
     Of all records together; plays over thresholds up to half the range.
@@ -413,7 +413,8 @@ def case(kind: str, seed: int, folder: Path) -> str:
         slow = bool(rng.integers(2))
         able = [name for name in names if EFFECTS[name][1] == slow or not EFFECTS[name][1]]
         first = rng.choice([name for name in able if EFFECTS[name][1] == slow])
-        chosen = [str(first), str(rng.choice([name for name in able if name != first and {name, first} != {"lag", "delay"}]))]
+        others = [name for name in able if name != first and {name, first} != {"lag", "delay"}]
+        chosen = [str(first), str(rng.choice(others))]
     foreign = list(FOREIGN)[seed % len(FOREIGN)] if kind == "foreign" else None
     slow = any(EFFECTS[name][1] for name in chosen) or (not chosen and bool(rng.integers(2)))
     made = session(rng, slow)
@@ -431,7 +432,7 @@ def case(kind: str, seed: int, folder: Path) -> str:
         return [sampled(y, part) for part in made.parts]
 
     amount = 0.0
-    bare = unabsorbed(made, output({}), v) if foreign is None else 0.0
+    bare = unabsorbed(output({}), v) if foreign is None else 0.0
     span = float(np.ptp(np.concatenate(output({})))) if foreign is None else 1.0
     noise = max(NOISE * span, bare)
 
@@ -439,7 +440,7 @@ def case(kind: str, seed: int, folder: Path) -> str:
         low, high = 1e-4, 1.0
         for _ in range(9):
             middle = float(np.sqrt(low * high))
-            low, high = (middle, high) if unabsorbed(made, run(middle), v) < wanted else (low, middle)
+            low, high = (middle, high) if unabsorbed(run(middle), v) < wanted else (low, middle)
         return float(np.sqrt(low * high))
 
     strengths: dict[str, float] = {}
@@ -447,7 +448,7 @@ def case(kind: str, seed: int, folder: Path) -> str:
     for name in chosen:
         ratio = float(np.exp(rng.uniform(np.log(5.0), np.log(20.0))))
         strengths[name] = strength(lambda x, name=name: output({name: x}), ratio * noise)  # type: ignore[misc]
-        left = unabsorbed(made, output({name: strengths[name]}), v)
+        left = unabsorbed(output({name: strengths[name]}), v)
         ratios.append(float(np.sqrt(max(left**2 - bare**2, 0.0))) / noise)
     if foreign is not None:
         ratio = float(np.exp(rng.uniform(np.log(5.0), np.log(20.0))))

@@ -165,14 +165,14 @@ def test_an_effect_has_to_show_in_both(of_fitted: bool, little: float, named: bo
 )
 def test_names_explain_most(fitted: float, held: float, stand: bool) -> None:
     """They leave this of the errors: 0.36 or 0.64 of the variance."""
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0)
     now, none = Made("now", 1, (fitted, held)), Made("none", 1, (1.0, 1.0))
     assert (selection.borne_out(now, none, records) is None) is stand  # type: ignore[arg-type]
 
 
 def test_names_explain_most_without_the_free_start_states() -> None:
     """On equal terms there was little to explain."""
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0)
     now, none = Made("now", 1, (0.3, 0.3)), Made("none", 1, (1.0, 1.0), on_equal_terms=(0.33, 0.33))
     assert selection.borne_out(now, none, records) is not None  # type: ignore[arg-type]
 
@@ -182,8 +182,8 @@ def test_names_explain_most_without_the_free_start_states() -> None:
     [
         (2.0, 100, "Missing: lag"),
         (4.0, 100, "An error of 0.08 um rms is not explained, 4 times the noise"),
-        (2.0, 40, "Only 40 of 100 samples were compared"),
-        (2.0, 60, "Missing: lag"),
+        (2.0, 20, "Only 20 of 100 samples were compared"),
+        (2.0, 40, "Missing: lag"),
     ],
 )
 def test_what_a_verdict_says_first(times: float, compared: int, first: str) -> None:
@@ -652,6 +652,28 @@ class TestNoiseFloor:
         item = sine(5000)
         floor = noise_floor([replace(item, y=np.round(item.y / 0.5) * 0.5)])
         assert floor.rms == pytest.approx(0.5 / np.sqrt(12.0), rel=0.3)
+
+
+class TestEdges:
+    @pytest.mark.parametrize(("jump", "left_out"), [(5.0, True), (2.0, False)])
+    def test_a_jump(self, jump: float, left_out: bool) -> None:
+        """Of a range of 100."""
+        v = np.repeat([0.0, 100.0, 50.0, 50.0 + jump], 20)
+        found = np.flatnonzero(signals.unresolved_edges(v)).tolist()
+        assert found == [20, 21, 40, 41, *([60, 61] if left_out else [])]
+
+    @pytest.mark.parametrize(("samples", "left_out"), [(1, True), (2, True), (3, False)])
+    def test_an_edge_that_is_resolved(self, samples: int, left_out: bool) -> None:
+        v = np.concatenate([np.zeros(20), np.linspace(0.0, 100.0, samples + 1)[1:], np.full(20, 100.0)])
+        found = np.flatnonzero(signals.unresolved_edges(v)).tolist()
+        assert found == (list(range(20, 21 + samples)) if left_out else [])
+
+    @pytest.mark.parametrize(("stands", "left_out"), [(5, True), (3, False)])
+    def test_a_drive_that_does_not_stand(self, stands: int, left_out: bool) -> None:
+        """Between jumps it would have to; fast triangles have no edges."""
+        v = np.tile(np.repeat([0.0, 100.0], stands), 8)
+        assert bool(signals.unresolved_edges(v).any()) is left_out
+        assert not signals.unresolved_edges(np.tile([0.0, 50.0, 100.0, 50.0], 20)).any()
 
 
 # Whole records -----------------------------------------------------------------------------------------------

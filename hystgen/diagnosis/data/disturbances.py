@@ -468,7 +468,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
 
 
 def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether the moves at some samples are far larger than those around them; next to them a filter may spread them."""
+    """Whether the moves at some samples are far larger than those around them; a filter may spread them to the next."""
     beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
     around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
     return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

@@ -170,6 +170,26 @@ def reversals(v: Array) -> Places:
     return _moves(v)[1]
 
 
+def unresolved_edges(v: Array) -> NDArray[np.bool_]:
+    """Samples of which nobody knows what the drive did between them: its jumps from one stand to the next.
+
+    A jump within a sample, or two if the converter averages, may begin anywhere in it, held or straight. So its samples
+    and the one behind them show what is assumed of the edge, where even a small lag makes a difference.
+    """
+    swing = float(np.ptp(v))
+    step = np.abs(np.diff(v))
+    moves = step > acceptance.HOLD_DRIVE * swing
+    found = np.zeros(len(v), dtype=bool)
+    stands, longest = acceptance.EDGE_STANDS, acceptance.EDGE_SAMPLES
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(np.int8)))
+    for first, last in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+        jumps = last - first <= longest and float(np.sum(step[first:last])) > acceptance.EDGE * swing
+        alone = not moves[max(first - stands, 0) : first].any() and not moves[last : last + stands].any()
+        if jumps and alone:
+            found[first + 1 : last + 2] = True
+    return found
+
+
 def one_loop(items: Sequence[Item]) -> bool:
     """Whether the drive moves between the same two ends in all records without a hold, which would show more."""
     ends = []

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.data import disturbances, preparing
-from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.items import Item, compared, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure
@@ -80,7 +80,7 @@ def result_of(
         ranking=tuple(tuple(_contender(each, unit) for each in ranked) for ranked in found.rankings),
         inverse=inverse,
         noise_from=noise.ruled,
-        compared=_compared(everything),
+        compared=compared(everything),
         withdrawn=found.withdrawn,
     )
     in_digits: Result = _in_digits(result)
@@ -96,23 +96,16 @@ def _contender(ranked: Ranked, unit: str | None) -> Contender:
 
 
 REFUSALS = {
-    "one_loop": "records of one loop support no name that leaves {value:.0%} of the gap above the noise, but {limit:.0%}",
+    "one_loop": "it leaves {value:.0%} of the gap above the noise, and of one loop at most {limit:.0%} supports a name",
     "little": "on equal terms it removes {value:.3g}{unit} rms, and {limit:.3g}{unit} is needed",
     "chance": "chance explains what it removes from held-out records (p = {value:.1g}, at most {limit:g} is needed)",
     "unsure": "neither held-out nor fitted records are sure of it (p = {value:.1g}, at most {limit:g} is needed)",
     "small": "it removes {value:.0%} of the gap, and a name needs {limit:.0%}",
     "most": "the effects found leave {value:.3g}{unit} rms, most of {limit:.3g}{unit}",
+    "few": "{value:.0%} of the samples were compared, and a name needs {limit:.0%}",
     "other": "another shape does better, or as well with fewer numbers",
 }
 """Why an effect that was tried has no name, in words."""
-
-
-def _compared(items: Sequence[Item]) -> tuple[int, int]:
-    """Samples that are compared, and samples recorded; the two ends of a record are two items."""
-    known: dict[str, NDArray[np.bool_]] = {}
-    for item in items:
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
-    return sum(int(np.count_nonzero(x)) for x in known.values()), sum(map(len, known.values()))
 
 
 def _in_digits(value: Any) -> Any:
@@ -329,7 +322,7 @@ def _folds(n: int) -> NDArray[np.intp]:
 
 
 def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
-    """Cross-validated shares explained by rate-free variables (drive, plays, and averages of the drive over the distance
+    """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over the distance
     that it travels), and by these together with averages over several times, which stand for rates and creep.
 
     What is left of a hysteresis that plays do not follow goes with both averages: only what the second add is rate.

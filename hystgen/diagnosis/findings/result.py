@@ -70,7 +70,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Contender:
-    """A shape of an effect that was fitted to the end, with its rms errors; `refused`: why it has no name, else None."""
+    """A shape of an effect that was fitted to the end, with its rms errors; `refused`: why it has no name, or None."""
 
     name: str
     shape: str
@@ -215,7 +215,7 @@ class Diagnosis:
         if closest is None:
             return ""
         named = " and ".join(self.result.withdrawn) or closest.name
-        if self.result.withdrawn:
+        if self.result.withdrawn and not self._limits():
             return f". {named} would explain a part of it, but most would remain"
         return f". The nearest is {named}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
 

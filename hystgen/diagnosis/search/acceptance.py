@@ -132,9 +132,10 @@ MUCH_LEFT = 3.0
 """[times the noise floor] A verdict that names effects says first what they leave if it is more. Changed by: blind
 single, acceptance::test_what_a_verdict_says_first."""
 
-FEW_COMPARED = 0.5
-"""[share of the samples] A verdict says first if fewer took part: most of what was recorded is then not judged.
-Changed by: acceptance::test_what_a_verdict_says_first."""
+FEW_COMPARED = 0.25
+"""[share of the samples] If fewer took part a verdict says so first and names nothing: of blind records without a known
+history at least 0.5 do, of a test whose amplitude grows to the end 0.02 to 0.06. Set by: blind of all kinds, first
+71000, and second_plants. Changed by: acceptance::test_what_a_verdict_says_first."""
 
 MOST_EFFECTS = 5
 """[effects] Most effects that are added: no case of any block has more than two. Changed by: run time of blind."""
@@ -291,6 +292,15 @@ THIN_RESIDUAL = 1.6
 THIN_COLUMN = 0.01
 """[share of its range, rms] The same for a further column. Changed by:
 acceptance::TestThinning::test_a_column_that_jitters."""
+
+EDGE = 0.03
+"""[share of the drive range] A jump of the drive is larger: of less the output moves by no more than some tens of times
+the noise, and a sample of it counts little. Changed by: acceptance::TestEdges::test_a_jump."""
+
+EDGE_SAMPLES, EDGE_STANDS = 2, 4
+"""[samples], [samples] Most of a jump that is not resolved, from one sample to the next or over one that averages, and
+fewest over which the drive stands before and behind it. With these samples compared a lag, a delay or a rate dependence
+left 2 to 8 times the noise, without them 1.0 to 1.1. Set by: second_plants single 0:13, pair 0:6."""
 
 # Noise floor -------------------------------------------------------------------------------------------------
 

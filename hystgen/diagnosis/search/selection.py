@@ -57,7 +57,8 @@ class Refusal:
     """Why an effect that was tried has no name: the number that it fell short by, and the limit of that.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
-    fitted ones], `small` [share of the gap], `most` [rms left], `other`: another shape was chosen.
+    fitted ones], `small` [share of the gap], `most` [rms left], `few` [share of samples], `other`: another shape was
+    chosen.
     """
 
     why: str
@@ -275,9 +276,11 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     """Why the names that were found do not stand, or None: together they have to explain most of the gap.
 
     Of held-out and of fitted records both, with the start states and offsets free that the effects leave free; what is
-    noise is explained. A disturbance lets many an effect remove a part of the error: what they leave tells them from the
-    effect that is there. Records of one loop support no name above the noise.
+    noise is explained. A disturbance lets many an effect remove a part of the error; what it leaves tells it from an
+    effect that is there. Records of one loop support no name above the noise, and a small part of them none at all.
     """
+    if records.compared < acceptance.FEW_COMPARED:
+        return Refusal("few", records.compared, acceptance.FEW_COMPARED)
     for group in (records.held, records.to_fit):
         after, before = rms(now.errors(group)), rms(none.errors(group, now))
         if records.one_loop and group is records.held and after > acceptance.FAR_ABOVE_NOISE * records.noise:
@@ -439,9 +442,9 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         now, found = _finished(now, found, records)
         refused = borne_out(now, none, records)
         if refused is not None:
-            names = tuple(dict.fromkeys(each.name for each in found))
+            withdrawn = tuple(dict.fromkeys(each.name for each in found))
             ranked = [tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in rankings]
-            return Outcome(refitted, none, (), tuple(ranked), names)
+            return Outcome(refitted, none, (), tuple(ranked), withdrawn)
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
