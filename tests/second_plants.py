@@ -33,6 +33,9 @@ NOISE = 4e-4
 
 TAU = 2.0 * np.pi
 
+LATE, RESOLVED = 30.0, 1.5
+"""Samples by which the strongest lag or delay is late, and below which its tail cannot be seen."""
+
 
 # A session: records with gaps between them, on one fine time axis ---------------------------------------------
 
@@ -265,12 +268,12 @@ def resonance(rng: np.random.Generator, made: Session, x: float, plant: Plant) -
 
 
 def lag(rng: np.random.Generator, made: Session, x: float, plant: Plant) -> None:
-    time = x * 30.0 * made.step
+    time = x * LATE * made.step
     plant.drive.append(lambda made, v: filtered(made.t, filtered(made.t, v, time), 0.12 * time))
 
 
 def delay(rng: np.random.Generator, made: Session, x: float, plant: Plant) -> None:
-    late = x * 30.0 * made.step
+    late = x * LATE * made.step
     plant.drive.append(lambda made, v: np.interp(made.t - late, made.t, v))
 
 
@@ -402,6 +405,12 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean((target - table @ solution) ** 2)))
 
 
+def alike(name: str, x: float) -> list[str]:
+    """Effects that no record of these can tell from one of this strength: what is over within a sample or so."""
+    late = ("lag", "delay")
+    return [other for other in late if other != name] if name in late and x * LATE < RESOLVED else []
+
+
 def case(kind: str, seed: int, folder: Path) -> str:
     """Write one case and its label; returns its name."""
     rng = np.random.default_rng([20, {"single": 1, "pair": 2, "none": 3, "foreign": 4}[kind], seed])
@@ -484,7 +493,7 @@ def case(kind: str, seed: int, folder: Path) -> str:
     label = {
         "case": title, "kind": kind, "seed": seed, "block": "tune", "bench": "slow" if slow else "fast",
         "effects": [
-            {"name": name, "form": "own", "ratio": ratio, "indistinguishable": []}
+            {"name": name, "form": "own", "ratio": ratio, "indistinguishable": alike(name, strengths[name])}
             for name, ratio in zip(chosen, ratios, strict=True)
         ],
         "foreign": None if foreign is None else {"name": foreign, "amount": amount},

@@ -643,7 +643,7 @@ class TestNoiseFloor:
     def test_samples_between(self, kept: int, between: str) -> None:
         """That were not measured: one in so many was. A sine that turns fast is no noise."""
         t = np.arange(6000)
-        y = np.sin(2.0 * np.pi * t / 150.0) + np.random.default_rng(4).normal(0.0, 0.005, 6000)
+        y = np.sin(2.0 * np.pi * t / (40.0 * kept)) + np.random.default_rng(4).normal(0.0, 0.005, 6000)
         y = np.repeat(y[::kept], kept) if between == "held" else np.interp(t, t[::kept], y[::kept])
         assert noise_floor([replace(sine(6000), y=y)]).differences == pytest.approx(0.005, rel=0.35)
 
@@ -1129,9 +1129,9 @@ class TestStickSlip:
         change[~fast] = np.resize([*[-slow] * 4, 4.0 * slow], np.count_nonzero(~fast))
         assert slips(np.where(fast, 1.0, slow), change, 0.02) is seen
 
-    @pytest.mark.parametrize(("beside", "seen"), [(0.22, True), (0.5, False)])
+    @pytest.mark.parametrize(("beside", "seen"), [(0.22, True), (0.35, False)])
     def test_a_fast_output_does_not_jump(self, beside: float, seen: bool) -> None:
-        """Jumps 4.5 or twice as large as the moves around them, as those of a smooth output are."""
+        """Jumps 4.5 or 2.9 times as large as the moves around them, which are as large where an output is smooth."""
         row = np.array([1.0, beside, -beside, beside, -beside, beside, -beside, beside, 1.0 - beside])
         y = np.cumsum(np.tile(row, 60))
         predicted = np.linspace(0.0, float(y[-1]), len(y))

@@ -154,19 +154,27 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
     effects = []
     for k, each in enumerate(found.found):
         later = sum(other.name == each.name for other in found.found[k + 1 :])
+        parameters = _parameters_of(found.fitted, each.name, later)
         effects.append(
             NamedEffect(
                 each.name,
-                _parameters_of(found.fitted, each.name, later),
+                parameters,
                 sure.of(found.fitted, each.name, later),
                 (each.before - each.after) / refitted if refitted else 0.0,
                 each.before,
                 each.after,
                 each.p_value,
                 _evidence(each),
+                fits.at_an_end(found.fitted, each.name, later) or _twice(parameters.get("time_constants", ())),
             )
         )
     return tuple(effects)
+
+
+def _twice(times: Sequence[float]) -> bool:
+    """Whether two time constants are one."""
+    ordered = sorted(times)
+    return any(b <= (1.0 + acceptance.BETTER) * a for a, b in itertools.pairwise(ordered))
 
 
 def _advice(one: str, other: str) -> str:

@@ -45,7 +45,8 @@ class Gap:
 class NamedEffect:
     """An effect that was found: `parameters` as its entry of a parameter file has them, `intervals` of 95 % for them.
 
-    `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units.
+    `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units;
+    `at_an_end`: whether a number of it is at an end of its range, or two of its parts are one: its shape is open.
     """
 
     name: str
@@ -56,6 +57,7 @@ class NamedEffect:
     holdout_after: float
     p_value: float
     evidence: str
+    at_an_end: bool = False
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,9 @@ class Diagnosis:
     def sentence(self) -> str:
         """The verdict in a few sentences, what limits it first."""
         parts = [*self._limits(), self._finding()]
+        ends = dict.fromkeys(effect.name for effect in self.result.effects if effect.at_an_end)
+        if ends:
+            parts.append(f"A number of {', '.join(ends)} is at an end of its range: its shape is not certain")
         wrong = kinds.faults(self.result.unexplained)
         if wrong:
             parts.append(f"The data have faults: {wrong}")
