@@ -584,7 +584,14 @@ class TestNoiseFloor:
     def test_jitter_of_the_drive(self, jitter: float, measured: bool) -> None:
         """Steps of a hold, of a range of 100."""
         item = steps([60] * 20, [0.01] * 20)
-        v = item.run.v + jitter * (np.arange(len(item.run.v)) % 2)
+        v = item.run.v + jitter * (np.arange(len(item.run.v)) % 2) + 1e-6 * np.arange(len(item.run.v)) % 1e-5
+        assert (noise_floor([replace(item, run=Run(item.run.t, v))]).holds is not None) is measured
+
+    @pytest.mark.parametrize(("code", "measured"), [(0.09, True), (0.11, False)])
+    def test_a_coarse_drive(self, code: float, measured: bool) -> None:
+        """Between two codes, of a range of 100."""
+        item = steps([60] * 20, [0.01] * 20)
+        v = code * (np.round(item.run.v / code) + np.arange(len(item.run.v)) % 2)
         assert (noise_floor([replace(item, run=Run(item.run.t, v))]).holds is not None) is measured
 
     def test_settling_is_no_noise(self) -> None:

@@ -69,13 +69,21 @@ def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None
 
 def still(v: Array, least: int) -> list[tuple[int, int]]:
     """Stretches [first, last) of at least `least` samples over which the drive stands still."""
-    tolerance = acceptance.HOLD_DRIVE * max(float(np.ptp(v)), 1e-300)
+    tolerance = max(stands_within(v), 1e-300)
     found, first = [], 0
     for k in np.append(np.flatnonzero(np.abs(np.diff(v)) > tolerance), len(v) - 1):
         if k + 1 - first >= least and np.ptp(v[first : k + 1]) <= 2.0 * tolerance:
             found.append((first, int(k) + 1))
         first = int(k) + 1
     return found
+
+
+def stands_within(v: Array) -> float:
+    """The change of a drive from sample to sample up to which it stands: noise of its measurement, or a code of it."""
+    swing = float(np.ptp(v))
+    code = converter_step(v)
+    jitter = 1.001 * code if code <= acceptance.COARSE_DRIVE * swing else 0.0
+    return max(acceptance.HOLD_DRIVE * swing, jitter)
 
 
 def _holds(item: Item) -> list[tuple[float, int]]:
@@ -178,7 +186,7 @@ def unresolved_edges(v: Array) -> NDArray[np.bool_]:
     """
     swing = float(np.ptp(v))
     step = np.abs(np.diff(v))
-    moves = step > acceptance.HOLD_DRIVE * swing
+    moves = step > stands_within(v)
     found = np.zeros(len(v), dtype=bool)
     stands, longest = acceptance.EDGE_STANDS, acceptance.EDGE_SAMPLES
     ends = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(np.int8)))
