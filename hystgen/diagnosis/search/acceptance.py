@@ -313,8 +313,8 @@ HOLD_DRIVE = 2e-4
 acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 
 COARSE_DRIVE = 1e-3
-"""[share of the drive range] A drive also holds while it changes by one code of its converter, if that is no larger: ten
-bits. Coarser values are levels. Changed by: acceptance::TestNoiseFloor::test_a_coarse_drive."""
+"""[share of the drive range] A drive also holds while it changes by one code of its converter, if that is no larger:
+ten bits. Coarser values are levels. Changed by: acceptance::TestNoiseFloor::test_a_coarse_drive."""
 
 HOLD_SETTLING = 0.4
 """[share of a hold] Its beginning, which is left out: what still moves there is no noise. Changed by:
