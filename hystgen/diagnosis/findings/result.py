@@ -95,7 +95,7 @@ class Result:
 
     `noise_from`: what the noise floor was estimated from, `holds`, `periods`, `differences` or `resolution`;
     `compared`: samples that took part, and samples recorded; `withdrawn`: effects that were accepted one by one and
-    together leave most of the gap.
+    do not stand in the end, since together they leave most of the gap, or too few samples were compared.
     """
 
     verdict: str
@@ -219,10 +219,10 @@ class Diagnosis:
         closest = self._closest()
         if closest is None:
             return ""
-        named = " and ".join(self.result.withdrawn) or closest.name
         if self.result.withdrawn and not self._limits():
-            return f". {named} would explain a part of it, but most would remain"
-        return f". The nearest is {named}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
+            named = " and ".join(self.result.withdrawn)
+            return f". {named[0].upper()}{named[1:]} would explain a part of it, but most would remain"
+        return f". The nearest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
 
     def _closest(self) -> Contender | None:
         first = self.result.ranking[0] if self.result.ranking else ()

@@ -351,7 +351,7 @@ class Ranked:
 class Outcome:
     """The refitted nominal model, the model with the effects, these effects, and the ranking of each round.
 
-    `withdrawn`: names of effects that had been accepted and together leave most of the gap.
+    `withdrawn`: names of effects that had been accepted and do not stand in the end (`borne_out`).
     """
 
     refitted: Fitted
