@@ -13,7 +13,7 @@ from hystgen.basics import drawing, parallel
 from hystgen.basics.drawing import label
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
-from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure
+from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure, times_noise
 from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
@@ -56,7 +56,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         for name in FIGURES
     }
     sections = [
-        Section("How the gap shrinks", [figures["gap"], *_refitted(result)]),
+        Section("How the gap shrinks", [figures["gap"], *_refitted(result), _noise(result)]),
         Section("What was found", _found(result, found.parameters.model.effects, found.not_emitted())),
         Section("What is left", _left(result)),
         Section("Faults of the data", _faults(result)),
@@ -106,6 +106,20 @@ def _refitted(result: Result) -> list[Text]:
             "weights fitted where something is missing take some of it, and other records may miss it in another way."
         )
     ]
+
+
+NOISE_FROM = {
+    "holds": "the holds of the drive",
+    "periods": "what does not repeat from one period of the drive to the next",
+    "differences": "the differences of neighbouring samples, since the records have no holds and no equal periods",
+    "resolution": "the resolution of the recorded numbers, since every other estimate is smaller",
+}
+"""What the noise floor comes from, in words."""
+
+
+def _noise(result: Result) -> Text:
+    floor = f"{label('noise floor', result.unit)} is {result.noise_floor:.3g}"
+    return Text(f"The {floor}, from {NOISE_FROM[result.noise_from]}.")
 
 
 def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
@@ -182,7 +196,7 @@ def _left(result: Result) -> list[Text | Listing | Table]:
         after, noise = result.gap.after.holdout, result.noise_floor
         if is_noise(after, noise):
             return [Text("Nothing but noise.")]
-        times = f"The error that is left is {after / noise:.3g} times the noise" if noise else "Some error is left"
+        times = f"The error that is left is {times_noise(after / noise)}"
         return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
     sentences = [each.sentence(result.unit) for each in seen]
     blocks: list[Text | Listing | Table] = [Listing(sentences)]
@@ -258,11 +272,12 @@ def _ranking(result: Result) -> list[Text | Table]:
     for k, tried in enumerate(result.ranking):
         best = min((each.holdout for each in tried), default=0.0)
         rows: list[Sequence[str]] = [
-            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best"]
+            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best", "why not"]
         ]
         for each in tried:
             margin = f"{100.0 * (each.holdout / best - 1.0):.1f} %" if best > 0.0 else ""
-            rows.append([each.name, each.shape, f"{each.fit:.4g}", f"{each.holdout:.4g}", margin])
+            errors = f"{each.fit:.4g}", f"{each.holdout:.4g}"
+            rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"
-        blocks += [Text(f"Round {k + 1}, the shapes that were fitted to the end{after}:"), Table(rows, (0, 1))]
+        blocks += [Text(f"Round {k + 1}, the shapes that were fitted to the end{after}:"), Table(rows, (0, 1, 5))]
     return blocks or [Text("None: the refitted model leaves no more than noise.")]
