@@ -26,6 +26,7 @@ from scipy.stats import binned_statistic
 
 import hystgen
 from hystgen.basics import drawing, extras
+from hystgen.basics.problems import percent
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import fit_figures
@@ -581,3 +582,10 @@ def test_python_call_is_part_of_the_package() -> None:
     assert "report_fit" in hystgen.__all__
     assert pages.names()[0] == "report.html"
     assert set(pages.names()) == FILES
+
+
+def test_shares_of_ten_times_and_more_are_factors() -> None:
+    assert percent(0.1234) == "12.3 %"
+    assert percent(9.994, of="the range") == "999 % of the range"
+    assert percent(32.0, of="the range") == "32 times the range"
+    assert percent(-0.5, "+.0f") == "-50 %"
