@@ -76,10 +76,10 @@ def gap(found: Diagnosis, width: float) -> Any:
             changed = f"{percent(change + 1.0)}" if many else f"{100.0 * change:+.0f} %"
             said += f"  ({changed})" if abs(change) >= 0.005 else "  (no change)"
         end = max(value, before if 0 < place < len(values) - 1 else 0.0)
-        axes.annotate(f" {said}", (end, place), va="center", fontsize=9)
+        axes.annotate(said, (end, place), (8.0 if far else 4.0, 0.0), textcoords="offset points", va="center", fontsize=9)
     axes.axvline(noise, color=FLOOR, linestyle="--", linewidth=1.2)
     axes.set_yticks(range(len(names)), names)
-    axes.invert_yaxis()
+    axes.set_ylim(len(names) - 0.5, -0.5)
     room = 1.4 if width == WIDE else 2.0
     if far:
         _decades(axes, "x")
@@ -327,7 +327,7 @@ CAPTIONS = {
 }
 
 ALTERNATIVES = {
-    "gap": "Bars of the held-out error after each step, down to the noise.",
+    "gap": "The held-out error after each step, down to the noise.",
     "overlay": "Measured and predicted displacement along time, and below it the error before and after.",
     "records": "Points for the rms error of every record before and after, with the noise as a line.",
     "time": "rms error before and after along the session, with the noise as a line.",
