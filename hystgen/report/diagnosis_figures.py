@@ -76,7 +76,8 @@ def gap(found: Diagnosis, width: float) -> Any:
             changed = f"{percent(change + 1.0)}" if many else f"{100.0 * change:+.0f} %"
             said += f"  ({changed})" if abs(change) >= 0.005 else "  (no change)"
         end = max(value, before if 0 < place < len(values) - 1 else 0.0)
-        axes.annotate(said, (end, place), (8.0 if far else 4.0, 0.0), textcoords="offset points", va="center", fontsize=9)
+        aside = (8.0 if far else 4.0, 0.0)
+        axes.annotate(said, (end, place), aside, textcoords="offset points", va="center", fontsize=9)
     axes.axvline(noise, color=FLOOR, linestyle="--", linewidth=1.2)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
