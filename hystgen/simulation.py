@@ -81,7 +81,8 @@ def _compensated(
     for record, part in zip(records, session.parts, strict=True):
         v = drives[part]
         limited = int(np.count_nonzero((v <= low) | (v >= high)))
-        said = [f"{record.name}: {limited} of {len(v)} drives were limited to input_range"] if limited else []
+        were = "was" if limited == 1 else "were"
+        said = [f"{record.name}: {limited} of {len(v)} drives {were} limited to input_range"] if limited else []
         found.append((v, said))
     return found
 

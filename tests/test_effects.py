@@ -1019,7 +1019,7 @@ def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "said"), [
-    (None, r"own.py: cannot be read: No such file or directory"),
+    (None, r"own.py: cannot be read \(No such file or directory\); give a folder with model.py"),
     ("def (", r"own.py:1: SyntaxError: invalid syntax"),
     ("import nowhere_at_all\n", r"own.py:1: ModuleNotFoundError: No module named 'nowhere_at_all'"),
     ("x = 1\nraise SystemExit(3)\n", r"own.py:2: SystemExit: 3"),
@@ -1169,7 +1169,8 @@ def test_simulate_runs_a_session_with_history_and_rest(
     assert (code, out) == (2, "")
     assert "user:neighbour is defined in no file given" in err
     code, out, err = run("simulate", path, files[0], "--effects", tmp_path / "none.py")
-    assert (code, out, err) == (2, "", f"error: {tmp_path}/none.py: cannot be read: No such file or directory")
+    said = "cannot be read (No such file or directory); give a folder with model.py, or a Python file"
+    assert (code, out, err) == (2, "", f"error: {tmp_path}/none.py: {said}")
 
 
 def test_simulate_warns_outside_the_range_and_needs_its_columns(

@@ -517,7 +517,7 @@ def test_without_dask_one_line_says_what_to_install(
         (["--batch", "few", "-o", "new", "--jobs", "0"], "--jobs"),
         (["few/SN-100.csv", "-o", "a.yaml", "--no-emit"], "--emit is for many units"),
         (["few/SN-100.csv", "-o", "a.yaml", "--jobs", "2"], "--jobs is for many units"),
-        (["few/SN-100.csv", "-o", "few"], "is a directory"),
+        (["few/SN-100.csv", "-o", "few"], "is a folder; give the file"),
         (["-o", "a.yaml"], "Missing argument"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

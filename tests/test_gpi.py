@@ -313,7 +313,7 @@ class TestFaults:
     def test_outliers_are_left_out_and_counted(self) -> None:
         v, y, wrong = self.spoilt()
         fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS)
-        assert f"made: {len(wrong)} isolated samples of y far from their neighbours" in " ".join(fit.warnings)
+        assert f"made: {len(wrong)} isolated samples of y far from the neighbours" in " ".join(fit.warnings)
         assert f"the first is sample {wrong[0]}" in " ".join(fit.warnings)
         assert held_out(fit, np.asarray) <= np.sqrt(1.1**2 - 1.0) * NOISE
 

@@ -310,7 +310,7 @@ def test_a_wrong_c_file_is_refused_with_its_place(tmp_path: Path, run: Call, wro
 def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
     code, _, err = run("emit", written(tmp_path, FOLLOWER), "--effects", outside(tmp_path, c=None), "-o", tmp_path)
     assert code == 2
-    assert "follower.c: cannot be read: No such file" in err
+    assert "follower.c: cannot be read (No such file" in err
 
 
 SOLVED, NUMBERS = "    return s[0] + (y", "return [rate, 1.0 / rate]"

@@ -794,9 +794,9 @@ def test_load(tmp_path: Path) -> None:
 
 
 def test_unreadable(tmp_path: Path) -> None:
-    assert load_refusal(tmp_path / "none.yaml") == "FILE: error: cannot be read: No such file or directory"
-    assert load_refusal(tmp_path) == "FILE: error: cannot be read: Is a directory"
-    assert load_refusal("a\0b") == "FILE: error: cannot be read: embedded null byte"
+    assert load_refusal(tmp_path / "none.yaml") == "FILE: error: cannot be read (No such file or directory); give the path of a parameter file"
+    assert load_refusal(tmp_path) == "FILE: error: cannot be read (Is a directory); give the path of a parameter file"
+    assert load_refusal("a\0b") == "FILE: error: cannot be read (embedded null byte); give the path of a parameter file"
 
 
 def test_size(tmp_path: Path) -> None:

@@ -15,16 +15,28 @@ from pathlib import Path
 FIT = ("scipy", "numba", "joblib", "threadpoolctl", "rich")
 """Packages of the extra `fit`, without which nothing is fitted."""
 
+PLOT = ("matplotlib",)
+"""Packages of the extra `plot`."""
+
 
 class MissingExtraError(ImportError):
     """Something needs an extra that is not installed; the message has the command that installs it."""
 
 
-def require_fit(what: str) -> None:
-    """Raise MissingExtraError where `what` cannot be done because packages of the extra `fit` are not installed."""
-    missing = [name for name in FIT if importlib.util.find_spec(name) is None]
-    if missing:
-        raise MissingExtraError(f"{what} needs {', '.join(missing)}; install the extra with: {install('fit')}")
+def require_fit(what: str, plot: bool = False) -> None:
+    """Raise MissingExtraError where `what` cannot be done because packages of the extra `fit` are not installed.
+
+    `plot`: it needs the extra `plot` too, so that one command installs both.
+    """
+    missing = {
+        extra: [name for name in packages if importlib.util.find_spec(name) is None]
+        for extra, packages in (("fit", FIT), ("plot", PLOT if plot else ()))
+    }
+    lacking = [extra for extra, packages in missing.items() if packages]
+    if lacking:
+        packages = ", ".join(name for extra in lacking for name in missing[extra])
+        which = "extra" if len(lacking) == 1 else "extras"
+        raise MissingExtraError(f"{what} needs {packages}; install the {which} with: {install(','.join(lacking))}")
 
 
 def install(extra: str) -> str:

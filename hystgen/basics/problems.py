@@ -130,9 +130,10 @@ class FormatError(ValueError):
         self.problems = [((), problem) if isinstance(problem, str) else problem for problem in problems]
         super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))
 
-def counted(number: int, what: str) -> str:
-    """`1 sample`, `2 samples`."""
-    return f"{number} {what}{'' if number == 1 else 's'}"
+
+def counted(number: int, one: str, several: str = "") -> str:
+    """`1 sample`, `2 samples`; `several`: the words behind any other number, where they are not `one` with an s."""
+    return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
 FACTOR = 10.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+import itertools
 import math
 import os
 import warnings
@@ -141,6 +143,42 @@ def seconds(_context: click.Context, _option: click.Parameter, value: float) -> 
     if not 0 <= value < math.inf:
         raise click.BadParameter("give seconds, 0 or more")
     return value
+
+
+def matched(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+    """The files that patterns such as 'held/*.csv' stand for, by name; every other path as it is."""
+    found: list[str] = []
+    for path in value:
+        found += [path] if os.path.lexists(path) else sorted(glob.glob(path)) or [path]
+    return tuple(found)
+
+
+class Judging(click.Command):
+    """A command with records and held-out records; says which files behind `--holdout FILE` it would fit.
+
+    A shell makes `--holdout a.csv b.csv` of `--holdout *.csv`, and the option takes the first of them alone.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the words."""
+        words = list(args)
+        rest = super().parse_args(ctx, args)
+        data = ctx.params.get("data") or ()
+        for k, word in enumerate(words):
+            behind = list(itertools.takewhile(lambda each: not each.startswith("-"), words[k + 1 :]))
+            fitted = [path for path in behind[1:] if path in data]
+            if word == "--holdout" and fitted and len(fitted) < len(data):
+                more = f" and {len(fitted) - 1} more" if len(fitted) > 1 else ""
+                console.note(
+                    f"warning: {fitted[0]}{more} will be fitted, not held out: --holdout takes one file; put a pattern "
+                    f"in quotes, --holdout '{Path(behind[0]).parent / '*'}{Path(behind[0]).suffix}'"
+                )
+        return rest
+
+
+def data_argument(required: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The records of a command."""
+    return click.argument("data", nargs=-1, required=required, type=click.Path(), callback=matched)
 
 
 def reading_options(columns: str | None, sample_time: float | None, delimiter: str | None) -> dict[str, Any]:

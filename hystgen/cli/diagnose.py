@@ -11,11 +11,14 @@ import click
 
 from hystgen.basics import console
 from hystgen.cli.common import (
+    Judging,
+    data_argument,
     effects_option,
     guarded,
     history_values,
     keep_inputs,
     load_model,
+    matched,
     params_argument,
     reading_options,
     record_options,
@@ -41,11 +44,14 @@ def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | No
     guarded(params, run)
 
 
-@click.command()
+@click.command(cls=Judging)
 @params_argument
-@click.argument("data", nargs=-1, type=click.Path())
+@data_argument(required=False)
 @click.option("-o", "output", type=click.Path(file_okay=False), help="folder for what is found, or planned")
-@click.option("--holdout", multiple=True, type=click.Path(), help="record that judges and takes no part in the fits")
+@click.option(
+    "--holdout", multiple=True, type=click.Path(), callback=matched,
+    help="record that judges and takes no part in the fits; or a pattern in quotes, 'held/*.csv'",
+)  # fmt: skip
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
 @effects_option
@@ -85,7 +91,7 @@ def diagnose(
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
-    guarded(params, partial(extras.require_fit, "diagnose"))
+    guarded(params, partial(extras.require_fit, "diagnose", plot=True))
     guarded(params, drawing.require)
     keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], (params, *data, *holdout))
     guarded(output, partial(files.check, Path(output), diagnosis.Diagnosis.FILES))

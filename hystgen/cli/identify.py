@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,31 @@ from typing import Any
 import click
 
 from hystgen.basics import console
-from hystgen.cli.common import Failed, guarded, history_values, keep_inputs, reading_options, record_options
+from hystgen.basics.problems import counted
+from hystgen.cli.common import (
+    Failed,
+    Judging,
+    data_argument,
+    guarded,
+    history_values,
+    keep_inputs,
+    matched,
+    reading_options,
+    record_options,
+)
 
 
-@click.command()
-@click.argument("data", nargs=-1, type=click.Path())
+def _units(_context: click.Context, _option: click.Parameter, value: str | None) -> dict[str, str] | None:
+    if value is None:
+        return None
+    units = [unit.strip() for unit in value.split(",")]
+    if len(units) != 2 or not any(units):
+        raise click.BadParameter(f"'{value}' is not two units; give that of the drive and that of the output, V,um")
+    return dict(zip(("input", "output"), units, strict=True))
+
+
+@click.command(cls=Judging)
+@data_argument(required=False)
 @click.option("-o", "output", required=True, type=click.Path(), help="parameter file to write; with --batch a folder")
 @click.option("--batch", multiple=True, metavar="PATTERN", help="'units/*.csv', a file or a folder: one unit a file")
 @click.option("--emit/--no-emit", default=None, help="with --batch: write the C of every unit too  [default: emit]")
@@ -23,21 +44,22 @@ from hystgen.cli.common import Failed, guarded, history_values, keep_inputs, rea
 @click.option("--thresholds", type=int, help="number of plays without r_0; default: chosen on held-out error")
 @click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
 @click.option(
-    "--holdout", multiple=True, type=click.Path(),
-    help="record that takes no part in the fit; with --batch for example 'holdout/{unit}.csv'",
+    "--holdout", multiple=True, type=click.Path(), callback=matched,
+    help="record that takes no part in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
+    "'holdout/{unit}.csv'",
 )  # fmt: skip
 @click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
 @click.option("--name", help="C identifier of the model; default: from the output file")
-@click.option("--units", metavar="V,um", help="units of drive and output; default: the records'")
+@click.option("--units", metavar="V,um", callback=_units, help="units of drive and output; default: the records'")
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
-    holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None, units: str | None, plot: str | None,
-    report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None, jobs: int | None,
-    scheduler: str | None, **reading: Any,
+    holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None, units: dict[str, str] | None,
+    plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
+    jobs: int | None, scheduler: str | None, **reading: Any,
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
 
@@ -49,7 +71,6 @@ def identify(
     from hystgen.basics import extras, writing
     from hystgen.report import identification as pages
 
-    drive, _, displacement = (units or "").partition(",")
     how = reading_options(**reading)
     options: dict[str, Any] = {
         "model": model,
@@ -57,7 +78,7 @@ def identify(
         "breaks": breaks,
         "history": history_values(history),
         "rest": rest,
-        "units": {"input": drive.strip(), "output": displacement.strip()} if units else None,
+        "units": units,
         "skip": skip,
         "loading_curve": loading_curve,
     }
@@ -77,8 +98,9 @@ def identify(
             raise click.UsageError(f"{option} is for many units; give --batch with it")
     if not data:
         raise click.UsageError("Missing argument 'DATA...'.")
-    if Path(output).is_dir():
-        raise click.BadParameter(f"File '{output}' is a directory.", param_hint="'-o'")
+    if Path(output).is_dir() or output.endswith(("/", os.sep)):
+        inside = Path(output) / "stage_x.yaml"
+        raise click.BadParameter(f"'{output}' is a folder; give the file to write, as in {inside}", param_hint="'-o'")
     made = [str(Path(report) / name) for name in pages.names()] if report else []
     keep_inputs((output, plot, *made), (*data, *holdout))
 
@@ -89,7 +111,7 @@ def identify(
         from hystgen.identification import settings
         from hystgen.report import plots
 
-        extras.require_fit("identify")  # before anything is read
+        extras.require_fit("identify", plot=bool(plot or report))  # before anything is read
         for file in (output, plot):
             if file:
                 writing.check_writable(file)
@@ -135,4 +157,4 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
     console.note(done.table().rstrip("\n"))
     console.say(str(Path(output) / "summary.csv"))
     if done.failed:
-        raise Failed(f"error: {len(done.failed)} of {len(done.units)} units failed", 1)
+        raise Failed(f"error: {len(done.failed)} of {counted(len(done.units), 'unit')} failed", 1)

@@ -13,6 +13,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import console
 from hystgen.cli.common import (
     Failed,
+    data_argument,
     effects_option,
     guarded,
     history_values,
@@ -33,7 +34,7 @@ def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> N
 
 @click.command()
 @params_argument
-@click.argument("data", nargs=-1, required=True, type=click.Path())
+@data_argument(required=True)
 @click.option("-o", "output", type=click.Path(), help="CSV file, or a folder for several; default: standard output")
 @click.option("--operator", type=click.Choice(["forward", "inverse"]), default="forward", show_default=True)
 @click.option(
@@ -67,6 +68,8 @@ def simulate(
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
+    if output and len(data) > 1 and Path(output).is_file():
+        raise Failed(f"error: {output} is a file, and several records need -o with a folder", 2)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
     keep_inputs(targets, [params, *data])

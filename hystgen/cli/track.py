@@ -9,6 +9,7 @@ import click
 
 from hystgen.basics import console
 from hystgen.cli.common import (
+    data_argument,
     effects_option,
     guarded,
     history_values,
@@ -22,7 +23,7 @@ from hystgen.cli.common import (
 
 @click.command()
 @params_argument
-@click.argument("data", nargs=-1, required=True, type=click.Path())
+@data_argument(required=True)
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
 @effects_option
 @record_options
@@ -39,7 +40,7 @@ def track(
     from hystgen.report import plots
 
     model = load_model(params, effects)
-    guarded(params, partial(extras.require_fit, "track"))
+    guarded(params, partial(extras.require_fit, "track", plot=plot is not None))
     visited = history_values(history)
     if plot:
         keep_inputs([plot], [params, *data])

@@ -38,7 +38,9 @@ def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
     try:
         mark = hashlib.sha256(str(file.resolve()).encode() + file.read_bytes()).hexdigest()[:12]
     except OSError as error:
-        raise EffectsError(f"{file}: cannot be read: {error.strerror or error}") from None
+        raise EffectsError(
+            f"{file}: cannot be read ({error.strerror or error}); give a folder with model.py, or a Python file"
+        ) from None
     name = f"hystgen_user_effects_{mark}"
     if name not in sys.modules:
         spec = importlib.util.spec_from_loader(name, importlib.machinery.SourceFileLoader(name, str(file)))

@@ -51,7 +51,9 @@ def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise EffectsError(f"{file}: cannot be read: {error.strerror or error}") from None
+        raise EffectsError(
+            f"{file}: cannot be read ({error.strerror or error}); put the C of the effect there"
+        ) from None
     if len(data) > MOST_BYTES:
         raise EffectsError(f"{file}: has {len(data)} bytes, more than {MOST_BYTES}; give the block alone")
     text = data.decode("utf-8", "replace").replace("\r\n", "\n")

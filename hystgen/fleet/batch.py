@@ -26,6 +26,7 @@ import numpy as np
 
 from hystgen import identification
 from hystgen.basics import arguments, extras, writing
+from hystgen.basics.problems import counted
 from hystgen.basics.progress import Progress
 from hystgen.basics.version import __version__
 from hystgen.emission import files
@@ -105,8 +106,8 @@ class Fleet:
         kept = sum(unit.kept for unit in self.units)
         found = f"{len(self.outliers)} of them outliers" if self.judged else "outliers not judged"
         lines = [
-            f"{len(self.units)} units: {len(self.units) - len(self.failed)} done ({kept} by an earlier call), "
-            f"{found}; {len(self.failed)} failed"
+            f"{counted(len(self.units), 'unit')}: {len(self.units) - len(self.failed)} done "
+            f"({kept} by an earlier call), {found}; {len(self.failed)} failed"
         ]
         if not self.judged:
             lines.append(f"outliers are marked from {outliers.FEWEST} units on")

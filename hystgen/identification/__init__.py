@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments, parallel
+from hystgen.basics import arguments, names, parallel
+from hystgen.basics.problems import counted
 from hystgen.basics.progress import Progress
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
@@ -107,6 +108,9 @@ def identify(
     >>> [round(weight, 3) for weight in fit.parameters.model.pi.weights]
     [0.12, 0.03]
     """
+    wrong = names.name_problem(name)
+    if wrong:
+        raise ValueError(f"the name {wrong}")
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
@@ -150,7 +154,8 @@ def identify(
         rows.append(done.held_out)
         reported += [text for item in held if (text := quality.outside(item.name, item.v, drive))]
     reported += [
-        f"{item.name}: only {item.used} samples are left once its start memory is known; it hardly counts"
+        f"{item.name}: only {counted(item.used, 'sample is', 'samples are')} left once its start memory is known; it "
+        "hardly counts"
         for item in compared
         if item.used < SHORTEST
     ]
@@ -280,7 +285,9 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
     if breaks is None:
         return None
     if model not in ("gpi-deadzone", "auto"):
-        raise ValueError(f"breaks are those of a dead-zone sum, model {model} has none")
+        raise ValueError(
+            f"breaks are those of a dead-zone sum, which model {model} does not have; give model gpi-deadzone or auto"
+        )
     if isinstance(breaks, int | np.integer) and not isinstance(breaks, bool):
         if not 1 <= breaks <= MOST_BREAKS:
             raise ValueError(f"breaks is a number from 1 to {MOST_BREAKS}, not {breaks}")
@@ -378,15 +385,13 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 def identifier_from(text: str) -> str:
     """A C identifier made from any text, such as a file's stem: `stage` where nothing is left of it."""
-    from hystgen.basics.names import name_problem
-
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:
         return "stage"
     if words[0].isdigit():
         words = f"stage_{words}"
     words = words[:40].rstrip("_")
-    return f"stage_{words}" if name_problem(words) else words
+    return f"stage_{words}" if names.name_problem(words) else words
 
 
 __all__ = [

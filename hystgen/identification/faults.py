@@ -314,7 +314,7 @@ def between_gaps(record: Record) -> list[Piece]:
     ]
 
 
-BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from their neighbours, not compared"
+BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from the neighbours, not compared"
 """What is done about isolated wrong samples."""
 
 

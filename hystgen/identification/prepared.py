@@ -86,7 +86,9 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
     if not (np.isfinite(v).all() and np.isfinite(y).all()):
         raise IdentificationError(f"{record.name} has samples without a value; drop them first")
     if len(v) < skip + SHORTEST:
-        raise IdentificationError(f"{record.name} has {len(v)} samples, at least {skip + SHORTEST} are needed")
+        raise IdentificationError(
+            f"{record.name} has {counted(len(v), 'sample')}, at least {skip + SHORTEST} are needed"
+        )
     for name, x in (("v", v), ("y", y)):
         missing = int(np.count_nonzero(no_value(x)))
         if missing > faults.most(len(x)):

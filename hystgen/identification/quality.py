@@ -295,12 +295,18 @@ def about_model(
             f"the records show little hysteresis: no play above {solution.reach:.3g} moves enough in them; "
             "record full cycles, several times, or give --history"
         )
+    if wanted is None and len(solution.weights) == 1:
+        reported.append(
+            "the output lags the drive nowhere, so the model has no plays; check that v is the drive and y the "
+            "displacement: exchanged, they look like this"
+        )
     if isinstance(wanted, tuple):
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
         if beyond:
+            above = f" above {solution.reach:.6g}"
             reported.append(
-                f"{counted(len(beyond), 'threshold')} above {solution.reach:.6g} hardly move in "
-                "these records; their weights are not to be trusted for larger drives"
+                f"{counted(len(beyond), f'threshold{above} hardly moves', f'thresholds{above} hardly move')} in these "
+                "records; do not trust the weights there for larger drives"
             )
     outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]
     spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
@@ -343,8 +349,9 @@ def about_start(errors: Errors, largest: float) -> str:
     if start <= UNLIKE * rest:
         return ""
     return (
-        f"{item.name}: the first {end} samples, whose output depends on the history, are off by {start:.3g} rms "
-        f"against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out if in doubt"
+        f"{item.name}: the output of the first {counted(end, 'sample')}, which depends on the history, is off by "
+        f"{start:.3g} rms against {rest:.3g} for the rest; the history may not be what the actuator saw. Leave it out "
+        "if in doubt"
     )
 
 
@@ -357,9 +364,10 @@ def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
                 if k < len(to_fit):
                     reported.append(f"{record.name}: fitted twice, as {other.name} too; leave one of them out")
                 else:
+                    alike = "" if record.name == other.name else f", as {other.name}"
                     reported.append(
-                        f"{record.name}: held out and, as {other.name}, fitted too, so that it judges nothing; leave "
-                        "it out of the one or the other"
+                        f"{record.name}: held out, but also fitted{alike}, so that it judges nothing; leave it out of "
+                        "one of the two"
                     )
                 break
     return reported
@@ -370,6 +378,6 @@ def outside(name: str, v: NDArray[np.float64], allowed: tuple[float, float]) -> 
     if not number:
         return ""
     return (
-        f"{name}: {number} samples have a drive outside the fitted range {allowed[0]:.6g} to {allowed[1]:.6g}; "
-        "the model is a guess there"
+        f"{name}: {counted(number, 'sample has', 'samples have')} a drive outside the fitted range {allowed[0]:.6g} to "
+        f"{allowed[1]:.6g}; the model is a guess there"
     )

@@ -105,7 +105,8 @@ def _text(file: str) -> str:
             size = os.fstat(stream.fileno()).st_size  # 0 for a pipe or device
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise ParameterError(file, [Problem("", f"cannot be read: {reason}")]) from None
+        wrong = Problem("", f"cannot be read ({reason}); give the path of a parameter file")
+        raise ParameterError(file, [wrong]) from None
     if len(content) > MAX_BYTES:
         raise _too_large(size if size > MAX_BYTES else None, file)
     try:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.checks import numbers
-from hystgen.basics.problems import NotInvertibleError
+from hystgen.basics.problems import NotInvertibleError, counted
 from hystgen.plays import memory
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ class PlaySum:
         if thresholds[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(thresholds)):
             raise ValueError("thresholds start with 0 and rise strictly")
         if len(weights) != len(thresholds):
-            raise ValueError(f"{len(thresholds)} thresholds but {len(weights)} weights")
+            raise ValueError(f"{counted(len(thresholds), 'threshold')} but {counted(len(weights), 'weight')}")
         requested: float | tuple[float, ...]
         if isinstance(self.initial_state, int | float):
             (requested,) = numbers([self.initial_state], "the initial state")

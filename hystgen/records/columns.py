@@ -39,6 +39,8 @@ _ONE = (
 )
 _UNIT = re.compile(rf"{_ONE}(?:\^?-?\d)?(?:\s?[*/·]\s?{_ONE}(?:\^?-?\d)?)*")
 
+_LENGTH = re.compile(r"(?:[pnumc]?m|(?i:(?:pico|nano|micro|milli|centi)?met(?:er|re)s?|microns?))")
+
 # After an underscore a word is a unit only when it is hardly anything else: v_in, y_min and v_m are names
 _AFTER_UNDERSCORE = re.compile(
     r"[mun]?s|sec|seconds|[muk]?V|volts|[mu]A|k?Hz|[munp]m|microns|deg|[mu]rad|degC|[mk]N|counts"
@@ -125,6 +127,12 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
                 )
         if unit:
             units[key] = unit
+    drive, displacement = units.get("input", ""), units.get("output", "")
+    if _LENGTH.fullmatch(_plain(drive)) and displacement and not _LENGTH.fullmatch(_plain(displacement)):
+        conflicts.append(
+            f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, as if they were "
+            "exchanged; check the columns and the units, the drive comes first"
+        )
     return units, conflicts
 
 
@@ -402,10 +410,24 @@ class Finder:
             if ours not in self._asked and not (ours == "t" and self.steps):
                 self._missing(ours, self.mapping.get(ours, ours))
         self._name_together()
-        named = [found[ours] for ours in self.mapping if ours in found]
-        for twice in dict.fromkeys(c.name for c in named if named.count(c) > 1):
-            self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
+        self._apart({ours: c for ours, c in found.items() if ours in self.mapping}, found, need, timed)
         return found
+
+    def _apart(
+        self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str], timed: bool
+    ) -> None:
+        """One column cannot be two of those that are needed."""
+        for ours, c in found.items():
+            if ours in named or ours not in (need if timed else (*need, "t")):
+                continue
+            for other in (other for other, theirs in named.items() if theirs is c):
+                self.problems.append(
+                    f'column "{printable(c.name)}" is {ours} already and cannot be {other} too; name another column '
+                    f'with --columns "{other}=COLUMN"'
+                )
+        columns = list(named.values())
+        for twice in dict.fromkeys(c.name for c in columns if columns.count(c) > 1):
+            self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
 
     def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
         """The only column whose name means ours; a time is the first column with a unit of time, too."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import codecs
 import io
 import os
+import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -117,6 +118,9 @@ SAMPLE = 1 << 16
 SAMPLE_LINES = 8
 """Fewest lines that show it, however long they are: a header, units and a few rows."""
 
+PARAMETERS = re.compile(r"^hystgen\s*:", re.MULTILINE)
+"""How the text of a model begins, which no table does."""
+
 SPARE = 1.05
 """Ratio of the rows that room is made for to the number that the first block suggests."""
 
@@ -129,6 +133,8 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
         sample += text
     if not sample.strip():
         raise reading.refuse("is empty; record again or give another file")
+    if PARAMETERS.search(sample):
+        raise reading.refuse("is a parameter file; give a recording, a table of time, drive and displacement")
     found = _layout(reading, sample)
     names = found.names
     units = found.units or [""] * len(names)
@@ -151,6 +157,7 @@ def _layout(reading: Reading, sample: str) -> Layout:
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
     found = layout.find(reading, lines)
+    _refuse_wrong_delimiter(reading, found, lines)
     if found.kind:
         reading.understood(found.kind)
     dialect = found.dialect
@@ -168,6 +175,20 @@ def _layout(reading: Reading, sample: str) -> Layout:
         named = [f"{name} [{unit}]" for name, unit in zip(found.names, found.units, strict=True) if unit]
         reading.understood(f"units {', '.join(map(printable, named[:LISTED]))}")
     return found
+
+
+def _refuse_wrong_delimiter(reading: Reading, found: Layout, lines: Sequence[str]) -> None:
+    """Raise RecordError where the delimiter given makes one column of what another one makes a table."""
+    if reading.delimiter is None or len(found.names) != 1 or not found.header:
+        return
+    shown = [line for line in lines[found.header - 1 :] if line.strip() and not is_comment(line)][:2]
+    for mark in (mark for mark in layout.DELIMITERS if mark != BLANKS):
+        widths = {len(Dialect(mark).cells(line)) for line in shown}
+        if len(widths) == 1 and widths.pop() > 1:
+            given = layout.DELIMITERS.get(reading.delimiter, f'"{printable(reading.delimiter)}"')
+            raise reading.refuse(
+                f"has {layout.DELIMITERS[mark]} between its cells, not {given}; leave out --delimiter", found.header
+            )
 
 
 def _is_below_text(lines: Sequence[str], header: int) -> bool:

@@ -332,8 +332,8 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
     first = f"the first at index {row}" if line is None else f"the first in line {line}"
     if number > REPAIRABLE * length:
         reading.problem(
-            f"{number} of {length} samples are {which}, {first}; more than {100 * REPAIRABLE:g} % is not repaired, "
-            "record or export again",
+            f"{number} of {length} samples {'is' if number == 1 else 'are'} {which}, {first}; more than "
+            f"{100 * REPAIRABLE:g} % is not repaired, record or export again",
             line,
         )
     else:

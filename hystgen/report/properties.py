@@ -6,7 +6,7 @@ import decimal
 from typing import Any
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.problems import FormatError, percent
+from hystgen.basics.problems import FormatError, counted, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.emission.calls import emit_options
@@ -28,7 +28,7 @@ def properties(model: Model) -> str:
     drive, output = (f" {unit}" if unit else "" for unit in (p.units.input, p.units.output))
     fronts = ["dead zone" if isinstance(stage, DeadZone) else "tanh envelope" for stage in c.stages]
     lines = [
-        f"{model.name}: {pi.n} plays" + (f" behind {', '.join(fronts)}" if fronts else ""),
+        f"{model.name}: {counted(pi.n, 'play')}" + (f" behind {', '.join(fronts)}" if fronts else ""),
         *([p.description] if p.description else []),
         f"drive range        {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}",
         f"input of the plays {c.play_range[0]:.6g} to {c.play_range[1]:.6g}",

@@ -118,9 +118,9 @@ class OtherHistory(Fault):
     def sentence(self, unit: str | None) -> str:
         u = _unit(unit)
         return (
-            f"the {counted(self.samples, 'sample')} at the start, whose output depends on the history, are off by "
-            f"{self.start:.3g}{u} rms, all others by {self.rest:.3g}{u}: the actuator came from elsewhere, and the "
-            "history is left out"
+            f"the output of the first {counted(self.samples, 'sample')}, which depends on the history, is off by "
+            f"{self.start:.3g}{u} rms, that of all others by {self.rest:.3g}{u}: the actuator came from elsewhere, "
+            "and the history is left out"
         )
 
 

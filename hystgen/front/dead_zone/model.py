@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.checks import numbers
-from hystgen.basics.problems import NotInvertibleError
+from hystgen.basics.problems import NotInvertibleError, counted
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class DeadZone:
         if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
             raise ValueError("dead-zone thresholds rise strictly and contain 0")
         if len(weights) != len(thresholds):
-            raise ValueError(f"{len(thresholds)} thresholds but {len(weights)} weights")
+            raise ValueError(f"{counted(len(thresholds), 'threshold')} but {counted(len(weights), 'weight')}")
         object.__setattr__(self, "thresholds", thresholds)
         object.__setattr__(self, "weights", weights)
 
