@@ -25,6 +25,7 @@ breathe_show_include = False
 breathe_show_define_initializer = True
 copybutton_prompt_text = r"\$ |>>> "
 copybutton_prompt_is_regexp = True
+copybutton_line_continuation_character = "\\"
 
 html_theme = "furo"
 html_title = f"hystgen {release}"

@@ -4,7 +4,7 @@ For every plant: a training and a held-out record are simulated, `hystgen.identi
 compensator is emitted as C, compiled on this machine and run in front of the plant along a reference that is in
 neither record. Writes plants.csv and plants.svg into the folder and prints the table.
 
-Usage: python examples/compensate_plants.py [-o FOLDER]
+Usage: python examples/compensate_plants.py [-o FOLDER] [--plant NAME]
 """
 
 from __future__ import annotations
@@ -283,10 +283,10 @@ def draw(results: list[Result]) -> Any:
     return figure
 
 
-def make(folder: Path) -> list[Result]:
-    """Write plants.csv and plants.svg into the folder."""
+def make(folder: Path, only: str = "") -> list[Result]:
+    """Write plants.csv and plants.svg, of all plants or of one alone, into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    results = [measure(case) for case in cases()]
+    results = [measure(case) for case in cases() if only in ("", case.name)]
     with open(folder / "plants.csv", "w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([HEADER, *map(row, results)])
     with drawing.styled():
@@ -299,7 +299,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     out = Path(__file__).resolve().parent / "out"
     parser.add_argument("-o", "--output", type=Path, default=out, help="folder of the table and the figure")
-    print(table(make(parser.parse_args().output)))
+    names = dict.fromkeys(case.name for case in cases())
+    parser.add_argument("--plant", default="", choices=names, metavar="NAME", help="this plant alone")
+    given = parser.parse_args()
+    print(table(make(given.output, given.plant)))
 
 
 if __name__ == "__main__":
