@@ -9,7 +9,7 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
-.PHONY: demo test check prove lint fuzz check-bounds blind track docs clean
+.PHONY: demo test check prove lint fuzz check-bounds blind track docs links clean
 
 # What the demo needs of the package, and a compiler in case there is none
 $(VENV)/demo: pyproject.toml
@@ -74,6 +74,10 @@ track: $(VENV)/ready
 # The documentation as a site, build/docs/index.html; needs Debian's doxygen
 docs: $(VENV)/ready
 	$(BIN)/python -m sphinx -W --keep-going -b html docs build/docs
+
+# Links of the pages and the site, those to other sites too; `make check` tries all others
+links: docs
+	$(BIN)/lychee --no-progress --include-fragments=anchor-only --max-retries 3 *.md docs build/docs
 
 clean:
 	rm -rf $(VENV) build dist
