@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 
 from hystgen.basics import extras
@@ -124,7 +126,7 @@ def test_tektronix(tmp_path: Path) -> None:
     path = put(tmp_path / "tek0001ALL.csv", tektronix(","))
     assert problem(path) == (
         ':20:1: error: there are no columns "v" and "y" among TIME, CH1, CH2; name them with --columns '
-        '"v=COLUMN,y=COLUMN"'
+        '"v=COLUMN,y=COLUMN", for example "v=CH1,y=CH2"'
     )
     record = read_record(path, parse_columns("v=CH1,y=CH2"))
     check(record, -0.02)
@@ -198,6 +200,73 @@ def test_pi_gcs_that_is_not_clear_or_damaged(tmp_path: Path) -> None:
     assert "2 columns where the header has 3" in problem(put(tmp_path / "d.dat", lines, "\n"), columns={"v": "#1"})
 
 
+# Others: read as they are, or one question, whose own example is an answer -------------------------------------------
+
+
+def rows(form: str) -> list[str]:
+    return [form.format(k=k, t=t, ms=1e3 * t, v=v, y=y) for k, (t, v, y) in enumerate(zip(T, V, Y, strict=True))]
+
+
+YOKOGAWA = [
+    '"Header Size","8"', '"Model Name","DL850E"', '"TraceName",{names}', '"VUnit","V","um"',
+    '"HResolution","1.000000e-03","1.000000e-03"', '"HUnit","s","s"', '"Date","2024/03/05","2024/03/05"',
+]  # fmt: skip
+LECROY = [
+    "LECROYWS3034Z,0,Waveform,LECROYWS3034Z,0,Waveform", "Segments,1,SegmentSize,50,Segments,1,SegmentSize,50",
+    "Segment,TrigTime,TimeSinceSegment1,Segment,TrigTime,TimeSinceSegment1", "Time,Ampl,Time,Ampl",
+]  # fmt: skip
+STYLES = {
+    "rigol": (["X,CH1,CH2,Start,Increment,", "Sequence,Volt,Volt,-0.02,1.0e-03"], "{k},{v:.6f},{y:.6f},,"),
+    "new_rigol": (["CH1V,CH2V,t0 =-2.0e-02, tInc = 1.0e-03,"], "{v:.6f},{y:.6f},,"),
+    "yokogawa": ([line.format(names='"Drive","Sensor"') for line in YOKOGAWA], ",{v:.6f},{y:.6f}"),
+    "yokogawa_channels": ([line.format(names='"CH1","CH2"') for line in YOKOGAWA], ",{v:.6f},{y:.6f}"),
+    "siglent": (["Sample Interval,Analog:1.0e-03", "Source,CH1,CH2", "Second,Volt,Volt"], "{t:.6f},{v:.6f},{y:.6f}"),
+    "lecroy": (LECROY, "{t:.7f},{v:.6f},{t:.7f},{y:.6f}"),
+    "moku": (["% Moku:Go Oscilloscope", "% Time (s), Input 1 (V), Input 2 (V)"], "{t:.6e}, {v:.6f}, {y:.6f}"),
+    "hioki": (['"HIOKI 8861","8861-50"', '"Time(s)","CH1-1(V)","CH1-2(V)"'], "{t:.6f},{v:.6f},{y:.6f}"),
+    "picoscope": (["Time,Channel A,Channel B", "(ms),(V),(mV)", ""], "{ms:.6f},{v:.6f},{y:.6f}"),
+    "saleae": (["Time [s],Channel 0,Channel 1"], "{t:.9f},{v:.9f},{y:.9f}"),
+    "pymeasure": (["#Procedure: <a.Sweep>", "#Data:", "Time (s),Voltage (V),Position (um)"], "{t},{v},{y}"),
+    "origin": (["Time\tVoltage\tWay", "s\tV\tum", "\tDrive\tSensor"], "{t:.6f}\t{v:.6f}\t{y:.6f}"),
+    "counted": (["Index,Time (s),Voltage (V),Reading"], "{k},{t:.6f},{v:.6f},{y:.6f}"),
+}  # fmt: skip
+ASKED = {
+    "rigol": "v=CH1,y=CH2", "new_rigol": "v=CH1,y=CH2", "yokogawa_channels": "v=CH1,y=CH2", "siglent": "v=CH1,y=CH2",
+    "lecroy": "t=#1,v=#2,y=#4", "moku": "v=Input 1 (V),y=Input 2 (V)", "hioki": "v=CH1-1(V),y=CH1-2(V)",
+    "picoscope": "v=Channel A,y=Channel B", "saleae": "v=Channel 0,y=Channel 1", "origin": "y=Way",
+    "counted": "y=Reading",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_styles_of_instruments(tmp_path: Path, style: str) -> None:
+    head, form = STYLES[style]
+    path = put(tmp_path / "a.csv", [*head, *rows(form)])
+    if style not in ASKED:
+        check(read_record(path))
+        return
+    text = problem(path)
+    assert text.endswith(f', for example "{ASKED[style]}"')
+    check(read_record(path, parse_columns(ASKED[style])))
+
+
+def test_settings_of_instruments_that_say_no_one_time(tmp_path: Path) -> None:
+    head = [line.format(names='"Drive","Sensor"').replace('1.000000e-03"', '2.0e-03"', 1) for line in YOKOGAWA]
+    path = put(tmp_path / "a.csv", [*head, *rows(",{v:.6f},{y:.6f}")])
+    assert problem(path) == ":5:1: error: its channels have sample rates of their own; export them with one rate"
+    path = put(tmp_path / "b.csv", ["CH1V,CH2V,t0 = 0, tInc = fast", *rows("{v:.6f},{y:.6f},,")])
+    assert problem(path) == ':1:1: error: tInc has "fast", which is no number; export it again'
+
+
+def test_an_overrange_of_picoscope_is_no_value(tmp_path: Path) -> None:
+    lines = ["t,v,y", *rows("{t:.6f},{v:.6f},{y:.6f}")]
+    lines[8] = lines[8].rpartition(",")[0] + ",\N{INFINITY}"
+    (tmp_path / "a.csv").write_text("\n".join(lines), encoding="utf-8")
+    assert read_record(tmp_path / "a.csv").notes == (
+        "1 sample without a value in v or y or t dropped, the first in line 9",
+    )
+
+
 # TDMS, written by npTDMS ----------------------------------------------------------------------------------------------
 
 
@@ -256,3 +325,91 @@ def test_tdms_without_its_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_other_rate_of_the_user_counts(tmp_path: Path) -> None:
     assert read_record(put(tmp_path / "a.dat", gcs(), "\n"), sample_time=0.5).sample_time == 0.5
+
+
+def test_tdms_scaled_from_codes(tmp_path: Path) -> None:
+    def scale(slope: float, at_zero: float) -> dict[str, Any]:
+        return {
+            "NI_Number_Of_Scales": 1, "NI_Scaling_Status": "unscaled", "NI_Scale[0]_Scale_Type": "Linear",
+            "NI_Scale[0]_Linear_Slope": slope, "NI_Scale[0]_Linear_Y_Intercept": at_zero,
+            "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF, "wf_increment": 0.001,
+        }  # fmt: skip
+
+    codes = {"Drive": np.round(V / 0.002).astype(np.int16), "Sensor": np.round((Y + 1) / 0.0005).astype(np.int16)}
+    path = write_tdms(tmp_path / "a.tdms", codes, Drive=scale(0.002, 0.0), Sensor=scale(0.0005, -1.0))
+    record = read_record(path)
+    assert record.v == pytest.approx(V, abs=0.0011)
+    assert record.y == pytest.approx(Y, abs=0.0003)
+    assert record.sample_time == 0.001
+
+
+# Simulink and ControlDesk: lists of structs, the numbers beside a text that says what they are ----------------------
+
+
+def matlab(group: Any, name: str, x: Any) -> Any:
+    """A variable as MATLAB v7.3 stores it."""
+    text = isinstance(x, str)
+    made = group.create_dataset(name, data=np.array([[ord(c)] for c in x], np.uint16) if text else np.atleast_2d(x))
+    made.attrs["MATLAB_class"] = np.bytes_("char" if text else "double")
+    return made
+
+
+def write_list(
+    path: Path, version: str, folder: str, time: dict[str, Any], traces: list[dict[str, Any]], of: str
+) -> Path:
+    """A struct with a time, a vector or a struct of its own, and a list of structs `of`."""
+    if version == "v5":
+        listed = np.array([tuple(each.values()) for each in traces], dtype=[(key, "O") for key in traces[0]])
+        scipy.io.savemat(path, {folder: {**time, of: listed}})
+        return path
+    with h5py.File(path, "w", userblock_size=512) as file:
+        group, kept = file.create_group(folder), file.create_group("#refs#")
+        for name, value in time.items():
+            inside = group.create_group(name) if isinstance(value, dict) else group
+            for key, x in value.items() if isinstance(value, dict) else ((name, value),):
+                matlab(inside, key, x)
+        listed = group.create_group(of)
+        for key in traces[0]:
+            found = listed.create_dataset(key, (len(traces), 1), dtype=h5py.ref_dtype)
+            for k, each in enumerate(traces):
+                found[k, 0] = matlab(kept, f"{key}{k}", each[key]).ref
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
+    return path
+
+
+@pytest.mark.parametrize("version", ["v5", "v73"])
+def test_lists_of_structs(tmp_path: Path, version: str) -> None:
+    traces = [{"values": V, "label": "drive"}, {"values": Y, "label": "position"}]
+    record = read_record(write_list(tmp_path / "simulink.mat", version, "out", {"time": T}, traces, "signals"))
+    check(record)
+    assert record.read_as == "t = time in seconds, as it has no unit, v = drive, y = position"
+    traces = [
+        {"Name": "Model Root/drive", "Data": V, "Unit": "V"}, {"Name": "Model Root/position", "Data": Y, "Unit": "um"},
+    ]  # fmt: skip
+    time = {"X": {"Name": "Time", "Data": T}}
+    record = read_record(write_list(tmp_path / "controldesk.mat", version, "run1", time, traces, "Y"))
+    check(record)
+    assert record.units == {"v": "V", "y": "um"}
+    # Without labels that tell them apart they are asked for, by their places in the list
+    traces = [{"values": V, "label": "x"}, {"values": Y, "label": "x"}]
+    path = write_list(tmp_path / "alike.mat", version, "out", {"time": T}, traces, "signals")
+    assert problem(path).endswith(', for example "v=out.signals.(1).values,y=out.signals.(2).values"')
+    check(read_record(path, parse_columns("v=out.signals.(1).values,y=out.signals.(2).values")))
+
+
+@pytest.mark.parametrize("kind", ["npz", "mat", "h5", "turned.h5"])
+def test_a_matrix_alone_is_a_table_without_names(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"a.{kind}"
+    table = np.column_stack([T, V, Y])
+    if kind == "npz":
+        np.savez(path, data=table)
+    elif kind == "mat":
+        scipy.io.savemat(path, {"data": table})
+    else:
+        with h5py.File(path, "w") as file:
+            file["data"] = table if kind == "h5" else table.T
+    assert problem(path) == (
+        ": error: data is a matrix of 3 columns; say which they are with --columns 1,2,3 (time, drive, measured)"
+    )
+    check(read_record(path, parse_columns("1,2,3")))

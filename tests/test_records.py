@@ -245,7 +245,8 @@ class TestRefuse:
     def test_missing_columns_all_at_once_with_what_may_be_meant(self, tmp_path: Path) -> None:
         path = write(tmp_path / "a.csv", rows(), "Time [s],Voltage (V),Chan3")
         assert problems(path) == [
-            ':1:1: error: there is no column "y" among Time [s], Voltage (V), Chan3; name it with --columns "y=COLUMN"'
+            ':1:1: error: there is no column "y" among Time [s], Voltage (V), Chan3; name it with --columns '
+            '"y=COLUMN", for example "y=Chan3"'
         ]
         assert len(read_record(path, {"y": "Chan3"})) == N
         other = write(tmp_path / "b.csv", rows(), "step,Drive voltage error (V),Chan3")

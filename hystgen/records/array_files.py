@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import extras
 from hystgen.records.columns import Column, Step, column, from_number, is_named
-from hystgen.records.reading import Reading, Table, one_dimension
+from hystgen.records.reading import Reading, Table, in_matrix, one_dimension
 
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -32,6 +32,7 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
         columns = []
         ignored = []
         steps: list[Step] = []
+        matrices: dict[str, Any] = {}
         members = frozenset(archive.zip.namelist())
         for name in archive.files:
             shape = _npy_shape(archive, name if name in members else f"{name}.npy")
@@ -40,7 +41,9 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
                 columns.append(column(name, length=length, read=partial(_npy_vector, archive, name)))
             elif not _scalar(name, "", partial(_npy_vector, archive, name), shape, steps):
                 ignored.append(name)
-        return reading.table(columns, ignored, steps=steps)
+                if in_matrix(shape):
+                    matrices[name] = shape, partial(archive.__getitem__, name)
+        return reading.table(columns, ignored, steps=steps, matrices=matrices)
 
 
 def _scalar(name: str, of: str, read: Callable[[], NDArray[Any]], shape: tuple[int, ...], steps: list[Step]) -> bool:
@@ -84,6 +87,7 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
         columns: list[Column] = []
         ignored: list[str] = []
         steps: list[Step] = []
+        matrices: dict[str, Any] = {}
         vectors = _MatVectors(stream)
         for name, shape, kind in whosmat(stream):
             if kind == "struct":
@@ -95,7 +99,9 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
                 name, "", partial(_mat_variable, stream, name), shape, steps
             ):
                 ignored.append(name)
-        return reading.table(columns, ignored, steps=steps)
+                if kind in MATLAB_NUMBERS and in_matrix(shape):
+                    matrices[name] = shape, lambda name=name: _mat_variables(stream, [name])[name]
+        return reading.table(columns, ignored, steps=steps, matrices=matrices)
 
 
 def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, Any]:
@@ -137,12 +143,60 @@ class _MatVectors:
         return np.asarray(self._loaded[1].pop(name)).ravel()
 
 
+Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[Any]]]]]
+"""Fields of a struct of a list: its texts, and its vectors with length and numbers."""
+
+_LABELS, _UNITS = ("label", "name"), ("unit", "units")
+
+HOLDING = ("data", "values")
+"""Fields of a struct whose numbers are what its label says."""
+
+
+def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:
+    """The vectors of a list of structs, by the text beside them: signals of Simulink, traces of ControlDesk.
+
+    Those without a text of their own are called by their number in the list, `(2).values`.
+    """
+
+    def beside(texts: dict[str, str], keys: Sequence[str]) -> str:
+        return next((text for name, text in texts.items() if name.casefold() in keys), "")
+
+    labels = [beside(texts, _LABELS) for texts, _ in structs]
+    columns = []
+    for number, ((texts, vectors), label) in enumerate(zip(structs, labels, strict=True), 1):
+        own = label if labels.count(label) == 1 else ""
+        for field, (length, read) in vectors.items():
+            if own and len(vectors) == 1:
+                name = own
+            else:
+                name = field if len(structs) == 1 else f"{own or f'({number})'}.{field}"
+            columns.append(column(name, folder, beside(texts, _UNITS), length, read))
+    return columns
+
+
+def _parts(struct: NDArray[Any], place: int) -> Parts:
+    parts: Parts = {}, {}
+    texts, vectors = parts
+    for name in struct.dtype.names or ():
+        value = struct.ravel()[place][name]
+        if not isinstance(value, np.ndarray):
+            continue
+        if value.dtype.kind == "U" and value.size == 1:
+            texts[name] = str(value.ravel()[0])
+        elif value.dtype.kind in "fiub" and one_dimension(value.shape):
+            vectors[name] = value.size, value.ravel
+    return parts
+
+
 def _fields(
     struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str], steps: list[Step]
 ) -> None:
-    """The vectors among the fields of a struct, and of the structs in it; lists of structs have none."""
-    if struct.shape != (1, 1):
-        ignored.append(folder[:-1])
+    """The vectors among the fields of a struct, and of the structs in it."""
+    alone = struct.shape == (1, 1)
+    if not alone or [name.casefold() for name in _parts(struct, 0)[1]] in ([each] for each in HOLDING):
+        listed = list_of_structs(folder, [_parts(struct, k) for k in range(struct.size)])
+        columns += listed
+        ignored += [] if listed else [folder[:-1]]
         return
     for name in struct.dtype.names or ():
         value = struct[name][0, 0]

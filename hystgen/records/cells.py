@@ -104,7 +104,10 @@ def _offset(zone: str | None) -> int:
 # Numbers, and what separates cells ---------------------------------------------------------------------------
 
 
-MISSING = frozenset(("", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "infinity", "-infinity"))
+MISSING = frozenset(
+    ("", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "infinity", "-infinity", "\N{INFINITY}",
+     "+\N{INFINITY}", "-\N{INFINITY}")
+)  # fmt: skip
 """Cells, in lower case, that hold no value."""
 
 BLANKS = " "

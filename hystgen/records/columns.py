@@ -178,8 +178,8 @@ class Step:
 
     def belongs(self, names: Iterable[str]) -> bool:
         """Whether they are those of any of the columns."""
-        group = not self.of or self.of[-1] in "./"
-        return any(name.startswith(self.of) if group else name == self.of for name in names)
+        group = self.of[-1:] in ("", ".", "/")
+        return not self.of or any(name.startswith(self.of) if group else name == self.of for name in names)
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
@@ -266,14 +266,17 @@ OTHERWISE = frozenset(
 )  # fmt: skip
 """Words of names that belong to something else than the quantity itself."""
 
+COUNTING = frozenset(("index", "scan", "sample", "chunk", "no", "nr", "number", "row", "point", "count", "segment"))
+"""Words of names of columns that count rows."""
+
 _WORDS = re.compile(r"[^\W\d_]+")
 
 _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Column:
-    """A column that a file offers.
+    """A column that a file offers; others may be called alike.
 
     `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: that without a unit,
     `drive`; `unit`: empty when the file gives none; `length`: samples, 0 where they are not counted before reading;
@@ -381,6 +384,7 @@ class Finder:
         self.understood: dict[str, Column] = {}
         self.steps: list[Step] = []
         self._unnamed: list[str] = []
+        self._several: dict[str, list[Column]] = {}
         self._asked: set[str] = set()
 
     def find(self, need: Sequence[str], timed: bool, steps: Sequence[Step] = ()) -> dict[str, Column]:
@@ -407,9 +411,9 @@ class Finder:
                 continue
             if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
                 self.steps = [step for step in steps if step.belongs(c.name for c in found.values())]
-            if ours not in self._asked and not (ours == "t" and self.steps):
+            if ours not in self._asked and ours not in self._several and not (ours == "t" and self.steps):
                 self._missing(ours, self.mapping.get(ours, ours))
-        self._name_together()
+        self._name_together(found)
         self._apart({ours: c for ours, c in found.items() if ours in self.mapping}, found, need, timed)
         return found
 
@@ -437,22 +441,40 @@ class Finder:
         if not meant and ours == "t":
             meant = [c for c in self.columns[:1] if c in free and is_time_unit(c.unit)]
         if len(meant) > 1:
-            self._ask(ours, ours, meant)
+            self._several[ours] = meant
         return meant[0] if len(meant) == 1 else None
 
-    def _name_together(self) -> None:
-        """One question for all columns that nothing identifies."""
-        if len(self._unnamed) > 1:
-            *others, last = (f'"{ours}"' for ours in self._unnamed)
-            self.problems.append(
-                f"there are no columns {', '.join(others)} and {last} among {_listed(self.columns)}; name them with "
-                f'--columns "{",".join(f"{ours}=COLUMN" for ours in self._unnamed)}"'
-            )
-        elif self._unnamed:
-            (ours,) = self._unnamed
-            self.problems.append(
-                f'there is no column "{ours}" among {_listed(self.columns)}; name it with --columns "{ours}=COLUMN"'
-            )
+    def _name_together(self, found: Mapping[str, Column]) -> None:
+        """One question for all columns that nothing identifies, or more than one may be."""
+        if not self._unnamed:
+            for ours, meant in self._several.items():
+                self._ask(ours, ours, meant)
+            return
+        unnamed = [ours for ours in (*STANDARD, *self._unnamed) if ours in (*self._unnamed, *self._several)]
+        unnamed = list(dict.fromkeys(unnamed))
+        wanted = ",".join(f"{ours}=COLUMN" for ours in unnamed)
+        *others, last = (f'"{ours}"' for ours in unnamed)
+        there = f"are no columns {', '.join(others)} and {last}" if others else f"is no column {last}"
+        self.problems.append(
+            f"there {there} among {_listed(self.columns)}; name {'them' if others else 'it'} with --columns "
+            f'"{wanted}"{self._example(unnamed, found)}'
+        )
+
+    def _example(self, unnamed: Sequence[str], found: Mapping[str, Column]) -> str:
+        """An answer to the question for columns, in their order, where no more of them are left than are asked for."""
+        taken = set(found.values())
+        free = [c for c in self.columns if c.name and c not in taken and not _words(c) & COUNTING]
+        times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
+        others = iter([c for c in free if c not in times])
+        answers = {ours: next(iter(times) if ours == "t" else others, None) for ours in unnamed}
+        if None in answers.values() or next(others, None) is not None:
+            return ""
+        return f', for example "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
+
+    def _address(self, c: Column) -> str:
+        """What names a column in `--columns`: its name, or its number where that is not its alone, or has a comma."""
+        alone = sum(each.name == c.name for each in self.columns) == 1
+        return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
     def _one(self, ours: str, required: bool) -> Column | None:
         theirs = self.mapping.get(ours, ours)
@@ -483,7 +505,7 @@ class Finder:
         self._asked.add(ours)
         self.problems.append(
             f'{len(matches)} columns may be meant by "{printable(theirs)}": {_listed(matches)}; name one with '
-            f'--columns "{ours}={printable(matches[0].name)}"'
+            f'--columns "{ours}={self._address(matches[0])}"'
         )
 
     def _missing(self, ours: str, theirs: str) -> None:

@@ -6,6 +6,7 @@ have whatever the file names opened, and are not read.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import IO, Any
 
@@ -13,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics import extras
-from hystgen.records.array_files import MATLAB_NUMBERS
+from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
 from hystgen.records.columns import Column, Step, column, from_number, is_named
-from hystgen.records.reading import Reading, Table, one_dimension
+from hystgen.records.reading import Reading, Table, in_matrix, one_dimension
 
 SLICE = 1 << 18
 """Samples read at a time."""
@@ -49,6 +50,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
         ignored: list[str] = []
         outside: list[str] = []
         steps: list[Step] = []
+        matrices: dict[str, Any] = {}
         join = "." if matlab else "/"  # MATLAB writes a field of a struct with a point
 
         def link(path: str, found: Any) -> None:
@@ -64,10 +66,14 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 of = f"{folder}{name}" if isinstance(found, h5py.Dataset) else f"{folder}{name}/"
                 steps.extend(_attributes(found, of))
             if not isinstance(found, h5py.Dataset):
+                columns.extend(_list_of_structs(reading, file, found, f"{folder}{name}.") if matlab else ())
                 return
             length = _length(found, matlab)
             if found.external or found.is_virtual:
                 outside.append(folder + name)
+            elif length and matlab and name.casefold() in HOLDING:
+                texts, _ = _parts(reading, found.parent)
+                columns.extend(list_of_structs(folder, [(texts, {name: (length, partial(_vector, reading, found))})]))
             elif length:
                 unit = "" if matlab else _unit(found)
                 columns.append(column(name, folder, unit, length, partial(_vector, reading, found)))
@@ -75,11 +81,45 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
                 steps.append(step)
             else:
                 ignored.append(folder + name)
+                if found.dtype.kind in "fiub" and in_matrix(found.shape or ()):
+                    matrices[folder + name] = found.shape, partial(found.__getitem__, ())
 
         steps.extend(_attributes(file, ""))
         file.visititems(visit)
         file.visititems_links(link)
-        return reading.table(columns, ignored, outside, steps)
+        return reading.table(columns, ignored, outside, steps, matrices)
+
+
+def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> list[Column]:
+    """The vectors of a list of structs, of which MATLAB keeps a dataset a field, with a reference a struct."""
+    import h5py
+
+    fields = {
+        name: [file[each] for each in found[()].ravel() if each]
+        for name, found in group.items()
+        if isinstance(found, h5py.Dataset) and h5py.check_ref_dtype(found.dtype) is h5py.Reference
+    }
+    structs = [
+        {name: values[k] for name, values in fields.items() if len(values) > k}
+        for k in range(max(map(len, fields.values()), default=0))
+    ]
+    return list_of_structs(folder, [_parts(reading, struct) for struct in structs])
+
+
+def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
+    """The texts and vectors among the fields of a struct."""
+    import h5py
+
+    parts: Parts = {}, {}
+    texts, vectors = parts
+    for name, value in fields.items():
+        if not isinstance(value, h5py.Dataset):
+            continue
+        if value.attrs.get("MATLAB_class") == b"char":
+            texts[name] = "".join(map(chr, np.asarray(value[()]).ravel()))
+        elif length := _length(value, matlab=True):
+            vectors[name] = length, partial(_vector, reading, value)
+    return parts
 
 
 def _attributes(found: Any, of: str) -> list[Step]:

@@ -79,7 +79,7 @@ def find(reading: Reading, lines: Sequence[str]) -> Layout:
 
     Raises RecordError where nothing or more than one thing fits.
     """
-    said = (header(reading, lines) for header in (labview, pi_gcs, tektronix))
+    said = (header(reading, lines) for header in (labview, pi_gcs, tektronix, rigol, yokogawa))
     return next((layout for layout in said if layout is not None), None) or _shown(reading, lines)
 
 
@@ -171,6 +171,11 @@ def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
     # The lowest line without a number is the header, or the units below it; others are rows with faults
     for place, (line, names) in enumerate(block):
         if not any(view.dialect.weight(name) > 0 for name in names):
+            more = block[place + 1 : place + 3]
+            if len(more) == 2 and not _are_units(names) and _are_units(more[0][1]) and _may_be_names(view, more[1][1]):
+                made = _made(view, more[1][1], more[1][0].number, _next(lines, line), more[0][1])
+                made.also = names  # as Origin has them: long names, units, comments
+                return made
             if _are_units(names) and place + 1 < len(block) and _may_be_names(view, block[place + 1][1]):
                 above, upper = block[place + 1]
                 return _made(view, upper, above.number, _next(lines, line), names)
@@ -517,3 +522,72 @@ def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:
 
 def _decimal_commas(lines: Sequence[str], delimiter: str) -> bool:
     return any(line.startswith(f"Sample Interval{delimiter}") and "," in line for line in lines)
+
+
+# CSV of Rigol oscilloscopes ----------------------------------------------------------------------------------
+
+
+_RIGOL_NEW = re.compile(r"(?P<names>.*?),\s*t0\s*=\s*(?P<start>[^,]*?)\s*,\s*tInc\s*=\s*(?P<step>[^,]*?)\s*,*\s*")
+
+_RIGOL_CHANNEL = re.compile(r"(CH\d+|MATH\d*)(V|A|W)")
+
+
+def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
+    """The layout of a table without time, whose first lines have its start and its increment instead.
+
+    `X,CH1,CH2,Start,Increment` above `Sequence,Volt,Volt,-0.2,0.001`, newer ones `CH1V,CH2V,t0 = -0.2, tInc = 0.001`.
+    """
+    cells = [cell.strip() for cell in lines[0].split(",")]
+    below = [cell.strip() for cell in lines[1].split(",")] if len(lines) > 1 else []
+    new = _RIGOL_NEW.fullmatch(lines[0])
+    if new is not None:
+        names = [name.strip() for name in new["names"].split(",")]
+        channels = [_RIGOL_CHANNEL.fullmatch(name) for name in names]
+        units = [channel[2] if channel else "" for channel in channels]
+        step, line, tag = new["step"], 1, "tInc"
+        names = [channel[1] if channel else name for name, channel in zip(names, channels, strict=True)]
+    elif cells[:1] == ["X"] and {"Start", "Increment"} <= set(cells[: len(below)]) and below[:1] == ["Sequence"]:
+        names = ["", *cells[1 : cells.index("Start")]]
+        units = below[: len(names)]
+        step, line, tag = below[cells.index("Increment")], 2, "Increment"
+    else:
+        return None
+    seconds = _number(reading, Dialect(), step, tag, line)
+    blank = [""] * (len(cells) - len(names))
+    return Layout(Dialect(), [*names, *blank], line + 1, 1, [*units, *blank], kind="Rigol CSV",
+                  steps=[Step(seconds, f"{tag} {seconds:g} s (line {line})")] if seconds > 0.0 else [])  # fmt: skip
+
+
+# CSV of Yokogawa's ScopeCorders and oscilloscopes -------------------------------------------------------------
+
+
+def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
+    """The layout that the settings give, one a line and one cell a channel; rows begin with an empty cell.
+
+    They have no time. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between rows.
+    """
+    dialect = Dialect()
+    settings: dict[str, tuple[int, list[str]]] = {}
+    first = None
+    for number, line in enumerate(lines, 1):
+        key, *cells = (cell.strip() for _, cell in dialect.cells(line))
+        if not key and cells and dialect.weight(cells[0]) > 0:
+            first = number
+            break
+        settings.setdefault(key, (number, cells))
+    if first is None or not {"TraceName", "HResolution"} <= settings.keys():
+        return None
+    header, names = settings["TraceName"]
+    place, steps = settings["HResolution"]
+    blank = [""] * len(names)
+    found = Layout(
+        dialect, ["", *names], first, header, ["", *(settings.get("VUnit", (0, []))[1] + blank)[: len(names)]],
+        kind="Yokogawa CSV",
+    )  # fmt: skip
+    seconds = {_number(reading, dialect, step, "HResolution", place) for step in steps if step}
+    if len(seconds) > 1:
+        raise reading.refuse("its channels have sample rates of their own; export them with one rate", place)
+    if settings.get("HUnit", (0, ["s"]))[1][:1] == ["s"] and seconds and min(seconds) > 0.0:
+        step = seconds.pop()
+        found.steps = [Step(step, f"HResolution {step:g} s (line {place})")]
+    return found

@@ -10,12 +10,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.problems import RecordError, counted, printable
-from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, further_names, to_seconds
+from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, column, further_names, to_seconds
 from hystgen.records.record import Array, Record, no_value
 
 SAME_STEP = 1e-6
@@ -190,12 +192,17 @@ class Reading:
         ignored: Sequence[str],
         outside: Sequence[str] = (),
         steps: Sequence[Step] = (),
+        matrices: Mapping[str, tuple[tuple[int, ...], Callable[[], NDArray[Any]]]] = MappingProxyType({}),
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
         Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
-        that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`).
+        that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`). `matrices`: name to
+        shape and numbers; the only one of a file without vectors is the record.
         """
+        if not columns and len(matrices) == 1:
+            ((name, (shape, read)),) = matrices.items()
+            columns, ignored = self._of_matrix(name, shape, read), [other for other in ignored if other != name]
         chosen = self.chosen(columns, ignored, outside, steps=steps)
         lengths = {c.length for c in chosen.values()}
         if len(lengths) > 1:
@@ -215,6 +222,20 @@ class Reading:
             assert c.read is not None
             numbers[name] = np.require(c.read(), np.float64, ("C", "W"))
         return self.finished(numbers, taken)
+
+    def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[Any]]) -> list[Column]:
+        """The columns of a matrix, called by their numbers. Raises RecordError when they are not."""
+        width = in_matrix(shape)
+        if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):
+            example = "1,2 (drive, measured) with --sample-time" if width == 2 else "1,2,3 (time, drive, measured)"
+            raise self.refuse(
+                f"{printable(name)} is a matrix of {width} columns; say which they are with --columns {example}"
+            )
+        across = shape.index(width)
+        return [
+            column(str(k + 1), length=max(shape), read=lambda k=k: np.take(read(), k, across))  # type: ignore[misc]
+            for k in range(width)
+        ]
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
         """A table with NaN for every value that is none, time in seconds and units by name."""
@@ -242,6 +263,16 @@ class Reading:
 
 def _standard_first(entry: tuple[str, Column]) -> int:
     return STANDARD.index(entry[0]) if entry[0] in STANDARD else len(STANDARD)
+
+
+MOST_TOGETHER = 64
+"""Columns of a matrix that is a record; a wider one is an image or a map."""
+
+
+def in_matrix(shape: tuple[int, ...]) -> int:
+    """Number of columns of a matrix that may be a record, whichever way it lies; 0 for anything else."""
+    two = len(shape) == 2 and shape[0] != shape[1]
+    return min(shape) if two and 2 <= min(shape) <= MOST_TOGETHER else 0
 
 
 def one_dimension(shape: tuple[int, ...]) -> int:
