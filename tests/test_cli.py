@@ -26,7 +26,7 @@ from modelfiles import FILES, head
 from ruamel.yaml import YAML
 
 import hystgen
-from hystgen import cli, verification
+from hystgen import cli, records, verification
 from hystgen.compensator import tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.emission import banner, module
@@ -431,6 +431,8 @@ def test_files_that_are_no_parameter_file(name: str) -> None:
     "simulate stage.yaml drive.csv -o file/out.csv", "simulate stage.yaml drive.csv other.csv",
     "simulate stage.yaml drive.csv other.csv -o file", "simulate stage.yaml drive.csv missing.csv -o new",
     "identify missing.csv -o new.yaml", "identify drive.csv", "identify stage.yaml -o new.yaml",
+    "identify drive.csv -o new/", "identify drive.csv -o new.yaml --units V",
+    "identify drive.csv -o new.yaml --units ,", "identify drive.csv -o new.yaml --units V,um,s",
     "show", "show stage.yaml --plot out.pdf", "show stage.yaml --plot no/such/folder/out.png",
     "show stage.yaml --plot .", "schema stage.yaml",
 ])  # fmt: skip
@@ -441,6 +443,49 @@ def test_bad_usage_is_refused_without_a_trace(words: str) -> None:
     before = everything()
     hyst(*words.split(), code=2)
     assert everything() == before, "nothing half-written"
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    ("identify stage.yaml -o new.yaml", "stage.yaml: error: is a parameter file; give a recording"),
+    ("identify drive.csv -o new/", "'new/' is a folder; give the file to write, as in new/stage_x.yaml"),
+    ("identify drive.csv -o new.yaml --units V", "'V' is not two units; give that of the drive and that of the output"),
+    ("identify drive.csv -o new.yaml --name 2x", 'error: the name "2x" is not a usable C prefix'),
+    ("identify drive.csv -o new.yaml --delimiter ;", "csv:1:1: error: has commas between its cells, not semicolons; "),
+    ("identify drive.csv -o new.yaml --delimiter tab", "has commas between its cells, not tabs; leave out --"),
+    ("identify drive.csv -o new.yaml --columns 1,2", 'column "t" is t already and cannot be v too; name another'),
+    ("simulate stage.yaml drive.csv other.csv -o file", "file is a file, and several records need -o with a folder"),
+    ("show nowhere.yaml", "cannot be read (No such file or directory); give the path of a parameter file"),
+])  # fmt: skip
+def test_what_a_stumble_is_answered_with(words: str, said: str) -> None:
+    for name in ("drive.csv", "other.csv"):
+        write(name, {column: [0.1 * k for k in range(20)] for column in ("t", "v", "y")})
+    Path("file").write_text("a file")
+    assert said in re.sub(r"\s+", " ", hyst(*words.split(), code=2).stderr)
+
+
+def test_files_behind_holdout_and_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pattern that the shell expands fits the files behind the first; in quotes it is held out whole."""
+    taken: list[tuple[list[str], list[str]]] = []
+
+    def read(sources: Sequence[str], **_: Any) -> None:
+        taken.append(tuple(sources))
+        raise ValueError("read")
+
+    monkeypatch.setattr(records, "read_records", read)
+    Path("held").mkdir()
+    for name in ("a.csv", "held/b.csv", "held/c.csv", "held/d.csv"):
+        write(name, {"t": [0.0], "v": [0.0], "y": [0.0]})
+    expanded = ["held/b.csv", "held/c.csv", "held/d.csv"]
+    err = hyst("identify", "a.csv", "--holdout", *expanded, "-o", "x.yaml", code=2).stderr
+    assert err.startswith(
+        "warning: held/c.csv and 1 more will be fitted, not held out: --holdout takes one file; put a pattern in "
+        "quotes, --holdout 'held/*.csv'\n"
+    )
+    for words in (["a.csv", "--holdout", "held/*.csv"], ["--holdout", "held/*.csv", "a.csv"]):
+        assert "warning" not in hyst("identify", *words, "-o", "x.yaml", code=2).stderr
+        assert taken.pop() == ("a.csv", *expanded)
+    hyst("identify", "held/[bc].csv", "no*.csv", "-o", "x.yaml", code=2)
+    assert taken.pop() == ("held/b.csv", "held/c.csv", "no*.csv")
 
 
 def test_messages_reach_the_shell(installed: str) -> None:

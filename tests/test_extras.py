@@ -90,6 +90,13 @@ def test_the_packages_of_the_extra_fit_are_those_that_are_asked_for(monkeypatch:
     with pytest.raises(extras.MissingExtraError) as caught:
         extras.require_fit("this")
     assert str(caught.value) == f"this needs joblib; install the extra with: {extras.install('fit')}"
+    assert set(extras.PLOT) == required(["hystgen[plot]"])
+    extras_missing = (*extras.PLOT, "joblib")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name in extras_missing else find(name))
+    with pytest.raises(extras.MissingExtraError) as caught:
+        extras.require_fit("this", plot=True)
+    both = extras.install("fit,plot")
+    assert str(caught.value) == f"this needs joblib, matplotlib; install the extras with: {both}"
 
 
 def test_all_is_every_extra_for_users() -> None:

@@ -663,6 +663,16 @@ SINE = 50.0 + 50.0 * np.sin(np.arange(400) / 20.0)
 NOTHING = np.full(400, np.nan)
 
 
+def test_exchanged_columns_leave_no_plays_and_are_asked_about() -> None:
+    """The drive leads the output; exchanged, no play fits."""
+    v = wander(31, 5.0, 95.0)
+    y = brute_output(v, THRESHOLDS, WEIGHTS, 0.0)
+    for drive, output, exchanged in ((v, y, False), (y, v, True)):
+        fit = hystgen.identify({"t": np.arange(len(v)) * 0.01, "v": drive, "y": output})
+        asked = [warning for warning in fit.warnings if "exchanged, they look like this" in warning]
+        assert (len(fit.parameters.model.pi.thresholds) == 1, len(asked) == 1) == (exchanged, exchanged)
+
+
 class TestRefused:
     @pytest.mark.parametrize(
         ("v", "y", "options", "message"),

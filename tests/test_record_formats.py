@@ -781,6 +781,12 @@ def test_units_that_records_agree_on() -> None:
     assert reported == [
         'the unit of y is "um" given and "nm" in a.csv; no number was converted, check that they agree'
     ]
+    units, reported = agreed_units([record("a.csv", v="µm", y="V")])
+    assert units == {"input": "µm", "output": "V"}
+    assert len(reported) == 1
+    assert "as if they were exchanged" in reported[0]
+    for v, y in (("um", "nm"), ("m", ""), ("V", "um")):
+        assert agreed_units([], {"input": v, "output": y})[1] == []
     units, reported = agreed_units([record("a.csv", v="x" * 41, y="a\nb")])
     assert units == {}
     assert len(reported) == 2
