@@ -15,7 +15,7 @@ import jinja2
 import numpy as np
 
 from hystgen.basics.names import comment_text
-from hystgen.basics.problems import NotInvertibleError, counted
+from hystgen.basics.problems import NotInvertibleError
 from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
@@ -419,7 +419,7 @@ def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str
 def _details(parameters: Parameters, cascade: StaticModel, options: Options, values: SimpleNamespace) -> list[str]:
     about = comment_text(parameters.description)
     kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in cascade.stages]
-    model = counted(cascade.pi.n, "play") + (f" behind {', '.join(kinds)}" if kinds else "")
+    model = f"{cascade.pi.n} play{'' if cascade.pi.n == 1 else 's'}" + (f" behind {', '.join(kinds)}" if kinds else "")
     names = dict.fromkeys(effect.name for effect in parameters.model.effects)
     model += f"; effects {', '.join(names)}" if names else ""
     estimate: cost.Cost = values.cost
