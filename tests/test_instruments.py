@@ -126,7 +126,7 @@ def test_tektronix(tmp_path: Path) -> None:
     path = put(tmp_path / "tek0001ALL.csv", tektronix(","))
     assert problem(path) == (
         ':20:1: error: there are no columns "v" and "y" among TIME, CH1, CH2; name them with --columns '
-        '"v=COLUMN,y=COLUMN", for example "v=CH1,y=CH2"'
+        '"v=COLUMN,y=COLUMN", for example --columns "v=CH1,y=CH2"'
     )
     record = read_record(path, parse_columns("v=CH1,y=CH2"))
     check(record, -0.02)
@@ -246,7 +246,7 @@ def test_styles_of_instruments(tmp_path: Path, style: str) -> None:
         check(read_record(path))
         return
     text = problem(path)
-    assert text.endswith(f', for example "{ASKED[style]}"')
+    assert text.endswith(f', for example --columns "{ASKED[style]}"')
     check(read_record(path, parse_columns(ASKED[style])))
 
 
@@ -394,7 +394,7 @@ def test_lists_of_structs(tmp_path: Path, version: str) -> None:
     # Without labels that tell them apart they are asked for, by their places in the list
     traces = [{"values": V, "label": "x"}, {"values": Y, "label": "x"}]
     path = write_list(tmp_path / "alike.mat", version, "out", {"time": T}, traces, "signals")
-    assert problem(path).endswith(', for example "v=out.signals.(1).values,y=out.signals.(2).values"')
+    assert problem(path).endswith(', for example --columns "v=out.signals.(1).values,y=out.signals.(2).values"')
     check(read_record(path, parse_columns("v=out.signals.(1).values,y=out.signals.(2).values")))
 
 

@@ -246,7 +246,7 @@ class TestRefuse:
         path = write(tmp_path / "a.csv", rows(), "Time [s],Voltage (V),Chan3")
         assert problems(path) == [
             ':1:1: error: there is no column "y" among Time [s], Voltage (V), Chan3; name it with --columns '
-            '"y=COLUMN", for example "y=Chan3"'
+            '"y=COLUMN", for example --columns "y=Chan3"'
         ]
         assert len(read_record(path, {"y": "Chan3"})) == N
         other = write(tmp_path / "b.csv", rows(), "step,Drive voltage error (V),Chan3")

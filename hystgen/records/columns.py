@@ -469,7 +469,7 @@ class Finder:
         answers = {ours: next(iter(times) if ours == "t" else others, None) for ours in unnamed}
         if None in answers.values() or next(others, None) is not None:
             return ""
-        return f', for example "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
+        return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
 
     def _address(self, c: Column) -> str:
         """What names a column in `--columns`: its name, or its number where that is not its alone, or has a comma."""
