@@ -398,6 +398,25 @@ def test_lists_of_structs(tmp_path: Path, version: str) -> None:
     check(read_record(path, parse_columns("v=out.signals.(1).values,y=out.signals.(2).values")))
 
 
+def test_lists_of_structs_open_no_other_file(tmp_path: Path) -> None:
+    """Links out of the file, and numbers that it keeps elsewhere, beside and behind the fields of a list."""
+    traces = [{"values": V, "label": "drive"}, {"values": Y, "label": "position"}]
+    path = write_list(tmp_path / "a.mat", "v73", "out", {"time": T}, traces, "signals")
+    (tmp_path / "raw").write_bytes((2 * Y).tobytes())
+    with h5py.File(tmp_path / "other.mat", "w") as file:
+        matlab(file, "label", "drive")
+    with h5py.File(path, "r+") as file:
+        for group in (file["out"], file["out/signals"]):
+            group["label2"] = h5py.ExternalLink("other.mat", "/label")
+            group["gone"] = h5py.ExternalLink("no_such_file.mat", "/label")
+            group["nowhere"] = h5py.SoftLink("/no/such/place")
+        kept = file["#refs#"].create_dataset("far", (1, N), "f8", external=[(str(tmp_path / "raw"), 0, 8 * N)])
+        kept.attrs["MATLAB_class"] = np.bytes_("double")
+        file["out/signals/values"][1, 0] = kept.ref
+    text = problem(path)
+    assert 'there is no column "y" among out.signals.drive, out.time; name it' in text
+
+
 @pytest.mark.parametrize("kind", ["npz", "mat", "h5", "turned.h5"])
 def test_a_matrix_alone_is_a_table_without_names(tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"a.{kind}"

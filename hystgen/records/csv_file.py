@@ -291,7 +291,8 @@ class _Body:
         reading.left_out("without numbers", [self.names[k] for k in sorted(self.text_columns)])
         numeric = [c for k, c in enumerate(columns) if k not in self.text_columns]
         taken = {**chosen, **reading.further(numeric, chosen)}
-        numbers = {name: self.stored[columns.index(c)] for name, c in taken.items()}
+        place = {c: k for k, c in enumerate(columns)}
+        numbers = {name: self.stored[place[c]] for name, c in taken.items()}
         return reading.finished(numbers, taken, self.lines)
 
     def _room(self, rows: int, size: int) -> None:

@@ -23,6 +23,9 @@ SLICE = 1 << 18
 
 _UNITS = ("units", "unit", "Units", "Unit")
 
+LONGEST = 1 << 10
+"""Characters of a text that may be a label or a unit; longer ones are not read."""
+
 _MATLAB_OWN = ("#refs#", "#subsystem#")
 """Groups in which MATLAB keeps what its cell arrays and objects refer to."""
 
@@ -72,7 +75,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
             if found.external or found.is_virtual:
                 outside.append(folder + name)
             elif length and matlab and name.casefold() in HOLDING:
-                texts, _ = _parts(reading, found.parent)
+                texts, _ = _parts(reading, _fields(found.parent))
                 columns.extend(list_of_structs(folder, [(texts, {name: (length, partial(_vector, reading, found))})]))
             elif length:
                 unit = "" if matlab else _unit(found)
@@ -96,8 +99,8 @@ def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> li
 
     fields = {
         name: [file[each] for each in found[()].ravel() if each]
-        for name, found in group.items()
-        if isinstance(found, h5py.Dataset) and h5py.check_ref_dtype(found.dtype) is h5py.Reference
+        for name, found in _fields(group).items()
+        if h5py.check_ref_dtype(found.dtype) is h5py.Reference and not (found.external or found.is_virtual)
     }
     structs = [
         {name: values[k] for name, values in fields.items() if len(values) > k}
@@ -106,16 +109,24 @@ def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> li
     return list_of_structs(folder, [_parts(reading, struct) for struct in structs])
 
 
+def _fields(group: Any) -> dict[str, Any]:
+    """The datasets of a group; a link to another file, or to anywhere by a path, is not followed."""
+    import h5py
+
+    own = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
+    return {name: group[name] for name in own if isinstance(group[name], h5py.Dataset)}
+
+
 def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
-    """The texts and vectors among the fields of a struct."""
+    """The texts and vectors among the fields of a struct that the file holds itself."""
     import h5py
 
     parts: Parts = {}, {}
     texts, vectors = parts
     for name, value in fields.items():
-        if not isinstance(value, h5py.Dataset):
+        if not isinstance(value, h5py.Dataset) or value.external or value.is_virtual:
             continue
-        if value.attrs.get("MATLAB_class") == b"char":
+        if value.attrs.get("MATLAB_class") == b"char" and value.size <= LONGEST:
             texts[name] = "".join(map(chr, np.asarray(value[()]).ravel()))
         elif length := _length(value, matlab=True):
             vectors[name] = length, partial(_vector, reading, value)
