@@ -1019,7 +1019,7 @@ def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "said"), [
-    (None, r"own.py: cannot be read \(No such file or directory\); give a folder with model.py"),
+    (None, r"own.py: cannot be read (No such file or directory); give a folder with model.py"),
     ("def (", r"own.py:1: SyntaxError: invalid syntax"),
     ("import nowhere_at_all\n", r"own.py:1: ModuleNotFoundError: No module named 'nowhere_at_all'"),
     ("x = 1\nraise SystemExit(3)\n", r"own.py:2: SystemExit: 3"),
