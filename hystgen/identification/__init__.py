@@ -50,6 +50,10 @@ MOST_PLAYS = 1000
 
 MOST_BREAKS = 64
 
+BEYOND = 0.1
+"""Share of the range of the fitted drive by which a held-out part of a record may leave it; further out a model that was
+fitted to less is not what is compared."""
+
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
@@ -210,17 +214,21 @@ class _Tried:
 
 
 def _try(
-    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress
+    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress, parts: bool = False
 ) -> _Tried:
-    """Fit one kind to courses and compare it with others."""
+    """Fit one kind to courses and compare it with others; `parts`: these are parts of the same records."""
     fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
+    if parts:
+        begun = [replace(other, start=item.start) for item, other in zip(compared, held, strict=True)]
+    else:
+        begun = fitted.begun(held)
     largest = float(fitted.solution.thresholds[-1])
-    settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in held]
+    settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
     for item in settled:
         if item.used < SHORTEST:
             raise IdentificationError(
-                f"{item.name} is held out, but only {item.used} of its samples can be compared once its start "
-                f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
+                f"{item.name} is held out, but only {item.used} of its samples can be compared, at least {SHORTEST} "
+                "are needed; hold out a longer record"
             )
     errors = [_compare(item, fitted) for item in settled]
     return _Tried(fitted, compared, settled, errors, Row.of("held out", "written", errors))
@@ -296,14 +304,13 @@ def _trial(
     instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
-        split = round(len(item.v) * (1.0 - HELD_OUT))
-        front = replace(item, last=split).resettled(math.inf)
-        if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
+        front, end = _parted(item)
+        if front.used < SHORTEST or np.ptp(item.v[front.first : front.last]) == 0.0:
             return [], kinds[0], [], f"{item.name}: {short}{instead}"
         fronts.append(front)
-        ends.append(replace(item, begin=max(split, item.begin)))
+        ends.append(end)
     try:
-        tried = [_try(fronts, ends, kind, how, bar) for kind in kinds]
+        tried = [_try(fronts, ends, kind, how, bar, True) for kind in kinds]
     except IdentificationError as failure:
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)
@@ -312,8 +319,29 @@ def _trial(
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
     # of an amplitude that fades the end alone is a smaller range, and no measure for the errors of both
-    whole = max(replace(item, last=len(item.v)).output_range for item in best.compared)
+    whole = max(item.output_range for item in courses)
     return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
+
+
+def _parted(item: Course) -> tuple[Course, Course]:
+    """The part of a record to fit and the share of it to hold out: its end, unless the drive goes there far beyond what
+    it does before, as where amplitudes grow. Then it is the last part of that length that stays within the rest."""
+    number = round(len(item.v) * HELD_OUT)
+    last = len(item.v)
+    beyond = {}
+    for stop in range(last, max(number, item.begin), -number) if number else ():
+        inside = item.v[stop - number : stop]
+        rest = np.concatenate([item.v[item.begin : stop - number], item.v[stop:]])
+        if len(rest) and np.ptp(rest) > 0.0:
+            over = max(float(np.max(inside) - np.max(rest)), float(np.min(rest) - np.min(inside)))
+            beyond[stop] = over / float(np.ptp(rest))
+    stop = next((k for k, over in beyond.items() if over <= BEYOND), last)
+    if stop == last:
+        split = round(len(item.v) * (1.0 - HELD_OUT))
+        return replace(item, last=split).resettled(math.inf), replace(item, begin=max(split, item.begin))
+    y = item.y.copy()
+    y[stop - number : stop] = np.nan
+    return replace(item, y=y), replace(item, begin=max(stop - number, item.begin), last=stop)
 
 
 def _parameters(

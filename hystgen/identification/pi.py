@@ -105,7 +105,7 @@ class Errors:
 
 def compare(item: Course, r: Array, p: Array) -> Errors:
     """Free run of the model along the drive, compared from `first` to `last`, with one free offset."""
-    error = (item.y - reduction.prediction(item.v, item.history, r, p))[item.first : item.last]
+    error = (item.y - reduction.prediction(item.v, item.visited, r, p))[item.first : item.last]
     offset = float(np.nanmean(error))
     return Errors(item, offset, error - offset)
 

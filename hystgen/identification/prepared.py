@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
-from hystgen.identification import faults, pi
+from hystgen.identification import faults, pi, start
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.records import LARGEST, SHORTEST, Record, no_value
@@ -175,7 +175,9 @@ def mask_outliers(
     Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the samples that it misses most,
     as many as may be left out, so that none of them draws it near.
     """
-    solution, _ = pi.solve([_without_pulses(_without_runs(item)[0]) for item in to_fit], wanted, floor)
+    first = start.estimated([_without_pulses(_without_runs(item)[0]) for item in to_fit])
+    solution, _ = pi.solve(first, wanted, floor)
+    to_fit[:] = [replace(item, start=each.start).resettled(math.inf) for item, each in zip(to_fit, first, strict=True)]
     places = tuple(float(r) for r in solution.thresholds)
     before: list[Array] = []
     for number in range(MOST_FITS):

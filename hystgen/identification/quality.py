@@ -13,6 +13,7 @@ from hystgen.identification import joint, pi, reduction
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import Errors, Solution, Weights
 from hystgen.identification.reduction import Course
+from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -278,9 +279,6 @@ AMPLIFIES = 100.0
 SMALL_REACH = 0.1
 """Largest threshold, as a share of the drive range, below which a warning says that a record shows little
 hysteresis."""
-
-STARTS, UNLIKE = 8, 3.0
-"""Fewest samples of a start, and times the rms error of the rest above which its error shows a wrong history."""
 
 
 def about_model(

@@ -29,8 +29,8 @@ from hystgen.effects.base import Run
 from hystgen.identification import faults, pi, prepared
 from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
-from hystgen.identification.quality import STARTS, UNLIKE
 from hystgen.identification.reduction import Course, settled
+from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]
