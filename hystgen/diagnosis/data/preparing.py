@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -26,7 +27,7 @@ from hystgen.diagnosis.findings.kinds import (
 )
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
-from hystgen.identification import faults, pi, prepared
+from hystgen.identification import faults, pi, prepared, start
 from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course, settled
@@ -293,6 +294,10 @@ def prepare(
         raise IdentificationError(too_little(fit_courses, f"fit and {JUDGE}", acceptance.SET_ASIDE))
     repaired: list[Finding] = [*fit_rails, *held_rails]
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
+    fit_courses, held_courses = _begun(fit_courses, held_courses)
+    for courses, what in ((fit_courses, "fit"), (held_courses, JUDGE)):
+        if courses and not any(course.used > acceptance.COMPARED_SAMPLES for course in courses):
+            raise IdentificationError(too_little(courses, what))
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
         for channel, wrong, what in (
             ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),
@@ -332,6 +337,27 @@ def _courses(
     return courses, saturated
 
 
+def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course]]:
+    """The courses with a start memory where without one most of their samples would not be compared.
+
+    Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
+    """
+
+    def needed(plain: Sequence[Course], begun: Sequence[Course]) -> list[Course]:
+        return [
+            other if item.used < acceptance.MOST_COMPARED * other.used else item
+            for item, other in zip(plain, begun, strict=True)
+        ]
+
+    plain, plain_held = ([replace(item, start=None).resettled(math.inf) for item in group] for group in (to_fit, held))
+    begun = start.estimated(to_fit)
+    if all(item.start is None for item in begun) and all(item.history is not None for item in held):
+        return plain, plain_held
+    solution, _ = pi.solve(begun, None, 0.0)
+    begun_held = start.of_model(held, (), solution.thresholds, solution.weights)
+    return needed(plain, begun), needed(plain_held, begun_held)
+
+
 def _without_faults(ready: Prepared) -> Prepared:
     """The records without samples that are plainly wrong, unless hardly any would be left."""
     repaired = not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
@@ -348,7 +374,8 @@ def _item(course: Course, record: Record, rest: float) -> Item:
     y = course.y.copy()
     y[: course.first] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
-    return Item(course.name, run, y, course.history, course.output_range)
+    turns = None if course.start is None else course.start.turns
+    return Item(course.name, run, y, course.history, course.output_range, turns=turns)
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
@@ -380,8 +407,9 @@ JUDGE = "judge by"
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether a share of any of them is enough to compare."""
-    return any(share * course.used > acceptance.COMPARED_SAMPLES for course in courses)
+    """Whether a share of any of them is enough to compare, if a start memory is found for it."""
+    samples = (np.count_nonzero(np.isfinite(course.y[course.begin : course.last])) for course in courses)
+    return any(share * number > acceptance.COMPARED_SAMPLES for number in samples)
 
 
 def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
