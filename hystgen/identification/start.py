@@ -31,6 +31,10 @@ STARTS, UNLIKE = 8, 3.0
 """Fewest samples of a start, and times the rms error of the rest above which its error shows that the memory it was
 given or found to begin with is not that of the actuator."""
 
+LEAST_KNOWN = 0.5
+"""Share of the samples of a record that judges a model, or in which effects are sought, from which on those before its
+memory is known are left out: a start memory fitted to them flatters the model, and may pass for what an effect does."""
+
 PLAYS = 12
 """Thresholds over which start memories are sought. Simulated starts cost no less in held-out error with 24."""
 
@@ -55,7 +59,7 @@ def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[C
     """
     if all(item.history is not None for item in courses):
         return list(courses)
-    plain = [replace(item, start=None).resettled(math.inf) for item in courses]
+    plain = [unknown(item) for item in courses]
     inner = [joint.through_front(item, stages) for item in plain]
     reach = pi.largest([_whole(item) for item in inner])
     if reach == 0.0:
@@ -67,11 +71,25 @@ def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[C
 def of_model(
     courses: Sequence[Course], stages: Sequence[Stage], thresholds: Array, weights: Array
 ) -> list[Course]:
-    """The same for courses of which the model is known: its weights stay as they are."""
-    if len(thresholds) < 2 or all(item.history is not None for item in courses):
-        return list(courses)
-    plain = [replace(item, start=None).resettled(math.inf) for item in courses]
-    return _started(plain, stages, [joint.through_front(item, stages) for item in plain], thresholds, weights)
+    """Courses by which a model is judged: its weights stay as they are, and starts that are not `wanted` ignored."""
+    begun = [unknown(item) for item in courses]
+    places = [k for k, item in enumerate(begun) if wanted(item)]
+    if len(thresholds) > 1 and places:
+        some = [begun[k] for k in places]
+        inner = [joint.through_front(item, stages) for item in some]
+        for k, item in zip(places, _started(some, stages, inner, thresholds, weights), strict=True):
+            begun[k] = item
+    return begun
+
+
+def unknown(item: Course) -> Course:
+    """The course without a start memory found for it, its start ignored where no history is known either."""
+    return replace(item, start=None).resettled(math.inf)
+
+
+def wanted(item: Course) -> bool:
+    """Whether too little of a course can be compared without a start memory found for it."""
+    return unknown(item).used < LEAST_KNOWN * _whole(item).used
 
 
 def _started(

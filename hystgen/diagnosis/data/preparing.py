@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -342,20 +341,12 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
 
     Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
     """
-
-    def needed(plain: Sequence[Course], begun: Sequence[Course]) -> list[Course]:
-        return [
-            other if item.used < acceptance.MOST_COMPARED * other.used else item
-            for item, other in zip(plain, begun, strict=True)
-        ]
-
-    plain, plain_held = ([replace(item, start=None).resettled(math.inf) for item in group] for group in (to_fit, held))
+    if not any(start.wanted(item) for item in (*to_fit, *held)):
+        return [start.unknown(item) for item in to_fit], [start.unknown(item) for item in held]
     begun = start.estimated(to_fit)
-    if all(item.start is None for item in begun) and all(item.history is not None for item in held):
-        return plain, plain_held
     solution, _ = pi.solve(begun, None, 0.0)
-    begun_held = start.of_model(held, (), solution.thresholds, solution.weights)
-    return needed(plain, begun), needed(plain_held, begun_held)
+    begun = [item if start.wanted(item) else start.unknown(item) for item in begun]
+    return begun, start.of_model(held, (), solution.thresholds, solution.weights)
 
 
 def _without_faults(ready: Prepared) -> Prepared:

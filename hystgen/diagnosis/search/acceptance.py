@@ -250,10 +250,6 @@ COMPARED_SAMPLES = 100
 """[samples] More than this are compared of a record that fits or judges: `BLOCKS` of five samples. Changed by:
 acceptance::TestHeldOut::test_enough_to_compare."""
 
-MOST_COMPARED = 0.5
-"""[share of the samples] Where fewer are left of a record once its start memory is known, that is estimated, and all of
-them are compared. Changed by: acceptance::TestHeldOut::test_an_unknown_start."""
-
 SET_ASIDE = 0.3
 """[share of a record] Its end, held out where no record can be: nearly the third that is taken of several records.
 Changed by: acceptance::TestHeldOut::test_the_end_of_a_record."""
