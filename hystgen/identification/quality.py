@@ -285,7 +285,8 @@ def about_model(
     solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
 ) -> list[str]:
     """Warnings about the model itself, one sentence each."""
-    reported = about_inverse(solution.weights, solution.fitted)
+    reported = solution.sense.sentences(int(np.count_nonzero(solution.weights[1:])))
+    reported += about_inverse(solution.weights, solution.fitted)
     low = min(item.drive_range[0] for item in compared)
     high = max(item.drive_range[1] for item in compared)
     if solution.reach < SMALL_REACH * (high - low):

@@ -293,7 +293,8 @@ def prepare(
         raise IdentificationError(too_little(fit_courses, f"fit and {JUDGE}", acceptance.SET_ASIDE))
     repaired: list[Finding] = [*fit_rails, *held_rails]
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
-    fit_courses, held_courses = _begun(fit_courses, held_courses)
+    fit_courses, held_courses, way = _begun(fit_courses, held_courses)
+    notes += way
     for courses, what in ((fit_courses, "fit"), (held_courses, JUDGE)):
         if courses and not any(course.used > acceptance.COMPARED_SAMPLES for course in courses):
             raise IdentificationError(too_little(courses, what))
@@ -336,17 +337,17 @@ def _courses(
     return courses, saturated
 
 
-def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course]]:
-    """The courses with a start memory where without one most of their samples would not be compared.
+def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
+    """The courses with a start memory where without one most of their samples would not be compared, and notes on the
+    way in which their loops run.
 
     Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
     """
-    if not any(start.wanted(item) for item in (*to_fit, *held)):
-        return [start.unknown(item) for item in to_fit], [start.unknown(item) for item in held]
     begun = start.estimated(to_fit)
     solution, _ = pi.solve(begun, None, 0.0)
     begun = [item if start.wanted(item) else start.unknown(item) for item in begun]
-    return begun, start.of_model(held, (), solution.thresholds, solution.weights)
+    begun_held = start.of_model(held, (), solution.thresholds, solution.weights)
+    return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
 
 
 def _without_faults(ready: Prepared) -> Prepared:
