@@ -138,7 +138,7 @@ def identify(
     errors = [_compare(item, fitted) for item in compared]
     own = Row.of("fit" if held or not rows else "all", "written", errors)
     rows.append(own)
-    drive = (min(item.drive_range[0] for item in compared), max(item.drive_range[1] for item in compared))
+    drive = _drive(compared)
     if held:
         rows.append(done.held_out)
         reported += [text for item in held if (text := quality.outside(item.name, item.v, drive))]
@@ -235,9 +235,31 @@ def _try(
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
-    """The first, that is the simplest, whose held-out error is about as small as any."""
-    enough = MODEL_PARSIMONY * min(each.held_out.rms for each in tried)
-    return next(k for k, each in enumerate(tried) if each.held_out.rms <= enough)
+    """The first, that is the simplest, whose held-out error is about as small as any.
+
+    Samples whose drive lies outside the fitted range do not choose, if there are others: there every model is a guess.
+    """
+    found = [_rms_inside(each) for each in tried]
+    enough = MODEL_PARSIMONY * min(found)
+    return next(k for k, rms in enumerate(found) if rms <= enough)
+
+
+def _rms_inside(tried: _Tried) -> float:
+    """Held-out rms error over the samples whose drive lies in the fitted range; of too few over all."""
+    low, high = _drive(tried.compared)
+    squares = []
+    for each in tried.errors:
+        drive = each.course.v[each.course.first : each.course.last]
+        inside = each.error[np.isfinite(each.error) & (drive >= low) & (drive <= high)]
+        if len(inside) >= SHORTEST:
+            squares.append((inside - np.mean(inside)) ** 2)
+    return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else tried.held_out.rms
+
+
+def _drive(courses: Sequence[Course]) -> tuple[float, float]:
+    """Least and largest drive of all courses."""
+    ranges = [item.drive_range for item in courses]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
 def _compare(item: Course, fitted: Fitted) -> pi.Errors:
