@@ -51,8 +51,8 @@ MOST_PLAYS = 1000
 MOST_BREAKS = 64
 
 BEYOND = 0.1
-"""Share of the range of the fitted drive by which a held-out part of a record may leave it; further out a model that was
-fitted to less is not what is compared."""
+"""Share of the range of the fitted drive by which a held-out part of a record may leave it; further out every model is
+a guess."""
 
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
@@ -70,7 +70,7 @@ def identify(
     rest: float = 0.0,
     name: str = "stage",
     units: Mapping[str, str] | None = None,
-    skip: int = 0,
+    skip: float = 0.0,
     loading_curve: bool = False,
     p0_floor: float = P0_FLOOR,
     columns: Mapping[str, str] | None = None,
@@ -88,10 +88,10 @@ def identify(
     which, a dead-zone sum may bend at, chosen in the same way by default. `holdout`: records that take no part in any
     choice but that of `auto`; without them the last quarter of each record gives the held-out figures, from a trial
     model that has not seen it, and the model written is then fitted to everything. `history`: drive values visited
-    before every record from a virgin state; without it the start of each record is ignored until the drive has wiped
-    the memory that matters. `rest`: seconds of pause after the history; a PI model does not depend on time, so it
-    changes nothing here. `name`: C identifier of the model. `units`: `input` and `output`, by default those of the
-    records. `skip`: samples at the start of every record that are not compared, though their drive counts.
+    before every record from a virgin state; without it the start memory of each record is estimated with the weights,
+    and its start ignored only where none explains it, or where the rest of a held-out record is enough to judge by.
+    `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here. `name`:
+    C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: seconds at the start of every record that are not compared, though their drive counts.
     `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and nothing
     is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as it
     comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
@@ -165,7 +165,7 @@ def check_options(
     breaks: int | Sequence[float] | None = None,
     history: Sequence[float] | None = None,
     rest: float = 0.0,
-    skip: int = 0,
+    skip: float = 0.0,
     p0_floor: float = P0_FLOOR,
     loading_curve: bool = False,
     units: Mapping[str, str] | None = None,
@@ -181,7 +181,7 @@ def check_options(
             raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
         before = ()
     arguments.number("rest", rest, "seconds", 0.0)
-    arguments.whole("skip", skip, "samples", 0)
+    arguments.number("skip", skip, "seconds", 0.0)
     if units is not None:
         arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:

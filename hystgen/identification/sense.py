@@ -32,9 +32,9 @@ FALLING = (
 )
 
 CLOCKWISE = (
-    "the loops run clockwise: y is ahead of v, where every play is behind its drive, so that no weights follow them. If "
-    "y is a force and v the displacement that goes with it, exchange the columns (--columns v=.., y=..): the model then "
-    "gives the displacement"
+    "the loops run clockwise: y is ahead of v, where every play is behind its drive, so that no weights follow them. "
+    "If y is a force and v the displacement that goes with it, exchange the columns (--columns v=..,y=..): the model "
+    "then gives the displacement"
 )
 
 NO_PLAYS = "no hysteresis was found: the model has no play beside r_0, and its output follows its input without a loop"
@@ -59,7 +59,7 @@ class Sense:
 
 def of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sense:
     """The sense of reduced records; `squares`: the sum of squared errors that positive weights leave."""
-    together = sum(float(np.cov(item.v[item.compared], item.y[item.compared])[0, 1]) * item.used for item in courses if item.used > 1)
+    together = sum(_covaried(item) for item in courses if item.used)
     some = np.unique(np.linspace(0, len(reduced.thresholds) - 1, PLAYS + 1).astype(int))
     matrix, target = reduced.whole[:, some], reduced.whole[:, -1]
     weights, *_ = np.linalg.lstsq(matrix, target, rcond=RANK)
@@ -67,6 +67,12 @@ def of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sense:
     r = reduced.thresholds[some]
     enclosed = sum(float(weights @ (r * _travelled(item, r))) for item in courses)
     return Sense(together < 0.0, enclosed < 0.0 and left < CLEARLY**2 * squares)
+
+
+def _covaried(item: Course) -> float:
+    """Sum of products of drive and output, each from its mean: negative where one falls while the other rises."""
+    v, y = item.v[item.compared], item.y[item.compared]
+    return float((v - np.mean(v)) @ (y - np.mean(y)))
 
 
 def _travelled(item: Course, r: Array) -> Array:

@@ -12,6 +12,7 @@ with any thresholds, as a known history does.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -265,8 +266,9 @@ class _Search:
         """The best slopes, and their weights as `best`."""
         shape, rms = self._first_slopes(), 0.0
         for _ in range(ROUNDS):
-            now = self._linear(shape, self._first_weights(shape), rms)
-            found, _ = joint.search(lambda s, p, rms=rms: self._linear(s, p, rms), _Bounds(self._slopes), now)
+            linear = functools.partial(self._linear, rms)
+            now = linear(shape, self._first_weights(shape))
+            found, _ = joint.search(linear, _Bounds(self._slopes), now)
             shape, rms = found.shape, found.rms
         return found
 
@@ -292,11 +294,11 @@ class _Search:
         shape, at = np.zeros(self._slopes), 0
         for each in self.systems:
             here = slice(at, at + each.slopes)
-            found = []
+            found: list[tuple[float, int, Array]] = []
             for slopes in each.simple():
                 one = shape.copy()
                 one[here] = slopes
-                found.append((self._linear(one, self._first_weights(one), 0.0).rms, len(found), slopes))
+                found.append((self._linear(0.0, one, self._first_weights(one)).rms, len(found), slopes))
             shape[here] = min(found)[2] if found else shape[here]
             at += each.slopes
         return shape
@@ -308,7 +310,7 @@ class _Search:
         system = self._whole(shape, np.zeros(len(self.r)), 0.0)
         return pi.non_negative(system, np.arange(len(self.r)))
 
-    def _linear(self, shape: Array, p: Array, rms: float) -> Shaped:
+    def _linear(self, rms: float, shape: Array, p: Array) -> Shaped:
         """The system that is linear about slopes and weights; `rms`: of the errors by which the prior is weighed."""
         samples = sum(each.item.used for each in self.systems)
         if self.known is None:

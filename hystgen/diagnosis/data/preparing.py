@@ -266,14 +266,19 @@ class Prepared:
 
 
 def prepare(
-    records: Sequence[Record], holdout: Sequence[Record], history: tuple[float, ...] | None, rest: float
+    records: Sequence[Record],
+    holdout: Sequence[Record],
+    history: tuple[float, ...] | None,
+    rest: float,
+    skip: float = 0.0,
 ) -> Prepared:
     """Items for the fits; without held-out records that can judge one in three is held out, or the end of each.
 
-    Raises IdentificationError, also where there is too little to compare.
+    `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, also where there is
+    too little to compare.
     """
     notes: list[str] = []
-    held_courses, held_rails = _courses(holdout, history)
+    held_courses, held_rails = _courses(holdout, history, skip)
     if holdout and len(records) > 2 and not enough(held_courses):
         notes.append(too_little(held_courses, JUDGE))
         holdout = []
@@ -283,8 +288,8 @@ def prepare(
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
-        held_courses, held_rails = _courses(holdout, history)
-    fit_courses, fit_rails = _courses(records, history)
+        held_courses, held_rails = _courses(holdout, history, skip)
+    fit_courses, fit_rails = _courses(records, history, skip)
     if not enough(fit_courses):
         raise IdentificationError(too_little(fit_courses, "fit"))
     if holdout and not enough(held_courses):
@@ -325,12 +330,12 @@ def prepare(
 
 
 def _courses(
-    records: Sequence[Record], history: tuple[float, ...] | None
+    records: Sequence[Record], history: tuple[float, ...] | None, skip: float
 ) -> tuple[list[Course], list[Saturated]]:
     """The records as they take part, and the samples left out at a converter's end."""
     courses, saturated = [], []
     for record in records:
-        course, ends = prepared.without_rails(prepared.course_of(record, history, 0))
+        course, ends = prepared.without_rails(prepared.course_of(record, history, prepared.samples_in(record, skip)))
         courses.append(course)
         for name, level, number in ends:
             saturated.append(Saturated(course.name, None, name, level, number))
