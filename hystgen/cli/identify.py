@@ -106,7 +106,7 @@ def identify(
             pages.check_folder(report)
             files.check(Path(report), pages.names())
         older = settings.of(output)
-        read = records.read_records([*data, *holdout], **how)
+        read = records.read_records([*data, *holdout], points=True, **how)
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],

@@ -81,7 +81,7 @@ def diagnose(
     arguments.number("skip", skip, "seconds", 0.0)
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
-    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
+    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     before = None if history is None else visited(history)
     with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
         first = hypothesis.as_given(model.cascade, given)

@@ -91,7 +91,8 @@ def identify(
     before every record from a virgin state; without it the start memory of each record is estimated with the weights,
     and its start ignored only where none explains it, or where the rest of a held-out record is enough to judge by.
     `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here. `name`:
-    C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: seconds at the start of every record that are not compared, though their drive counts.
+    C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: seconds at the
+    start of every record that are not compared, though their drive counts.
     `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and nothing
     is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as it
     comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
@@ -102,7 +103,7 @@ def identify(
     """
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
-    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
+    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")

@@ -67,10 +67,12 @@ def read_records(
     delimiter: str | None = None,
     need: Sequence[str] = ("v", "y"),
     progress: bool = False,
+    points: bool = False,
 ) -> list[Record]:
     """Read several data files as `read_record` does; records that are in memory already are kept.
 
-    `progress`: says on stderr once how files were understood ("read as: .."), with a bar on a terminal when it takes
+    `points`: a file without a time is one of points taken one by one, and not refused. `progress`: says on stderr once
+    how files were understood ("read as: .."), with a bar on a terminal when it takes
     more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
     arguments.
     """
@@ -85,7 +87,8 @@ def read_records(
                 if isinstance(source, Record):
                     _check_arrays(source)
                 else:
-                    source = _read(arguments.path("a record", source), columns, sample_time, delimiter, need, bar.tick)
+                    path = arguments.path("a record", source)
+                    source = _read(path, columns, sample_time, delimiter, need, bar.tick, points)
                     if source.read_as:
                         ways.setdefault(source.read_as, []).append(source.name)
                 found.append(source)
@@ -168,8 +171,9 @@ def _read(
     delimiter: str | None,
     need: Sequence[str],
     tick: Callable[[float], None],
+    points: bool,
 ) -> Record:
-    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick)
+    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick, points)
     mark = reading.delimiter
     if mark is not None and (len(mark) != 1 or mark in "\"'.\r\n" or mark.isalnum()):
         reading.problem(f'the delimiter "{printable(mark)}" is not usable; give one character such as ;')

@@ -318,6 +318,8 @@ def prepare(
         to_fit, held = parted(to_fit)
         share = f"{100 * acceptance.SET_ASIDE:g} %"
         notes.append(f"no record was given that can judge: the last {share} of each is set aside")
+    if not all(item.timed for item in (*to_fit, *held)):
+        notes.append("not every record has a time: effects that depend on it are not sought; give --sample-time")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
@@ -372,7 +374,7 @@ def _item(course: Course, record: Record, rest: float) -> Item:
     y[: course.first] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
     turns = None if course.start is None else course.start.turns
-    return Item(course.name, run, y, course.history, course.output_range, turns=turns)
+    return Item(course.name, run, y, course.history, course.output_range, turns=turns, timed=record.timed)
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
@@ -413,10 +415,16 @@ def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
     """The message where there is not; `what`: the purpose they are too short for."""
     names = ", ".join(course.name for course in courses)
     most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
+    if enough(courses, share):
+        return (
+            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
+            f"which no start memory explains, and more than {least:.0f} are needed; give --history, "
+            "or records that sweep their range again"
+        )
+    most = max(int(np.count_nonzero(np.isfinite(course.y[course.begin :]))) for course in courses)
     return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
-        f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
-        "or records that sweep their range again"
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, and more than "
+        f"{least:.0f} are needed; record more"
     )
 
 
