@@ -31,7 +31,7 @@ from scipy.optimize import lsq_linear, minimize
 
 import hystgen
 from hystgen.basics.problems import NotInvertibleError
-from hystgen.identification import Fit, IdentificationError, identifier_from
+from hystgen.identification import Fit, IdentificationError, identifier_from, reduction
 from hystgen.records import Record, RecordError
 from hystgen.verification import compilers
 
