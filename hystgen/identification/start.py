@@ -88,6 +88,11 @@ def unknown(item: Course) -> Course:
     return replace(item, start=None).resettled(math.inf)
 
 
+def findable(item: Course) -> bool:
+    """Whether a record moves its plays up and down again, which shows a start memory."""
+    return item.history is not None or pi.largest([_whole(item)]) > 0.0
+
+
 def wanted(item: Course) -> bool:
     """Whether too little of a course can be compared without a start memory found for it."""
     return unknown(item).used < LEAST_KNOWN * _whole(item).used

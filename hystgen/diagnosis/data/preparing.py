@@ -407,24 +407,29 @@ JUDGE = "judge by"
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
     """Whether a share of any of them is enough to compare, if a start memory is found for it."""
-    samples = (np.count_nonzero(np.isfinite(course.y[course.begin : course.last])) for course in courses)
-    return any(share * number > acceptance.COMPARED_SAMPLES for number in samples)
+    return any(share * _comparable(course) > acceptance.COMPARED_SAMPLES for course in courses)
+
+
+def _comparable(course: Course) -> int:
+    """Number of samples that can be compared once a start memory is found, if it can be."""
+    known = np.isfinite(course.y[course.begin : course.last])
+    return int(np.count_nonzero(known)) if start.findable(course) else course.used
 
 
 def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
     """The message where there is not; `what`: the purpose they are too short for."""
     names = ", ".join(course.name for course in courses)
     most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
-    if enough(courses, share):
+    if all(start.findable(course) for course in courses) and not enough(courses, share):
+        most = max(_comparable(course) for course in courses)
         return (
-            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
-            f"which no start memory explains, and more than {least:.0f} are needed; give --history, "
-            "or records that sweep their range again"
+            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, and more than "
+            f"{least:.0f} are needed; record more"
         )
-    most = max(int(np.count_nonzero(np.isfinite(course.y[course.begin :]))) for course in courses)
     return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, and more than "
-        f"{least:.0f} are needed; record more"
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
+        f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
+        "or records that sweep their range again"
     )
 
 
