@@ -162,7 +162,7 @@ class TestMeasured:
         data = part_of_file(source, tmp_path / "first.csv", 0, 27500)
         held = part_of_file(source, tmp_path / "later.csv", 27500)
         target = tmp_path / "piezo.yaml"
-        code, _, err = run("identify", data, "--skip", 17500, "-o", target)
+        code, _, err = run("identify", data, "--skip", 3.5, "-o", target)
         assert code == 0, err
         assert check_predicts(target, held)[2] <= 0.25
 
@@ -427,7 +427,7 @@ class TestStartMemory:
         assert fit.parameters.model.pi.initial_state == 0.0
         assert fit.along(record(v, y), fit.used[0]) == pytest.approx(y, abs=0.01 * np.ptp(y))
         garbage = y.copy()
-        garbage[:settled] = 1e3
+        garbage[:settled] -= 20.0 * v[:settled]
         again = hystgen.identify(record(v, garbage), thresholds=THRESHOLDS, holdout=record(v, y))
         assert row(again, "fit").ignored == settled
         assert fitted(again)[1] == pytest.approx(WEIGHTS, rel=1e-8)
@@ -464,7 +464,7 @@ class TestStartMemory:
         y = brute_output(v, THRESHOLDS, WEIGHTS, 0.0)
         garbage = y.copy()
         garbage[:700] = -5.0
-        fit = hystgen.identify(record(v, garbage), thresholds=THRESHOLDS, history=(), skip=700)
+        fit = hystgen.identify(record(v, garbage), thresholds=THRESHOLDS, history=(), skip=0.7)
         assert fitted(fit)[1] == pytest.approx(WEIGHTS, rel=1e-8)
         assert (row(fit, "all").samples, row(fit, "all").ignored) == (len(v) - 700, 0)
 
@@ -512,19 +512,19 @@ class TestFigures:
         code, out, err = run("identify", data, "--holdout", held, "-o", target)
         assert code == 0, err
         assert err == ""
-        # While fitting, plays up to 85 % of half the drive's range are tried; the largest need not be written
-        ends = {"fit": 0.85 * 50.0, "held out": written(target)["model"]["pi"]["thresholds"][-1]}
+        largest = written(target)["model"]["pi"]["thresholds"][-1]
         for name, part in ((data, "fit"), (held, "held out")):
             printed = table_of(out)[part]
             assert printed["records"] == name.name
             _, v, _ = columns(name)
-            first = first_exact(v, ends[part])
-            figures = check_predicts(target, name, skip=first)
+            first = first_exact(v, largest) if part == "held out" else 0
+            figures = check_predicts(target, name)
             assert figures[2] < 1.0
             assert (int(printed["ignored"]), int(printed["samples"])) == (first, len(v) - first)
-            assert float(printed["rms"]) == pytest.approx(figures[0], rel=1e-3)
-            assert float(printed["max"]) == pytest.approx(figures[1], rel=1e-3)
-            assert float(printed["rms %"]) == pytest.approx(figures[2], abs=6e-4)
+            exact = part == "held out"  # the start memory that was found is not in the file
+            assert float(printed["rms"]) == pytest.approx(figures[0], rel=1e-3 if exact else 0.05)
+            assert float(printed["rms %"]) == pytest.approx(figures[2], abs=6e-4 if exact else 0.02)
+            assert not exact or float(printed["max"]) == pytest.approx(figures[1], rel=1e-3)
         check_verifies(target)
 
     def test_several_records_in_a_row(self) -> None:
@@ -561,8 +561,7 @@ class TestFigures:
         found = row(fit, "held out", "trial")
         assert (found.samples, found.ignored) == (len(v) - split, 0)
         assert (found.rms, found.max) == pytest.approx(figures[:2], rel=1e-6)
-        whole = np.ptp(y[first_exact(v, float(r[-1])) :])
-        assert [row(fit, part, "trial").output_range for part in ("fit", "held out")] == [whole] * 2
+        assert [row(fit, part, "trial").output_range for part in ("fit", "held out")] == [np.ptp(y)] * 2
 
     def test_held_out_records_take_no_part(self) -> None:
         v, w = wander(26), wander(27)
@@ -699,7 +698,7 @@ class TestRefused:
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
                 "the sign of y, else check which column is which",
             ),
-            (SINE, SINE, ("--skip", "390"), "data.csv has 400 samples, at least 406 are needed"),
+            (SINE, SINE, ("--skip", "0.39"), "data.csv has 400 samples, at least 406 are needed"),
             (
                 SINE[:60],
                 SINE[:60],

@@ -37,7 +37,7 @@ LEAST_KNOWN = 0.5
 memory is known are left out: a start memory fitted to them flatters the model, and may pass for what an effect does."""
 
 PLAYS = 12
-"""Thresholds over which start memories are sought. Simulated starts cost no less in held-out error with 24."""
+"""Thresholds over which start memories are sought: as many as default fits have in the middle of their range."""
 
 SPREAD = math.sqrt(3.0)
 """One over the standard deviation of a slope that may be anywhere from -1 to 1."""
@@ -48,6 +48,9 @@ NORMAL = 1.96
 ZIGZAGS = 4
 """Pairs of turns that stand for a slope between two thresholds: off it by at most 1/16 of their distance."""
 
+TOGETHER = 6
+"""Most courses that share weights in a search: its cost grows with the cube of their number."""
+
 ROUNDS = 2
 """Searches; the first one gives the errors by which the prior is weighed in the next."""
 
@@ -56,17 +59,22 @@ def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[C
     """The courses compared from their beginning, with a start memory for those whose history is not known.
 
     `stages`: the front of the plays. Where no admissible memory explains the start nearly as well as the rest it stays
-    ignored: a transient. Courses in which no play moves once its memory is known are returned as they are.
+    ignored: a transient. So it does where the plays do not move up and down again.
     """
     if all(item.history is not None for item in courses):
         return list(courses)
-    plain = [unknown(item) for item in courses]
-    inner = [joint.through_front(item, stages) for item in plain]
-    reach = pi.largest([_whole(item) for item in inner])
+    begun = [unknown(item) for item in courses]
+    places = [k for k, item in enumerate(begun) if findable(item)]
+    some = [begun[k] for k in places]
+    reach = pi.largest([_whole(joint.through_front(item, stages)) for item in some])
     if reach == 0.0:
-        return plain
-    r = np.array(pi.dense(reach, sum(item.last - item.begin for item in plain), PLAYS).thresholds)
-    return _started(plain, stages, inner, r, None)
+        return begun
+    r = np.array(pi.dense(reach, sum(item.last - item.begin for item in some), PLAYS).thresholds)
+    for first in range(0, len(places), TOGETHER):
+        here = places[first : first + TOGETHER]
+        for k, item in zip(here, _started([begun[k] for k in here], stages, r, None), strict=True):
+            begun[k] = item
+    return begun
 
 
 def of_model(
@@ -76,9 +84,7 @@ def of_model(
     begun = [unknown(item) for item in courses]
     places = [k for k, item in enumerate(begun) if wanted(item)]
     if len(thresholds) > 1 and places:
-        some = [begun[k] for k in places]
-        inner = [joint.through_front(item, stages) for item in some]
-        for k, item in zip(places, _started(some, stages, inner, thresholds, weights), strict=True):
+        for k, item in zip(places, _started([begun[k] for k in places], stages, thresholds, weights), strict=True):
             begun[k] = item
     return begun
 
@@ -94,14 +100,15 @@ def findable(item: Course) -> bool:
 
 
 def wanted(item: Course) -> bool:
-    """Whether too little of a course can be compared without a start memory found for it."""
-    return unknown(item).used < LEAST_KNOWN * _whole(item).used
+    """Whether too little of a course can be compared without a start memory, and one can be found for it."""
+    return findable(item) and unknown(item).used < LEAST_KNOWN * _whole(item).used
 
 
 def _started(
-    courses: Sequence[Course], stages: Sequence[Stage], inner: Sequence[Course], r: Array, weights: Array | None
+    courses: Sequence[Course], stages: Sequence[Stage], r: Array, weights: Array | None
 ) -> list[Course]:
-    """The courses with the start memories found, but for transients; `inner`: as the plays see them."""
+    """The courses with the start memories found, but for transients."""
+    inner = [joint.through_front(item, stages) for item in courses]
     search = _Search(tuple(_System.of(_whole(item), r) for item in inner), r, weights)
     found = search.result()
     begun = []
@@ -295,18 +302,14 @@ class _Search:
         return parts
 
     def _first_slopes(self) -> Array:
-        """Of every course in turn the best of the memories with at most one turn, the others being as they are."""
-        shape, at = np.zeros(self._slopes), 0
+        """Of every course the best of the memories with at most one turn, each with weights of its own."""
+        shape = [np.empty(0)]
         for each in self.systems:
-            here = slice(at, at + each.slopes)
-            found: list[tuple[float, int, Array]] = []
-            for slopes in each.simple():
-                one = shape.copy()
-                one[here] = slopes
-                found.append((self._linear(0.0, one, self._first_weights(one)).rms, len(found), slopes))
-            shape[here] = min(found)[2] if found else shape[here]
-            at += each.slopes
-        return shape
+            alone = replace(self, systems=(each,))
+            found = each.simple()
+            left = [alone._linear(0.0, slopes, alone._first_weights(slopes)).rms for slopes in found]
+            shape += [found[int(np.argmin(left))]] if found else []
+        return np.concatenate(shape)
 
     def _first_weights(self, shape: Array) -> Array:
         """Weights that fit best about some slopes."""
