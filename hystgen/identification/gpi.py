@@ -78,7 +78,8 @@ def solve(
     Of several fronts of a kind the one with the fewest shape numbers is taken that predicts blocks of the records left
     out of the fit about as well as any. Raises IdentificationError.
     """
-    courses = start.estimated(courses)
+    # A start memory found without the front is not the one behind it: it counts where there is not enough else
+    courses = start.estimated(courses) if kind == "pi" else start.needed(courses)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
         return Fitted(Kept(), np.empty(0), plain), compared
@@ -96,7 +97,7 @@ def solve(
         if all(error > best for error, _, _ in tried[-FRUITLESS:]):
             break
     _, front, shape = next(each for each in tried if each[0] <= FRONT_PARSIMONY * best)
-    courses = start.estimated(courses, front.stages(shape))
+    courses = start.needed(courses, front.stages(shape))
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved, and the shape is to be the best one for them
     r = fitted.solution.thresholds

@@ -77,6 +77,13 @@ def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[C
     return begun
 
 
+def needed(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[Course]:
+    """The courses with a start memory where too little of them could be compared without one (`wanted`)."""
+    if not any(wanted(item) for item in courses):
+        return [unknown(item) for item in courses]
+    return [item if wanted(item) else unknown(item) for item in estimated(courses, stages)]
+
+
 def of_model(
     courses: Sequence[Course], stages: Sequence[Stage], thresholds: Array, weights: Array
 ) -> list[Course]:

@@ -350,9 +350,8 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
 
     Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
     """
-    begun = start.estimated(to_fit)
+    begun = start.needed(to_fit)
     solution, _ = pi.solve(begun, None, 0.0)
-    begun = [item if start.wanted(item) else start.unknown(item) for item in begun]
     begun_held = start.of_model(held, (), solution.thresholds, solution.weights)
     return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
 
