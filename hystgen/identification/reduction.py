@@ -148,14 +148,15 @@ def _reached(v: Array) -> int:
 def travel(course: Course, threshold: float) -> float:
     """Peak-to-peak movement of one play over the samples compared.
 
-    Where no history is known it counts from where the memory of that play is, and the lesser of the way up and the way
-    down: while a drive goes one way, a play behind an unknown start shows no more than a straight line.
+    Where these begin before the memory of that play is known it counts from there, and the lesser of the way up and the
+    way down: while a drive goes one way, a play behind an unknown start shows no more than a straight line.
     """
     start = start_states(course.v, course.history, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))
-    if course.history is not None:
+    known = replace(course, start=None).resettled(threshold).first
+    if course.first >= known:
         return float(np.ptp(moved[course.first :]))
-    moved = moved[replace(course, start=None).resettled(threshold).first :]
+    moved = moved[known:]
     up = np.max(moved - np.minimum.accumulate(moved))
     return float(min(up, np.max(np.maximum.accumulate(moved) - moved)))
 
