@@ -238,7 +238,8 @@ def _try(
 def _choose(tried: Sequence[_Tried]) -> int:
     """The first, that is the simplest, whose held-out error is about as small as any.
 
-    Samples whose drive lies outside the fitted range do not choose, if there are others: there every model is a guess.
+    Samples whose drive lies far outside the fitted range do not choose, if there are others: there every model is a
+    guess.
     """
     found = [_rms_inside(each) for each in tried]
     enough = MODEL_PARSIMONY * min(found)
@@ -246,8 +247,11 @@ def _choose(tried: Sequence[_Tried]) -> int:
 
 
 def _rms_inside(tried: _Tried) -> float:
-    """Held-out rms error over the samples whose drive lies in the fitted range; of too few over all."""
+    """Held-out rms error over the samples whose drive lies within `BEYOND` of the fitted range; of too few over all."""
     low, high = _drive(tried.compared)
+    low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
+    if all(low <= np.min(each.course.v) and np.max(each.course.v) <= high for each in tried.errors):
+        return tried.held_out.rms
     squares = []
     for each in tried.errors:
         drive = each.course.v[each.course.first : each.course.last]
