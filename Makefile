@@ -9,7 +9,7 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
-.PHONY: demo test check prove lint fuzz check-bounds blind track clean
+.PHONY: demo test check prove lint fuzz check-bounds blind track docs clean
 
 # What the demo needs of the package, and a compiler in case there is none
 $(VENV)/demo: pyproject.toml
@@ -70,6 +70,10 @@ blind: $(VENV)/ready
 # Blind plants behind compensators made from their records, four an effect
 track: $(VENV)/ready
 	$(BIN)/python -m tests.plants track --seeds 0:5 --jobs $(JOBS)
+
+# The documentation as a site, build/docs/index.html; needs Debian's doxygen
+docs: $(VENV)/ready
+	$(BIN)/python -m sphinx -W --keep-going -b html docs build/docs
 
 clean:
 	rm -rf $(VENV) build dist

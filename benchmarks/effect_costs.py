@@ -3,10 +3,10 @@
     python benchmarks/effect_costs.py [-o FOLDER] [--cores cortex-m0plus,cortex-m4f]
 
 Code is that of a module at -O2, of zig and gcc the larger one (RISC-V: zig); instructions are the mean of the inverse,
-strict -O2 build of zig, over a slow sine. `any` is what any effect at all adds, a gain among it, which is the least of
-them; the others are more than that, or less. Plays that a search finds have that in common, `dilated`, and more than
-that. `effect_sizes.csv`, which the banner of emitted files is made from, has the code on both cores that
-`hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
+or of the forward operator for what that alone has, strict -O2 build of zig, over a slow sine. `any` is what any effect
+at all adds, a gain among it, which is the least of them; the others are more than that, or less. Plays that a search
+finds have that in common, `dilated`, and more than that. `effect_sizes.csv`, which the banner of emitted files is made
+from, has the code on both cores that `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from engine_costs import CODE_PLAYS, SHIPPED, _program
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import engines
-from hystgen.compensator.chain.costs import PARTS
+from hystgen.compensator.chain.costs import OPERATORS, PARTS
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options
 from hystgen.model import Model
@@ -53,6 +53,8 @@ EFFECTS = {
     "polynomial": "name: noncongruent, coefficients: [[0.02, 0.01], [0.02], [0.02], [0.02], [0.02], [0.02], [0.02], "
     "[0.02], [0.02], [0.02]]",
     "centre": "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
+    "mode": "name: resonance, frequency: 30, damping: 0.05",
+    "delay": "name: delay, time: 2.6e-3",
 }
 """A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
 assert {"any", *EFFECTS} == set(PARTS)
@@ -68,16 +70,19 @@ def model(effect: str) -> Model:
     return Model(parse_parameters(text, "bench.yaml"))
 
 
-def measured(folder: Path, effect: str, arithmetic: str, cores: list[str]) -> tuple[dict[str, int], dict[str, float]]:
-    """Bytes of code and mean instructions of a sample of the inverse on each core."""
+def measured(
+    folder: Path, effect: str, arithmetic: str, cores: list[str], operator: str = "inverse"
+) -> tuple[dict[str, int], dict[str, float]]:
+    """Bytes of code and mean instructions of a sample of an operator on each core."""
     one = model(effect)
-    options = emit_options(one, "inverse", arithmetic, "loop")
+    options = emit_options(one, operator, arithmetic, "loop")
     files = sources.write(folder, one, options)
     constants = module.cost_of(one.parameters, one.cascade, options).memory.tables
     numbers, real = one.tables(arithmetic, "loop"), ARITHMETICS[arithmetic].number
-    low, high = (float(end) for end in numbers.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    first = slots.OUTPUT_MIN if operator == "inverse" else slots.DRIVE_MIN
+    low, high = (float(end) for end in numbers.limits[first : first + 2])
     u = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(0.01 * np.arange(600))
-    record = comparison.expected_record(numbers, real, True, ("sine", np.zeros(len(u), np.uint8), u))
+    record = comparison.expected_record(numbers, real, operator == "inverse", ("sine", np.zeros(len(u), np.uint8), u))
     code, counts = {}, {}
     for core in cores:
         names = ("zig",) if core.startswith("rv32") else ("zig", "gcc")
@@ -85,7 +90,7 @@ def measured(folder: Path, effect: str, arithmetic: str, cores: list[str]) -> tu
         images = {name: emulator.Image.load(path) for name, path in built.items()}
         code[core] = max(image.sections[".module"] for image in images.values()) - constants
         machine = emulator.Core(targets.find(core), images["zig"])
-        outcome = comparison.compare(functools.partial(machine.run, "bench", "inverse"), [record])
+        outcome = comparison.compare(functools.partial(machine.run, "bench", operator), [record])
         assert not outcome.different, (effect, arithmetic, core, outcome)
         counts[core] = float(np.mean(machine.counts))
     return code, counts
@@ -103,12 +108,16 @@ def main() -> None:
         for arithmetic, about in ARITHMETICS.items():
             base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
             least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
+            ahead = measured(Path(place) / f"forward-{arithmetic}", "gain", arithmetic, cores, "forward")
             if not about.fixed:
                 moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
             for effect in ("any", *(each for each in EFFECTS if not (about.fixed and each in FLOAT_ALONE))):
                 folder = Path(place) / f"{effect}-{arithmetic}"
-                code, counts = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores)
+                operator = OPERATORS.get(effect, "inverse")
+                measures = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores, operator)
+                code, counts = measures
                 before = base if effect == "any" else moved if effect in MOVED else least
+                before = ahead if operator == "forward" else before
                 more = [(core, code[core] - before[0][core], counts[core] - before[1][core]) for core in cores]
                 sizes.append((effect, arithmetic, *(size for _, size, _ in more)))
                 costs += [(effect, arithmetic, core, size, round(count)) for core, size, count in more]

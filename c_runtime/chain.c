@@ -4,9 +4,11 @@
    applied goes through all of them forwards, a reference backwards, so that the memory is the
    actuator's and nothing else. Which blocks there are, the model's own functions say:
 
-   drive_side    lag: in front of the memoryless part and the plays
-   output_side   creep, ageing, heat, gain: behind the plays
-   displaced     saturation, offsets and drift, behind everything
+   waited, slewed   delay and slew limit: of the forward operator, and the inverse has none of a
+                    delay, whose reference comes ahead of its time
+   drive_side       lag: in front of the memoryless part and the plays
+   output_side      creep, ageing, heat, gain: behind the plays; forwards the modes of the stage too
+   displaced        saturation, offsets and drift, behind everything
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
@@ -25,35 +27,52 @@ static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d) {
                                           : d;
 }
 
-/* The actuator has seen drive v. */
-static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
-    const bool moving = self->moving;
-    if (moving) {
-        hystgen_forward_travelled(self, v);
+/* The plays have seen what arrives of drive v. Returns their sum. */
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self,
+                                                               hystgen_real_t v) {
+    const hystgen_reach_t late = hystgen_forward_waited(self, v);
+    const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
+    if (reached < late || reached > late) {
+        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
     }
-    const hystgen_signal_t x = hystgen_entered_drive(v);
-    const hystgen_signal_t a = moving ? hystgen_forward_drive_side_absorb(self, x)
-                                      : hystgen_forward_drive_side_rest(self, x);
+    const hystgen_signal_t x = hystgen_entered_drive((hystgen_real_t)reached);
+    const hystgen_signal_t a = self->moving ? hystgen_forward_drive_side_absorb(self, x)
+                                            : hystgen_forward_drive_side_rest(self, x);
     self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
-    self->output = moving ? hystgen_forward_output_side_absorb(self, self->level)
-                          : hystgen_forward_output_side_rest(self, self->level);
-    self->applied = v;
-    self->moving = true;
+    return self->level;
 }
 
 /* The actuator has seen drive v. */
-static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
-    const bool moving = self->moving;
-    if (moving) {
+HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
+    if (self->moving) {
+        hystgen_forward_travelled(self, v);
+    }
+    self->applied = v;
+    const hystgen_signal_t h = hystgen_forward_played(self, v);
+    self->output = self->moving ? hystgen_forward_output_side_absorb(self, h)
+                                : hystgen_forward_output_side_rest(self, h);
+    self->moving = true;
+}
+
+/* The plays have seen what arrives of drive v. Returns their sum. */
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_played(hystgen_inverse_t *self,
+                                                               hystgen_real_t v) {
+    const hystgen_signal_t x = hystgen_entered_drive(v);
+    const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
+                                            : hystgen_inverse_drive_side_rest(self, x);
+    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
+    return self->level;
+}
+
+/* The actuator has seen drive v. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
+    if (self->moving) {
         hystgen_inverse_travelled(self, v);
     }
-    const hystgen_signal_t x = hystgen_entered_drive(v);
-    const hystgen_signal_t a = moving ? hystgen_inverse_drive_side_absorb(self, x)
-                                      : hystgen_inverse_drive_side_rest(self, x);
-    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
-    self->output = moving ? hystgen_inverse_output_side_absorb(self, self->level)
-                          : hystgen_inverse_output_side_rest(self, self->level);
     self->applied = v;
+    const hystgen_signal_t h = hystgen_inverse_played(self, v);
+    self->output = self->moving ? hystgen_inverse_output_side_absorb(self, h)
+                                : hystgen_inverse_output_side_rest(self, h);
     self->moving = true;
 }
 
@@ -231,18 +250,15 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (inside < v || inside > v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    const hystgen_reach_t reached = hystgen_forward_slewed(self, inside);
-    if (reached < inside || reached > inside) {
-        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
-    }
-    hystgen_forward_absorb(self, (hystgen_real_t)reached);
+    hystgen_forward_absorb(self, inside);
     self->answer =
         hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
     return self->answer;
 }
 
 /* The next reference. Returns what the output side has to give at this sample. */
-static hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self, hystgen_real_t u) {
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
+                                                            hystgen_real_t u) {
     bool limited = false;
     const hystgen_real_t level = hystgen_inverse_clamp(u);
     if (level < u || level > u) {
@@ -265,14 +281,9 @@ void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
     }
 }
 
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
-    hystgen_inverse_take(self);
-    if (!hystgen_finite(u)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        hystgen_inverse_repeat(self);
-        return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
-    }
-    const hystgen_signal_t y = hystgen_inverse_put(self, u);
+/* The drive after which the output side gives y, within its limits; the memory is up to date. */
+HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_sought(hystgen_inverse_t *self,
+                                                             hystgen_signal_t y) {
     const bool moving = self->moving;
     const hystgen_signal_t h = moving ? hystgen_inverse_output_side_solve(self, y)
                                       : hystgen_inverse_output_side_resting(self, y);
@@ -290,7 +301,18 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
     self->status |= self->bits;
-    return hystgen_inverse_answer(self, inside);
+    return inside;
+}
+
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+    hystgen_inverse_take(self);
+    if (!hystgen_finite(u)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        hystgen_inverse_repeat(self);
+        return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
+    }
+    const hystgen_signal_t y = hystgen_inverse_put(self, u);
+    return hystgen_inverse_answer(self, hystgen_inverse_sought(self, y));
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* The drive may go anywhere in one step. */
-static hystgen_reach_t hystgen_forward_slewed(const hystgen_forward_t *self, hystgen_reach_t v) {
+static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
     (void)self;
     return v;
 }

@@ -103,7 +103,7 @@ static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystg
         return here;
     }
     for (i = 0; i < HYSTGEN_HALVES; ++i) {
-        const hystgen_real_t w = low + (high - low) * HYSTGEN_HALF;
+        const hystgen_real_t w = low + (high - low) / 2;
         if (hystgen_inverse_sum(self, w) < h) {
             low = w;
         } else {

@@ -1,5 +1,13 @@
 #include "hystgen_runtime.h"
 
+HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
+    to->input = from->input; /* field by field: for a whole structure a compiler may call memcpy */
+    to->output = from->output;
+    to->k = from->k;
+    to->depth = from->depth;
+    to->rising = from->rising;
+}
+
 /* x as the present move sees it: a falling move is a rising one with all signs changed. */
 static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x) {
 #ifdef HYSTGEN_SOFT_FLOAT
@@ -132,15 +140,12 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        if (t->segment[c->top].reach > room) {
-            /* gains fall from segment to segment: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) { /* gains fall: the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
         m->from = -hystgen_along(m, from);
         m->base = c->output;
-        if (k == 0 && from <= t->range[!rising]) {
-            m->behind = m->from; /* back to the corner it is the same line */
-        }
+        m->behind = k == 0 && from <= t->range[!rising] ? m->from : input; /* the same line back */
     }
     m->begin = hystgen_along(m, begin);
     m->start = hystgen_along(m, start);
@@ -149,12 +154,9 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     if (hystgen_along(m, output) > t->limit[rising]) {
         return false;
     }
-    if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
-        cap = x; /* by rounding: no move leads back */
-    } else {
-        m->here.output = output;
-    }
-    cap = t->range[rising] < cap ? t->range[rising] : cap;
+    const bool back = hystgen_along(m, output) < hystgen_along(m, m->here.output); /* by rounding */
+    m->here.output = back ? m->here.output : output;
+    cap = back ? x : t->range[rising] < cap ? t->range[rising] : cap;
     m->cap = hystgen_along(m, cap);
     m->next = hystgen_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -211,15 +213,19 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start) {
     unsigned int k;
-    corner[0] = start->bottom;
+    corner[0].output = start->bottom.output;
+    corner[0].pass[0] = start->bottom.pass[0];
+    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].top = start->bottom.top;
+    corner[0].rose = start->bottom.rose;
     m->here.depth = 1;
     for (k = start->bottom.top - 1u; k > 0; --k) {
         const hystgen_real_t *center = start->center[start->step > 0 ? k : 0u];
         m->here.k = (uint_least16_t)k;
         m->here.rising = k <= start->risen;
         m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
-        m->here.input = center[0] + hystgen_along(m, t->segment[k].way * HYSTGEN_HALF);
-        m->here.output = center[1] + hystgen_along(m, t->segment[k].reach * HYSTGEN_HALF);
+        m->here.input = center[0] + hystgen_along(m, t->segment[k].way / 2);
+        m->here.output = center[1] + hystgen_along(m, t->segment[k].reach / 2);
         hystgen_leave_corner(t, m, corner);
     }
     m->here.k = 0;

@@ -5,8 +5,8 @@
    invertible. States have bits below those of a signal, so that the slowest one does not stall. */
 
 /* Everything has settled at the input x. Returns the output. */
-static int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                  hystgen_creep_state_t *state, int64_t x) {
+HYSTGEN_APART int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                         hystgen_creep_state_t *state, int64_t x) {
     int64_t sum = 0;
     unsigned int i;
     for (i = 0; i < t->n; ++i) {
@@ -29,24 +29,29 @@ static int64_t hystgen_creep_solve(const hystgen_creep_table_t *t, const hystgen
     return self->before + hystgen_times(y - self->ahead, &t->inverse_slope);
 }
 
-/* The input is x at this sample. Returns the output. */
-static int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                    hystgen_creep_state_t *state, int64_t x) {
+/* The input is x at this sample. Returns the output. Two short loops keep less on the stack than a
+   long one. */
+HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                           hystgen_creep_state_t *state, int64_t x) {
     const int64_t change = x - self->before;
-    const int64_t direct = hystgen_times(x, &t->direct);
-    int64_t sum = 0;
+    int64_t now = 0;
     int64_t next = 0;
     unsigned int i;
+    self->before = x;
     for (i = 0; i < t->n; ++i) {
         const hystgen_creep_term_t *term = &t->term[i];
-        const int64_t late = hystgen_times(change, &term->late) * ((int64_t)1 << term->lift);
-        const int64_t now = state[i].next + late;
-        const int64_t settled = hystgen_times(x, &term->weight) * ((int64_t)1 << t->bits);
-        state[i].next = now + hystgen_times((settled - now) >> t->drop, &term->rate);
-        sum += now;
+        state[i].next += hystgen_times(change, &term->late) * ((int64_t)1 << term->lift);
+        now += state[i].next;
+    }
+    now = hystgen_nearest(now, t->bits);
+    for (i = 0; i < t->n; ++i) {
+        const hystgen_creep_term_t *term = &t->term[i];
+        const int64_t settled =
+            hystgen_times(self->before, &term->weight) * ((int64_t)1 << t->bits);
+        state[i].next += hystgen_times((settled - state[i].next) >> t->drop, &term->rate);
         next += state[i].next;
     }
-    self->before = x;
+    const int64_t direct = hystgen_times(self->before, &t->direct);
     self->ahead = direct + hystgen_nearest(next, t->bits);
-    return direct + hystgen_nearest(sum, t->bits);
+    return direct + now;
 }

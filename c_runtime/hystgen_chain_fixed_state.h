@@ -24,6 +24,12 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
+    int64_t before; /* input of the last sample */
+    int64_t off;    /* output less input */
+    int64_t rate;   /* of that, per radian of the mode */
+} hystgen_mode_t;
+
+typedef struct {
     int32_t gain;
     int32_t inverse;
     int64_t offset;
@@ -35,5 +41,13 @@ typedef struct {
     int32_t inverse;
     bool own; /* the gain follows the travel */
 } hystgen_ageing_t;
+
+typedef struct {
+    int64_t whole;  /* drift in signals, */
+    int64_t part;   /* and the part of one, in units of the table */
+    int64_t lead;   /* samples that the next reference is ahead */
+    int64_t gained; /* by the change in a sample since the start */
+    int64_t count;
+} hystgen_clock_t;
 
 #endif

@@ -49,6 +49,20 @@ typedef struct {
     uint8_t drop; /* and those that products leave out */
 } hystgen_lag_exact_table_t;
 
+/* Mode of the stage: what output less input, and the rate of that, add of themselves in a step
+   (keep, swing), of each other (turn), and of a change of the input (late, beside the change
+   itself, and push). */
+typedef struct {
+    hystgen_factor_t keep;
+    hystgen_factor_t turn;
+    hystgen_factor_t swing;
+    hystgen_factor_t late;
+    hystgen_factor_t push;
+    uint8_t bits; /* of the states below those of a signal, */
+    uint8_t drop; /* those that products leave out, */
+    uint8_t lift; /* and those that products with a change of the input do */
+} hystgen_mode_table_t;
+
 /* Gain and offset per degree above the reference, and between which temperatures. */
 typedef struct {
     hystgen_factor_t per_degree;
@@ -76,6 +90,16 @@ typedef struct {
     uint8_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
     uint8_t bits;  /* of a gain below a code that sets it */
 } hystgen_ageing_table_t;
+
+/* Drift over time: its change in the first sample, and what that changes by from sample to sample.
+ */
+typedef struct {
+    int64_t slope;
+    int64_t change;
+    int64_t samples; /* after which it stays where it is */
+    int64_t farthest;
+    uint8_t bits; /* of slope and change below those of a signal */
+} hystgen_clock_table_t;
 
 /* A smooth limit, or the way back from it, as polynomials. */
 typedef struct {

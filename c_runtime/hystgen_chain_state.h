@@ -27,6 +27,12 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
+    hystgen_real_t before; /* input of the last sample */
+    hystgen_real_t off;    /* output less input */
+    hystgen_real_t rate;   /* of that, per radian of the mode */
+} hystgen_mode_t;
+
+typedef struct {
     hystgen_real_t gain;
     hystgen_real_t inverse;
     hystgen_real_t offset;

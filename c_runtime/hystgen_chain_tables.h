@@ -37,6 +37,16 @@ typedef struct {
     hystgen_real_t inverse_late;
 } hystgen_lag_exact_table_t;
 
+/* Mode of the stage: what output less input, and the rate of that, add of themselves in a step
+   (keep, swing), of each other (turn), and of a change of the input (lead, push). */
+typedef struct {
+    hystgen_real_t keep;
+    hystgen_real_t turn;
+    hystgen_real_t swing;
+    hystgen_real_t lead;
+    hystgen_real_t push;
+} hystgen_mode_table_t;
+
 /* Gain and offset per degree above the reference, and between which temperatures. */
 typedef struct {
     hystgen_real_t per_degree;

@@ -6,7 +6,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     hystgen_plays_t *m = &self->plays;
     hystgen_real_t x = u - HYSTGEN_OFFSET;
     unsigned int bits = 0;
-    self->undo = m->here;
+    hystgen_copy_place(&self->undo, &m->here);
     if (!(u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX)) {
         bits = u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX ? HYSTGEN_STATUS_INPUT_CLAMPED
                                                                : HYSTGEN_STATUS_HELD;
@@ -55,7 +55,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         return m->here.output;
     }
     if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
-        self->undo = m->here;
+        hystgen_copy_place(&self->undo, &m->here);
         self->before = x;
         if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
             return m->here.output;
@@ -76,13 +76,12 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
         self->returned = m->here.output;
     }
     self->committed = true;
-    if (self->before < m->here.input || self->before > m->here.input) {
-        /* the last step went on along its line */
-        self->undo = m->here;
+    if (self->before < m->here.input || self->before > m->here.input) { /* it went along a line */
+        hystgen_copy_place(&self->undo, &m->here);
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;
     }
-    m->here = self->undo;
+    hystgen_copy_place(&m->here, &self->undo);
     hystgen_forget_line(m);
     hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, v);
     self->before = m->here.input;
@@ -92,7 +91,7 @@ HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_
     hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
     hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner,
                            hystgen_clamp_drive(self->plays.here.output));
-    self->undo = self->plays.here;
+    hystgen_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;

@@ -2,7 +2,7 @@
 
 /* The next step begins here. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self) {
-    self->undo = self->plays.here;
+    hystgen_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
@@ -15,7 +15,7 @@ static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
 
 /* The actuator has gone to v in place of where the last step led. */
 HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v) {
-    self->plays.here = self->undo;
+    hystgen_copy_place(&self->plays.here, &self->undo);
     hystgen_forget_line(&self->plays);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
 /* The next step begins here. */
-static void hystgen_inverse_keep(hystgen_inverse_t *self) {
+HYSTGEN_APART void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;

@@ -19,8 +19,8 @@ static int64_t hystgen_lag_exact_solve(const hystgen_lag_exact_table_t *t,
 }
 
 /* The input is v at this sample. Returns the output. */
-static int64_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *t,
-                                        hystgen_lag_exact_t *self, int64_t v) {
+HYSTGEN_APART int64_t hystgen_lag_exact_absorb(const hystgen_lag_exact_table_t *t,
+                                               hystgen_lag_exact_t *self, int64_t v) {
     const int64_t reached = self->next + hystgen_times(v - self->before, &t->late);
     const int64_t more = v * ((int64_t)1 << t->bits) - reached;
     self->next = reached + hystgen_times(more >> t->drop, &t->rate);

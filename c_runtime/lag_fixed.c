@@ -29,7 +29,8 @@ static int64_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *se
 }
 
 /* The input is v at this sample. Returns the output. */
-static int64_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t v) {
+HYSTGEN_APART int64_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self,
+                                         int64_t v) {
     const int64_t given = v * ((int64_t)1 << t->bits);
     const int64_t change = hystgen_lag_scaled(t, given - self->high, &t->rate);
     const int64_t left = self->lead - change;

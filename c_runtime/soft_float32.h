@@ -1,6 +1,3 @@
-#define HYSTGEN_HALF 0.5f
-
-/* Whether each operation of a number is a call of a library. */
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define HYSTGEN_SOFT_FLOAT
+#define HYSTGEN_SOFT_FLOAT /* each operation of a number is a call of a library */
 #endif

@@ -1,7 +1,4 @@
-#define HYSTGEN_HALF 0.5
-
-/* Whether each operation of a number is a call of a library. */
 #if (defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0)) ||                           \
     (defined(__riscv) && (!defined(__riscv_flen) || __riscv_flen < 64)) || defined(__AVR__)
-#define HYSTGEN_SOFT_FLOAT
+#define HYSTGEN_SOFT_FLOAT /* each operation of a number is a call of a library */
 #endif

@@ -5,9 +5,10 @@
 
 /* x times a factor, to the nearest whole number; |x| < 2^51, a shift is 21 to 82. */
 static int64_t hystgen_times(int64_t x, const hystgen_factor_t *f) {
-    const int64_t high = x >> HYSTGEN_LOW_PART;
-    const int64_t low = x & (((int64_t)1 << HYSTGEN_LOW_PART) - 1);
-    const int64_t whole = high * f->mantissa + ((low * f->mantissa) >> HYSTGEN_LOW_PART);
+    const int32_t high = (int32_t)(x >> HYSTGEN_LOW_PART);
+    const int32_t low = (int32_t)(x & (((int64_t)1 << HYSTGEN_LOW_PART) - 1));
+    const int64_t whole =
+        (int64_t)high * f->mantissa + (((int64_t)low * f->mantissa) >> HYSTGEN_LOW_PART);
     const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
     return (whole + ((int64_t)1 << (shift - 1u))) >> shift;
 }

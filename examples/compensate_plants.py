@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hystgen
+from hystgen.basics import drawing
 from hystgen.closed_loop import CompiledC
 from hystgen.plants import (
     BoucWen,
@@ -33,7 +34,6 @@ from hystgen.plants import (
     Preisach,
 )
 from hystgen.records import Record
-from hystgen.report import drawing
 
 Array = NDArray[np.float64]
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from hystgen.fleet.batch import identify_batch as identify_batch
     from hystgen.front.dead_zone.model import DeadZone as DeadZone
     from hystgen.front.tanh.model import TanhEnvelope as TanhEnvelope
-    from hystgen.identification import identify as identify
     from hystgen.model import InverseModel as InverseModel
     from hystgen.model import Model as Model
     from hystgen.model import load as load
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
     from hystgen.plays import elastoplastic as elastoplastic
     from hystgen.plays import operators as operators
     from hystgen.report.diagnosis import diagnose as diagnose
+    from hystgen.report.identification import identify as identify
     from hystgen.report.identification import report_fit as report_fit
     from hystgen.report.plan import plan as plan
     from hystgen.verification.run import verify as verify
@@ -63,7 +63,7 @@ _PLACES = {
     "diagnose": "report.diagnosis",
     "differences": "emission.calls",
     "emit": "emission.calls",
-    "identify": "identification",
+    "identify": "report.identification",
     "identify_batch": "fleet.batch",
     "load": "model",
     "plan": "report.plan",

@@ -100,7 +100,7 @@ class Response:
     displacement: Array
 
     def max_error(self, start: float = 0.0) -> float:
-        """Largest |error| from `start` (s) on, at the samples. Raises ValueError where nothing is left."""
+        """Largest `|error|` from `start` (s) on, at the samples. Raises ValueError where nothing is left."""
         return float(np.max(np.abs(self._error_from(start))))
 
     def rms_error(self, start: float = 0.0) -> float:

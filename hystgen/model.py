@@ -7,15 +7,15 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics import arguments
-from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
+from hystgen.basics import arguments, display, drawing
+from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, tables
 from hystgen.compensator.session import Session
@@ -53,11 +53,41 @@ def cascade_of(parameters: Parameters) -> Cascade:
     return Cascade(pi, tuple(stages), part.output_offset, parameters.input_range)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Model:
     """A model as its parameter file gives it: `parameters`, and the mathematics in `cascade`."""
 
     parameters: Parameters
+
+    def __repr__(self) -> str:
+        low, high = self.cascade.input_range
+        unit = f" {self.parameters.units.input}" if self.parameters.units.input else ""
+        effects = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
+        facts = [
+            counted(self.cascade.pi.n, "play") + (" behind a front" if self.cascade.stages else ""),
+            f"{low:g} to {high:g}{unit}",
+            *([f"effects {effects}"] if effects else []),
+            "no inverse" if self.cascade.inverse_problems() else "invertible",
+        ]
+        return f"<Model {self.name}: {', '.join(facts)}>"
+
+    def _repr_html_(self) -> str:
+        return display.block(repr(self), draw=self._figure)
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+        """A picture of loops, the initial loading curve and, if it exists, the inverse with its accuracy.
+
+        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg, it is written there as well.
+        Effects are not drawn. Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
+        """
+        return drawing.picture(self._figure, path)
+
+    def _figure(self) -> Any:
+        from hystgen import portrait
+
+        shown = not self.cascade.inverse_problems() and not self.effects
+        inverse = partial(self.inverse().simulate, clamp=True) if shown else None
+        return portrait.figure(self.name, self.cascade, self.parameters.units, inverse, bool(self.effects))
 
     @cached_property
     def cascade(self) -> Cascade:
@@ -291,11 +321,14 @@ class Model:
         return Compensator(self.chain, self.parameters.emit.compensation.compensate)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InverseModel:
     """The compensator of a model: reference in, drive out."""
 
     forward: Model
+
+    def __repr__(self) -> str:
+        return f"<InverseModel of {self.forward!r}>"
 
     def simulate(
         self,
@@ -359,8 +392,28 @@ def check_arithmetic(arithmetic: str) -> None:
         raise FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(ARITHMETICS)}")
 
 
-def as_model(source: Model | str | os.PathLike[str]) -> Model:
-    """The model, or that of a parameter file. Raises ParameterError, and TypeError for what is neither."""
-    if not isinstance(source, Model | str | os.PathLike):
-        raise TypeError(f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}")
-    return source if isinstance(source, Model) else load(source)
+class HasModel(Protocol):
+    """What has a model, such as a fit or a diagnosis."""
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+
+
+ModelSource: TypeAlias = "Model | HasModel | str | os.PathLike[str]"
+"""A model, what has one, or the path of a parameter file."""
+
+
+def as_model(source: ModelSource) -> Model:
+    """The model, that of a parameter file, or that of what has one, such as a fit.
+
+    Raises ParameterError, and TypeError for what is none of them.
+    """
+    if isinstance(source, str | os.PathLike):
+        return load(source)
+    model = source if isinstance(source, Model) else getattr(source, "model", None)
+    if not isinstance(model, Model):
+        raise TypeError(
+            f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}"
+        )
+    return model

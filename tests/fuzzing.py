@@ -13,10 +13,13 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from modelfiles import FILES
+from modelfiles import CHAINS, FILES
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
+from hystgen.emission import module
+from hystgen.emission.chain import SETTINGS as SETTING_CALLS
+from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
@@ -28,6 +31,9 @@ CALLS = {
     "reset": slots.OP_RESET,
     "commit": slots.OP_COMMIT,
 }
+SETTINGS = ("push", "settle", "set_offset", "set_temperature", "set_gain")
+"""Calls of models with effects that are fuzzed, with an argument of any kind."""
+
 SANITIZERS = "address,undefined,float-cast-overflow"
 FLAGS = ["-std=c99", "-g", "-O1", f"-fsanitize=fuzzer,{SANITIZERS}", "-fno-sanitize-recover=all"]
 LONGEST = 2048
@@ -133,18 +139,20 @@ def build(
     engine: str,
     change: Callable[[str], str] = lambda text: text,
 ) -> Target:
-    """Emit a model, whose C `change` may alter, and build its fuzzer; in fixed point with both engines."""
+    """Emit a model, whose C `change` may alter, and build its fuzzer; in fixed point with both engines, but models with
+    effects, which `loop` alone has."""
     clang = compilers.find("clang")
     assert clang, "clang is not installed"
     real = ARITHMETICS[arithmetic].number
     fixed = real.kind == "i"
-    model = Model(parse_parameters(FILES[name], f"{name}.yaml"))
+    chain = name in CHAINS
+    model = Model(parse_parameters({**FILES, **CHAINS}[name], f"{name}.yaml"))
     hystgen.emit(model, folder, operator="both", arithmetic=arithmetic, engine=engine)
     source = folder / f"{name}.c"
     source.write_text(change(source.read_text()))
     sources = [source]
-    twin = f"{name}_twin" if fixed else ""
-    if fixed:
+    twin = f"{name}_twin" if fixed and not chain else ""
+    if twin:
         other = Model(parse_parameters(FILES[name].replace(f"name: {name}\n", f"name: {twin}\n"), f"{twin}.yaml"))
         hystgen.emit(
             other, folder, operator="both", arithmetic=arithmetic, engine="loop" if engine == "corners" else "corners"
@@ -158,13 +166,23 @@ def build(
     harness = folder / "fuzz_harness.c"
     harness.write_text(
         template.render(
-            name=name, NAME=name.upper(), twin=twin, fixed=fixed, size=real.itemsize, calls=CALLS,
+            name=name, NAME=name.upper(), twin=twin, chain=chain, settings=settings(model, arithmetic, engine),
+            fixed=fixed, size=real.itemsize, calls=CALLS,
             FLT="FLT" if arithmetic == "float32" else "DBL", least=f"({limits.min + 1} - 1)", most=limits.max,
         )
     )  # fmt: skip
     binary = folder / "fuzz"
     clang.run([*FLAGS, *sources, harness, "-o", binary])
     return Target(model, arithmetic, engine, binary)
+
+
+def settings(model: Model, arithmetic: str, engine: str) -> dict[str, list[tuple[int, str]]]:
+    """Codes and names of the settings that each operator has."""
+    calls = module.calls_of(model.parameters, model.cascade, Options("both", arithmetic, engine, "self-contained"))
+    return {
+        op: [(SETTING_CALLS[each], each) for each in SETTINGS if each in calls.get(op, ())]
+        for op in ("forward", "inverse")
+    }
 
 
 def seed(corpus: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the proof of the `corners` engine takes for granted of a corner list, written into the emitted C.
+"""What proofs take for granted, written into the emitted C: of a corner list, and of the states of effects.
 
 Two facts are relations between numbers of the whole list, which Eva's sets of values cannot hold: the last plays of the
 blocks fall strictly from corner to corner, so that there are no more corners than plays; and a sum of products, or a
@@ -10,9 +10,13 @@ from __future__ import annotations
 
 import re
 
+from hystgen.compensator.chain.layout import ARRIVING_BITS, Compiled
 from hystgen.compensator.fixed_tables import build
+from hystgen.effects.creep import fixed as creep
+from hystgen.effects.lag import fixed as lag
+from hystgen.effects.resonance import fixed as resonance
 from hystgen.model import Model
-from hystgen.plays.slots import PLAY_MAX, PLAY_MIN
+from hystgen.plays.slots import CODE_MAX, PLAY_MAX, PLAY_MIN
 
 BEFORE = """
 #include <stdint.h>
@@ -89,4 +93,53 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
         )
         text, found = re.subn(pattern.replace("NAME", name), filled, text)
         assert found == count, (pattern, found)
+    return BEFORE + text
+
+
+# In models with effects: what states of filters stay within, by the range analysis that their formats were chosen by,
+# and a drive between two others. Eva's sets of values widen a filter's state until it overflows.
+STATES = [
+    (r"(int64_t NAME_creep_rest\([^{]*\{\n)", r"\1    WITHIN(x, SIGNAL);\n"),
+    (r"(    return self->ahead;)", r"    WITHIN(self->ahead, SIGNAL);\n\1"),
+    (r"(int64_t NAME_creep_absorb\([^{]*\{\n)", r"\1    WITHIN(x, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n"),
+    (r"(int64_t NAME_creep_solve\([^{]*\{\n)",
+     r"\1    WITHIN(y, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n    WITHIN(self->ahead, SIGNAL);\n"),
+    (r"(        const NAME_creep_term_t \*term = [^\n]*\n)", r"\1        WITHIN(state[i].next, CREEP);\n"),
+    (r"    return direct \+ now;",
+     r"    const int64_t y = direct + now;\n    WITHIN(self->ahead, SIGNAL);\n    WITHIN(y, SIGNAL);\n    return y;"),
+    (r"    return (NAME_nearest\((?:self->high - NAME_lag_scaled[^;]*|reached), t->bits\));",
+     r"    const int64_t arrives = \1;\n    WITHIN(arrives, DRIVE);\n    return arrives;"),
+    (r"(int64_t NAME_lag_absorb\([^{]*\{\n)",
+     r"\1    WITHIN(self->high, LAG);\n    WITHIN(self->asked, LAG);\n    WITHIN(self->lead, LAG);\n"),
+    (r"(int64_t NAME_lag_solve\([^{]*\{\n)",
+     r"\1    WITHIN(self->high, LAG);\n    WITHIN(self->wanted, LAG);\n"),
+    (r"(int64_t NAME_lag_exact_(?:absorb|solve)\([^{]*\{\n)", r"\1    WITHIN(self->next, LAG);\n"),
+    (r"(int64_t NAME_mode_absorb\([^{]*\{\n)",
+     r"\1    WITHIN(x, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n    WITHIN(self->off, MODE);\n"
+     r"    WITHIN(self->rate, MODE);\n"),
+    (r"(    const int64_t change = \(int64_t\)sample\[[^\n]*\n)    return ([^;]*);",
+     r"\1    const int64_t between = \2;\n    WITHIN(between, CODE);\n    return (NAME_reach_t)between;"),
+]  # fmt: skip
+
+
+def granted_states(text: str, compiled: Compiled, name: str) -> str:
+    """The emitted C of a model with effects with the checks in it that its blocks need."""
+    t, codes = compiled.tables, compiled.codes
+    assert codes is not None
+
+    def most(rows: list[list[int]], place: int, bits: int) -> int:
+        return 2 ** (bits + max((int(row[place]) for row in rows), default=0))
+
+    numbers = {
+        "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
+        "DRIVE": max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS]),
+        "CREEP": most(t.creep.block.tolist(), creep.DROP, 49), "LAG": most(t.lag.block.tolist(), lag.DROP, 50),
+        "MODE": most(t.mode.tolist(), resonance.DROP, 50),
+    }  # fmt: skip
+    for pattern, replacement in STATES:
+        filled = re.sub(
+            r"\b(" + "|".join(numbers) + r")\b", lambda found: f"INT64_C({numbers[found[1]]})",
+            replacement.replace("NAME", name),
+        )  # fmt: skip
+        text = re.sub(pattern.replace("NAME", name), filled, text)
     return BEFORE + text

@@ -86,6 +86,7 @@ class World:
         return SimpleNamespace(
             to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
             residual=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
+            compared=1.0,
         )  # fmt: skip
 
 

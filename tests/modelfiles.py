@@ -86,6 +86,7 @@ CHAINS = {
     "relaxing": chain("relaxing", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", front=BRANCHES),
     "dilated": chain("dilated", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",
                      "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2", front=TANH),
+    "wider": chain("wider", "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 3.0e-4, 3.0e-4, 3.0e-4]", CREEP),
     "bumpy": chain("bumpy", "name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5"),
     "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
     "straight": chain("straight", "name: resonance, frequency: 20, damping: 0.1", "name: lag, time_constant: 3.0e-3",
@@ -104,10 +105,9 @@ CHAINS = {
 }  # fmt: skip
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
-INVERSE_ALONE = ("straight", "viscous_twin", "late", "drifting_late", "everything")
+INVERSE_ALONE = ("viscous_twin",)
 
 FLOAT_ALONE = (
-    "drifting", "drifting_late", "heated", "viscous", "dilated", "bumpy", "viscous_twin", "dashpot", "soft_dashpot",
+    "heated", "viscous", "dilated", "bumpy", "dashpot", "soft_dashpot",
 )  # fmt: skip
-"""Those with a clock or own heat, or whose plays are bent, have a nonlinear dashpot or do not all relax with one time
-constant, which fixed point does not have."""
+"""Those with own heat, or whose plays are bent or have a nonlinear dashpot, which fixed point does not have."""

@@ -95,14 +95,14 @@ KILLED = (
     ),
     Mutant(
         "a step back by rounding goes on", FLOAT,
-        "        cap = x; /* by",
-        "        /* by",
+        "    cap = back ? x : t->range",
+        "    cap = t->range",
         "listed", "float32",
     ),
     Mutant(
         "an answer steps back", FLOAT,
-        "    } else {\n        m->here.output = output;\n    }\n",
-        "    }\n    m->here.output = output;\n",
+        "    m->here.output = back ? m->here.output : output;\n",
+        "    m->here.output = output;\n",
         "listed", "float32",
     ),
     Mutant(
@@ -119,8 +119,8 @@ KILLED = (
     ),
     Mutant(
         "a line leads back beyond the range", FLOAT,
-        "if (k == 0 && from <= t->range[!rising]) {",
-        "if (k == 0) {",
+        "k == 0 && from <= t->range[!rising] ? m->from",
+        "k == 0 ? m->from",
         "outside", "float32",
     ),
     Mutant(

@@ -23,13 +23,15 @@ V = np.sin(T / 5.0)
 REC = Path(__file__).resolve().parents[1] / "examples" / "stage_recording.csv"
 MODEL = Model(parse_parameters(FILES["plain"], "plain.yaml"))
 INVERSE = MODEL.inverse()
-ARRAYS = r"a list of these, not .*Record\(name, t, v, y\)"
+NO_RECORD = r"a data frame, a dict of arrays .*, a tuple of arrays \(t, v, y\), or a list of these, not "
+OF_FILES = "made of files, not of records in memory"
 
 
 class Frame:
     """As much of pandas' DataFrame as a call looks at: iterated over, it gives the names of its columns."""
 
     shape = (60, 3)
+    columns = ("t", "v", "y")
 
     def keys(self) -> list[str]:
         return ["t", "v", "y"]
@@ -92,22 +94,16 @@ FILES_AND_MODELS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "plan a number": (lambda: hystgen.plan(3), TypeError, "or a parameter file, not 3"),
 }
 RECORDS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
-    "identify a table": (lambda: hystgen.identify(Frame()), TypeError, ARRAYS),
-    "identify a mapping": (lambda: hystgen.identify({"t": T, "v": V, "y": V}), TypeError, ARRAYS),
-    "identify Arrow": (lambda: hystgen.identify(pyarrow.table({"t": T, "v": V, "y": V})), TypeError, ARRAYS),
-    "identify arrays": (lambda: hystgen.identify((T, V, V)), TypeError, ARRAYS),
-    "identify tuples": (lambda: hystgen.identify([(T, V, V)]), TypeError, ARRAYS),
-    "identify an array": (lambda: hystgen.identify(np.column_stack([T, V, V])), TypeError, ARRAYS),
-    "identify a number": (lambda: hystgen.identify(5), TypeError, ARRAYS),
-    "identify nothing": (lambda: hystgen.identify(None), TypeError, ARRAYS),
-    "identify a stream": (lambda: hystgen.identify(REC.open()), TypeError, ARRAYS),
-    "hold out a table": (lambda: hystgen.identify(REC, holdout=Frame()), TypeError, ARRAYS),
-    "diagnose a table": (lambda: hystgen.diagnose(MODEL, Frame()), TypeError, ARRAYS),
-    "diagnose arrays": (lambda: hystgen.diagnose(MODEL, (T, V, V)), TypeError, ARRAYS),
-    "batch of a table": (lambda: hystgen.identify_batch(Frame(), "o"), TypeError, ARRAYS),
-    "batch of records": (lambda: hystgen.identify_batch(Record("a", T, V, V), "o"), TypeError, "made of files"),
-    "read a table": (lambda: read_records(Frame()), TypeError, ARRAYS),
-    "read a number": (lambda: read_record(3), TypeError, "not a list with 3 in it"),
+    "identify tuples of numbers": (lambda: hystgen.identify([(1, 2, 3)]), TypeError, NO_RECORD),
+    "identify a number": (lambda: hystgen.identify(5), TypeError, NO_RECORD),
+    "identify nothing": (lambda: hystgen.identify(None), TypeError, NO_RECORD),
+    "identify a stream": (lambda: hystgen.identify(REC.open()), TypeError, NO_RECORD),
+    "hold out a number": (lambda: hystgen.identify(REC, holdout=3), TypeError, NO_RECORD),
+    "diagnose a number": (lambda: hystgen.diagnose(MODEL, 3), TypeError, NO_RECORD),
+    "batch of a table": (lambda: hystgen.identify_batch(Frame(), "o"), TypeError, OF_FILES),
+    "batch of Arrow": (lambda: hystgen.identify_batch(pyarrow.table({"t": T, "v": V}), "o"), TypeError, OF_FILES),
+    "batch of records": (lambda: hystgen.identify_batch(Record("a", T, V, V), "o"), TypeError, OF_FILES),
+    "read a number": (lambda: read_record(3), TypeError, NO_RECORD),
     "lengths": (lambda: hystgen.identify(Record("a", T, V[:50], V)), ValueError, "60 samples of t and 50"),
     "length of a column": (lambda: hystgen.identify(Record("a", T, V, V, {"c": V[1:]})), ValueError, "and 59 of c"),
     "a column of v": (lambda: hystgen.identify(Record("a", T, V.reshape(-1, 1), V)), ValueError, "v of a has one"),

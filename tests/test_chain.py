@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import CHAINS, CREEP, FILES, FLOAT_ALONE, INVERSE_ALONE, chain
+from modelfiles import BRANCHES, CHAINS, CREEP, FILES, FLOAT_ALONE, INVERSE_ALONE, chain
 from scipy.integrate import solve_ivp
 
 import hystgen
@@ -27,6 +27,8 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.model import RelaxingPlays
+from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.resonance.model import Resonance
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -117,6 +119,57 @@ def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: in
     span = float(np.ptp(numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]))
     assert np.mean(free) > 0.8
     assert np.max(np.abs(y - run.v)[free]) <= EXACT[name] * span
+
+
+@pytest.mark.parametrize("name", ["late", "straight", "everything"])
+def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
+    """Jumps and holds, to which a mode rings longest."""
+    one = model(name, CHAINS[name].replace(BRANCHES, "").replace("rate: 3000", "rate: 30000"))
+    low, high = one.cascade.input_range
+    v = np.repeat(np.random.default_rng(4).uniform(0.3 * low, 0.3 * high, 4), 60)
+    t = np.arange(len(v)) * T
+    warm = {"temperature": 20.0 + 0.1 * np.arange(len(v))}
+    y = one.simulate(v, t=t, extra=warm)
+    for arithmetic in ("float64", "float32", "q31", "q15"):
+        found = compiled(one, arithmetic)
+        if found.codes is None:
+            drive, output, bound = 1.0, 1.0, bounds.chain_bounds(found, arithmetic).forward
+            given = v.astype(np.float32).astype(float)
+        else:
+            drive, output = float(found.codes.drive_lsb), float(found.codes.output_lsb)
+            given, bound = np.rint(v / drive), found.codes.forward_error
+        with jit.plain():
+            answered = answers(found, Run(t, given, warm), False).astype(float)
+        wanted = one.simulate(given * drive, t=t, extra=warm) / output
+        most = np.inf if found.codes is None else float(found.tables.limits[slots.CODE_MAX])
+        assert np.max(np.abs(answered - np.clip(wanted, -most, most))) <= bound
+        assert bound < 1e-2 * np.ptp(y) / output
+    assert np.ptp(y) > 2.0
+    assert np.max(np.abs(y - one.without([e for e in one.effects if e.name in ("delay", "resonance")])
+                         .simulate(v, t=t, extra=warm))) > 0.5, "what they are worth"  # fmt: skip
+
+
+@pytest.mark.parametrize(("frequency", "damping"), [(0.5, 0.3), (30.0, 0.05), (333.0, 1.0), (700.0, 0.01), (5.0, 4.0)])
+def test_sums_over_a_mode_are_those_of_its_recursion(frequency: float, damping: float) -> None:
+    """Sizes of responses that bounds are made of, against the recursion sample by sample."""
+    effect = Resonance(name="resonance", frequency=frequency, damping=damping)
+    one = resonance.numbers(effect, T)
+    keep, turn, swing, lead, push = one.table
+    step = np.array([[1.0 + keep, turn], [-turn, 1.0 + swing]])
+    n = 40_000
+
+    def responses(state: Any, change: float = 0.0) -> tuple[float, float]:
+        """Sums of the sizes of the output and of the rate, with a pulse of the input at the first sample."""
+        state = np.array(state) + change * np.array([lead, push])
+        total, rates = abs(change + state[0]), abs(state[1])
+        for k in range(n):
+            state = step @ state - (change * np.array([lead, push]) if k == 0 else 0.0)
+            total, rates = total + abs(state[0]), rates + abs(state[1])
+        return total, rates
+
+    assert responses((0.0, 0.0), 1.0) == pytest.approx((one.largest, one.fastest), rel=1e-6)
+    assert responses((1.0, 0.0)) == pytest.approx((one.off_after, one.turned), rel=1e-6)
+    assert responses((0.0, 1.0)) == pytest.approx((one.rate_after, one.slowed), rel=1e-6)
 
 
 def test_drift_is_compensated_ahead_of_time() -> None:
@@ -225,6 +278,30 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
         slew = [effect.rate * T for effect in one.effects if effect.name == "slew_limit"]
         assert not slew or np.max(np.abs(np.diff(v))) <= max(slew) * (1 + 1e-6)
         assert np.max(np.abs(forward - one.simulate(v, t=run.t, extra=run.extra))) <= bound.forward
+
+
+@pytest.mark.parametrize("name", ["lagging", "everything", "dilated", "wider"])
+def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> None:
+    """Where only that is promised: float64 to which the drives are committed that float32 sent."""
+    one = model(name, CHAINS[name].replace(BRANCHES, ""))
+    numbers, double = compiled(one, "float32"), compiled(one, "float64")
+    bound = bounds.chain_bounds(numbers, "float32")
+    assert bounds.condition(numbers)
+    run = record(numbers, 3, 400, 1.0)
+    warm = len(numbers.tables.gain) > 0
+    pairs = [(slots.OP_TEMPERATURE, 20.0)] * warm + [(slots.OP_PUSH, float(u)) for u in run.v[: numbers.ahead]]
+    pairs += [(slots.OP_STEP, float(u)) for u in run.v[numbers.ahead :]]
+    with jit.plain():
+        op, x = (np.array(column) for column in zip(*pairs, strict=True))
+        v, _ = reference.answers(numbers.tables, True, op.astype(np.uint8), x)
+        seen = []
+        for (call, value), answer in zip(pairs, v.tolist(), strict=True):
+            seen += [(call, value)] + [(slots.OP_COMMIT, answer)] * (call == slots.OP_STEP)
+        op_seen, x_seen = (np.array(column) for column in zip(*seen, strict=True))
+        w, _ = reference.answers(double.tables, True, op_seen.astype(np.uint8), x_seen)
+    steps = op == slots.OP_STEP
+    assert np.max(np.abs(v[steps] - w[op_seen == slots.OP_STEP])) <= bound.rounding
+    assert bound.rounding < 0.1 * np.ptp(one.cascade.input_range), "it says more than the range"
 
 
 def test_slow_states_neither_stall_nor_drift() -> None:
@@ -531,7 +608,7 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
     for name in FLOAT_ALONE:
-        what = "a clock and for own heat" if name in ("drifting", "drifting_late", "heated") else "plays that"
+        what = "own heat" if name == "heated" else "plays that"
         with pytest.raises(UnsupportedEffectsError, match=f"in fixed point there is no C for {what}"):
             emit_options(model(name), arithmetic="q15", operator="inverse")
     assert emit_options(model("viscous"), arithmetic="q31", allow_partial=True).left_out
@@ -543,8 +620,10 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
         compiled(model("slow", chain("slow", "name: creep, time_constants: [1.0e+7], weights: [9.0]")), "q31")
     with pytest.raises(FormatError, match="a lag: its states and constants do not fit q31"):
         compiled(model("slow", chain("slow", "name: lag, time_constant: 1.0e9")), "q31")
-    with pytest.raises(UnsupportedEffectsError, match="only the inverse has it"):
-        emit_options(model("late"), operator="both")
+    long = model("remote", chain("remote", "name: delay, time: 33"))
+    with pytest.raises(UnsupportedEffectsError, match="33000 samples, and the forward operator keeps 32768 at most"):
+        emit_options(long, operator="both")
+    assert emit_options(long).engine == "loop", "a preview of any length"
     with pytest.raises(FormatError, match="too large for float32"):
         compiled(model("huge", chain("huge", "name: lag, time_constant: 1.0e30")), "float32")
     assert list(tmp_path.iterdir()) == []

@@ -661,9 +661,9 @@ def test_the_example_of_the_module_runs() -> None:
     assert result.attempted > 3
 
 
-def test_the_example_of_the_readme_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_of_the_page_runs(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     root = Path(__file__).parents[1]
-    block = re.search(r"```python\n(.*?)```", (root / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    block = re.search(r"```python\n(.*?)```", (root / "docs/howto/closed-loop.md").read_text("utf-8"), re.DOTALL)
     assert block
     monkeypatch.chdir(root)
     exec(block[1], {})

@@ -296,7 +296,7 @@ def test_a_backend_from_a_notebook_is_no_matter(backend: str) -> None:
 def test_the_users_own_plots_keep_their_backend() -> None:
     """A notebook that calls hystgen before it imports matplotlib itself."""
     code = (
-        "import os\nfrom hystgen.report import drawing\ndrawing.require()\nimport matplotlib\n"
+        "import os\nfrom hystgen.basics import drawing\ndrawing.require()\nimport matplotlib\n"
         "print(matplotlib.get_backend(), os.environ['MPLBACKEND'])"
     )
     env = {**os.environ, "MPLBACKEND": "svg"}

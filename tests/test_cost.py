@@ -113,7 +113,7 @@ def dearest(one: Model, name: str, engine: str, inverse: bool) -> tuple[int, int
     """Most multiplications and comparisons of a step over jumps of all sizes, beyond the limits too, with commits."""
     tables = one.tables(name, engine)
     code, counted = reference.operations(tables), counting(tables)
-    state = counting(reference.new_state(tables))
+    state = counting(reference.new_state(tables, inverse))
     rng = np.random.default_rng(0)
     x: Any = rng.uniform(-10.5, 10.5, SAMPLES) * rng.choice([1.0, 0.5, 0.1, 0.02], SAMPLES)
     x[rng.random(SAMPLES) < 0.02] = 11.0

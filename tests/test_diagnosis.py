@@ -155,6 +155,8 @@ class TestBlindPlants:
         assert ("As C they are not there yet" in page) == (emitted[0] != 0) == (f"yet: {reason}." in page)
         assert ("`hystgen emit params.yaml` writes the compensator as C" in page) == (emitted[0] == 0)
         assert (reason in " ".join(err.split())) == (emitted[0] != 0)
+        assert page.count("Your next step: ") == 1
+        assert ("Your next step: write the compensator as C." in page) == (emitted[0] == 0)
         first = [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())]
         assert run(*words)[0] == 0
         assert [path.read_bytes() for path in sorted((tmp_path / "out").iterdir())] == first

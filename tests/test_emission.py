@@ -25,7 +25,7 @@ from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.text import literal
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import Model
-from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.files import parameters_sha256, parse_parameters
 from hystgen.plays import slots
 from hystgen.verification import comparison, compilers, host, signals, sources
 
@@ -445,15 +445,57 @@ def test_constant_tables_take_no_more_than_the_banner_says(
     assert 0.5 * int(said[1]) < taken <= int(said[1])
 
 
-@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
-@pytest.mark.parametrize("level", ["-O0", "-Os", "-O2"])
-def test_nothing_is_copied_by_a_function_of_the_library(arithmetic: str, level: str, tmp_path: Path) -> None:
+TEN = """\
+hystgen: 1
+name: stage
+input_range: [0, 30]
+model:
+  pi:
+    thresholds: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]
+    weights: [0.5, 0.05, 0.05, 0.04, 0.03, 0.03, 0.02, 0.02, 0.01, 0.01]
+"""
+
+
+@pytest.mark.parametrize(("arithmetic", "lines", "code"), [
+    ("float32", 400, 3600), ("q31", 450, 3500), ("q15", 450, 3500),
+])  # fmt: skip
+def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, code: int, tmp_path: Path) -> None:
+    """Lines of C and bytes of code, tables apart, of an inverse on two cores; both operators take 1.6 times that."""
+    zig = next(compiler for compiler in required_compilers() if compiler.name == "zig").command
+    gcc = ("arm-none-eabi-gcc", "-mthumb")
+    builds = (
+        (*gcc, "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"), (*gcc, "-mcpu=cortex-m0plus"),
+        (*zig, "-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp"),
+        (*zig, "-target", "thumb-freestanding-eabi", "-mcpu=cortex_m0plus"),
+    )  # fmt: skip
+    taken = {}
+    for operator in ("inverse", "forward", "both"):
+        folder = tmp_path / operator
+        hystgen.emit(Model(parse_parameters(TEN)), folder, operator=operator, arithmetic=arithmetic, engine="corners")
+        if operator != "both":
+            assert len((folder / "stage.c").read_text().splitlines()) <= lines
+        for number, build in enumerate(builds):
+            output = folder / "one.o"
+            subprocess.run([*build, "-std=c99", "-O2", "-c", str(folder / "stage.c"), "-o", str(output)], check=True)
+            with output.open("rb") as file:
+                sections = [s for s in ELFFile(file).iter_sections() if s.name.startswith(".text")]
+                taken[operator, number] = sum(section["sh_size"] for section in sections)
+    for number in range(len(builds)):
+        alone = taken["inverse", number]
+        assert taken["forward", number] <= alone <= code
+        assert taken["both", number] <= 1.6 * alone
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize("name", ["plain", "two_branches"])
+def test_nothing_is_copied_by_a_function_of_the_library(name: str, arithmetic: str, tmp_path: Path) -> None:
     """A Cortex-M0+ has gcc copy structures of more than 16 bytes by memcpy."""
-    hystgen.emit(model("plain"), tmp_path, operator="both", arithmetic=arithmetic, engine="corners")
+    hystgen.emit(model(name), tmp_path, operator="both", arithmetic=arithmetic, engine="corners")
     core = ["arm-none-eabi-gcc", "-std=c99", "-mcpu=cortex-m0plus", "-mthumb"]
-    subprocess.run([*core, level, "-c", tmp_path / "plain.c", "-o", tmp_path / "plain.o"], check=True)
-    listed = ["arm-none-eabi-nm", "-u", tmp_path / "plain.o"]
-    assert "memcpy" not in subprocess.run(listed, capture_output=True, text=True, check=True).stdout
+    for level in ("-O0", "-Os", "-O2"):
+        subprocess.run([*core, level, "-c", tmp_path / f"{name}.c", "-o", tmp_path / "one.o"], check=True)
+        listed = ["arm-none-eabi-nm", "-u", tmp_path / "one.o"]
+        assert "memcpy" not in subprocess.run(listed, capture_output=True, text=True, check=True).stdout, level
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -500,6 +542,22 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
     assert " \\\n" in text[: text.index("Parameters:")]
     assert read.options == {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}
     assert not read.edited
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_files_name_their_licence_and_headers_what_made_them(layout: str, tmp_path: Path) -> None:
+    """By a line that licence scanners look for, and by macros that a firmware can log."""
+    files = emitted_files(model("plain"), layout=layout)
+    for name, text in files.items():
+        assert text.splitlines()[0] == "/* SPDX-License-Identifier: 0BSD", name
+        (tmp_path / name).write_text(text)
+    (tmp_path / "main.c").write_text(
+        '#include <stdio.h>\n#include "plain.h"\n'
+        "int main(void) { return puts(PLAIN_HYSTGEN_VERSION), puts(PLAIN_PARAMS_SHA256), 0; }\n"
+    )
+    subprocess.run(["cc", "-I", tmp_path, "-o", tmp_path / "main", tmp_path / "main.c"], check=True)
+    shown = subprocess.run([tmp_path / "main"], capture_output=True, text=True, check=True).stdout.split()
+    assert shown == [hystgen.__version__, parameters_sha256(model("plain").parameters)]
 
 
 @pytest.mark.parametrize("engine", ENGINES)

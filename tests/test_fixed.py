@@ -178,7 +178,7 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         }
     )  # fmt: skip
     for inverse in (0, 1):
-        state = reference.new_state(whole)
+        state = reference.new_state(whole, bool(inverse))
         with plain():
             operations.init(whole, state, inverse)
         first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from granted import granted_states
 from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
@@ -22,11 +23,12 @@ from hystgen.compensator.chain.layout import Codes, Compiled
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
+from hystgen.effects.drift import fixed as drift
+from hystgen.effects.drift.model import CurvedDrift
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
-from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 from hystgen.verification import sources
 
@@ -37,7 +39,7 @@ BOTH = pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 
 def model(text: str) -> Model:
     one = parse_parameters(text, "fixed.yaml")
-    how = Compensation(noise_gain=1e9)
+    how = one.emit.compensation.model_copy(update={"noise_gain": 1e9})
     return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
 
 
@@ -98,10 +100,10 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     drive = float(codes.drive_lsb)
     v = answers(numbers, given, True).astype(float)
     ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
-    wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
+    wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
-    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything"))
+    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything", "wider"))
     if name not in BRANCHED and not codes.condition:
         assert np.max(left) <= codes.inverse_rounding
     if name not in INVERSE_ALONE:
@@ -120,7 +122,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
     for seed in range(3):
         given, exact = record(numbers, codes, seed, 0.5)
         v = answers(numbers, given, True).astype(float)
-        wanted = Compensator(one.chain).drives(exact, ends) / drive  # type: ignore[arg-type]
+        wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(exact, ends) / drive  # type: ignore[arg-type]
         assert np.max(np.abs(v)) < 0.9 * numbers.tables.limits[slots.DRIVE_MAX]
         assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
 
@@ -170,7 +172,8 @@ def test_branches_are_mostly_the_same(arithmetic: str) -> None:
     given, exact = record(numbers, codes, 5, 0.5)
     drive = float(codes.drive_lsb)
     ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
-    left = np.abs(answers(numbers, given, True) - Compensator(one.chain).drives(exact, ends) / drive)  # type: ignore[arg-type]
+    wanted = Compensator(one.chain).drives(exact, ends)  # type: ignore[arg-type]
+    left = np.abs(answers(numbers, given, True) - wanted / drive)
     assert np.quantile(left, 0.9) <= codes.inverse_rounding < 0.1 * codes.inverse_error
 
 
@@ -182,6 +185,12 @@ OPERATIONS = {
 
 MAIN = """#include <stdio.h>
 #include <stdlib.h>
+void not_granted(int line);
+void not_granted(int line)
+{{
+    fprintf(stderr, "beyond what the range analysis says: line %d", line);
+    exit(1);
+}}
 #include "{name}.h"
 void hystgen_harness_{op}(const unsigned char *call, const {name}_real_t *x, {name}_real_t *answer,
     unsigned char *status, size_t count);
@@ -220,10 +229,13 @@ def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int
 @pytest.mark.parametrize("name", FIXED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
+    """States stay within what their formats were chosen by, as the proof takes for granted."""
     one = model(CHAINS[name])
     own = one.name
     options = emit_options(one, "inverse" if name in INVERSE_ALONE else "both", arithmetic)
     written = sources.write(tmp_path, one, options)
+    source = tmp_path / f"{own}.c"
+    source.write_text(granted_states(source.read_text(), compiled(one, arithmetic)[0], own))
     calls = module.calls_of(one.parameters, one.cascade, options)
     real, numbers, n = ARITHMETICS[arithmetic].number, one.tables(arithmetic, "loop"), 20_000
     for op in written.operators:
@@ -299,6 +311,40 @@ def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:
         u[:200] = (low + (high - low) * (0.5 + 0.3 * np.sin(0.1 * np.arange(200)))).astype(int)
         v, _ = reference.answers(numbers.tables, True, np.full(n, slots.OP_STEP, dtype=np.uint8), u)
         assert np.ptp(v[-2000:]) <= allowed
+
+
+def test_a_drift_is_counted_without_rounding() -> None:
+    """Slopes and changes that meet, turn or hardly move, up to where the clock stops, against fractions."""
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        rate = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-6, -1))
+        change = float(rng.choice([-1.0, 0.0, 1.0]) * 10.0 ** -rng.uniform(0, 5))
+        effect = CurvedDrift(name="drift", shape="curved", rate=rate, change=change)
+        signal, ahead = Fraction(10) / 2 ** int(rng.integers(15, 44)), int(rng.integers(0, 20))
+        far = float(20 / signal)
+        one = drift.numbers(effect, T, signal, far, ahead)
+        slope, twice, samples, _, bits, *_ = one.table
+        for n in (0, 1, 1000, 10**6, samples, 2 * samples):
+            counted = min(n, samples)
+            if n > samples == drift.MOST_SAMPLES:
+                continue
+            total = slope * counted + twice * (counted * (counted - 1) // 2)
+            whole, gained = total >> bits, twice * counted
+            state = np.array([[whole, total - (whole << bits), 0, gained, counted]])
+            for lead in (0, ahead):
+                table = np.array([one.table])
+                with jit.plain(), np.errstate(over="raise"):
+                    found = int(drift.clock_drift(table, state, 0, np.int64(lead)))
+                t = (n + lead) * Fraction(T)
+                exact = (Fraction(rate) + Fraction(change) / 2 * t) * t / signal
+                assert abs(found - min(max(exact, -Fraction(far)), Fraction(far))) <= one.error
+        state = np.zeros((1, 5), dtype=np.int64)
+        with jit.plain():
+            for _ in range(20):
+                drift.clock_tick(np.array([one.table]), state, 0)
+        counted = min(20, samples)
+        total = slope * counted + twice * (counted * (counted - 1) // 2)
+        assert int(state[0, drift.WHOLE]) * 2**bits + int(state[0, drift.PART]) == total
 
 
 @BOTH

@@ -58,6 +58,18 @@ def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path
     assert fuzz(tmp_path, SECONDS, name, arithmetic, engine) > 1000
 
 
+@needs_clang
+@pytest.mark.slow(one_in=4)
+@pytest.mark.parametrize(
+    ("name", "arithmetic"),
+    [("creeping", "q31"), ("lagging", "q15"), ("quick", "q31"), ("warm", "q15"), ("worn", "q31"), ("late", "q15"),
+     ("relaxing", "q31"), ("wider", "q15"), ("drifting", "q31"), ("drifting_late", "q15"), ("everything", "q15")],
+)  # fmt: skip
+def test_fuzzing_finds_nothing_in_models_with_effects(name: str, arithmetic: str, tmp_path: Path) -> None:
+    """With settings in between, against the reference."""
+    assert fuzz(tmp_path, min(SECONDS, 4.0), name, arithmetic, "loop") > 300
+
+
 def changed_entry(text: str) -> str:
     """One threshold by one unit in the last place."""
     start = text.index("plain_forward_segment[")

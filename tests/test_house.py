@@ -29,6 +29,7 @@ ROOMS = (
     "compensator",
     "cascade",
     "plants",
+    "portrait",
     "model",
     "records",
     "simulation",
@@ -215,7 +216,7 @@ def test_the_package_itself_imports_nothing() -> None:
 @pytest.mark.parametrize(
     ("walk", "most"),
     [
-        ("a recording's column v to weights", 28),
+        ("a recording's column v to weights", 29),
         ("a weight to its digit in float32 C", 31),
         ("a sample through the bit reference", 8),
         ("a recording to a named effect", 59),

@@ -41,7 +41,7 @@ def sixfold(x: Any) -> Any:
 
 
 def test_plain_is_python_all_the_way_down() -> None:
-    assert sixfold(7) == 42
+    assert (sixfold(7), tripled(7)) == (42, 21)
     with plain():
         assert sixfold(LARGE) == 6 * LARGE
         with plain():

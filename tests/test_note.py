@@ -75,8 +75,10 @@ class TestPage:
         named = re.findall(r"`(test_\w+\.py)::([\w:]+)`", PAGE.read_text(encoding="utf-8"))
         assert [name for name in named if name[1] not in names_in(name[0])] == []
 
-    def test_readme_leads_to_it(self) -> None:
+    def test_the_site_and_the_readme_lead_to_it(self) -> None:
         assert "(docs/note.md)" in (ROOT / "README.md").read_text(encoding="utf-8")
+        for page in ("explanation/memory.md", "howto/closed-loop.md"):
+            assert "(../note.md)" in (ROOT / "docs" / page).read_text(encoding="utf-8")
 
 
 def draw(gallery: Path, folder: Path) -> subprocess.CompletedProcess[str]:

@@ -25,10 +25,10 @@ from recordings import brute_output, brute_plays, noisy, wander, write_csv
 from scipy.stats import binned_statistic
 
 import hystgen
-from hystgen.basics import extras
+from hystgen.basics import drawing, extras
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
-from hystgen.report import drawing, fit_figures
+from hystgen.report import fit_figures
 from hystgen.report import identification as pages
 from hystgen.report.fit_figures import Shown
 
@@ -237,6 +237,7 @@ class TestPage:
         assert f"{low:.3g} to {high:.3g} um, {100 * low / row.output_range:.3g}" in lead
         assert "it is invertible" in lead
         assert "hystgen emit axis.yaml -o firmware/\n" in lead
+        assert "Your next step: write the C." in lead
 
     def test_counts_are_those_put_in(self, page: Page, fitted: tuple[Fit, Record, Record]) -> None:
         first, other = table(page, "What was done to the data")

@@ -58,10 +58,14 @@ def test_neither_of_two_is_a_further_one(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.parametrize(("bare", "enough"), [(True, 1.166), (False, 1.414)])
 @pytest.mark.parametrize("left", [1.0, 1.1, 1.3, 1.5])
-def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(bare: bool, enough: float, left: float) -> None:
+@pytest.mark.parametrize("of_fitted", [False, True])
+def test_what_is_left_is_enough_where_all_but_the_noise_of_it_is(
+    bare: bool, enough: float, left: float, of_fitted: bool
+) -> None:
     """A first effect removes 0.6 times what it leaves, a further one as much as it leaves; neither less than noise."""
-    now: Any = SimpleNamespace(bare=bare)
-    records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: left * NOISE)
+    held, fitted = (NOISE, left * NOISE) if of_fitted else (left * NOISE, NOISE)
+    now: Any = SimpleNamespace(bare=bare, errors=lambda _: [np.full(4, fitted)])
+    records: Any = SimpleNamespace(noise=NOISE, residual=lambda _: held, to_fit=[])
     assert selection.leaves_enough(now, records) is (left > enough)
 
 

@@ -182,7 +182,7 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
-    code, state = reference.operations(numbers), reference.new_state(numbers)
+    code, state = reference.operations(numbers), reference.new_state(numbers, inverse)
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range

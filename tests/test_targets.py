@@ -472,17 +472,18 @@ def test_corner_lists_are_as_deep_as_they_can_be(bench: ModuleType) -> None:
     assert {1, 2, 4, 8, 16} <= set(found)
 
 
+@pytest.mark.slow(one_in=4)
 @pytest.mark.parametrize(
     ("core", "n", "arithmetic", "operator"),
     [
         *(
             (core, 4, arithmetic, operator)
+            for operator in ("forward", "inverse")
             for core in ("cortex-m4f", "cortex-m0plus")
             for arithmetic in ("float32", "q31", "q15")
-            for operator in ("forward", "inverse")
         ),
-        ("cortex-m4f", 16, "float32", "forward"),
         ("cortex-m4f", 16, "float32", "inverse"),
+        ("cortex-m4f", 16, "float32", "forward"),
         ("cortex-m4f", 64, "q31", "inverse"),
     ],
 )
@@ -524,6 +525,7 @@ def test_round_numbers_are_no_dearer_than_what_was_asked_for(
     assert 200 < dearest <= bench.GOALS[16][bench.FROM_0]
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("n", [16, 128])
 def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> None:
     """A range from 0 on, as piezo drives have: once it has been up, references below what the plays leave at 0 get 0.

@@ -51,6 +51,7 @@ UNITS = (
     ("bumpy", "float32", "loop"),
     ("viscous_twin", "float32", "loop"),
     ("late", "float32", "loop"),
+    ("late", "q31", "loop"),
     ("relaxing", "float32", "loop"),
     ("lagging", "q15", "loop"),
     ("quick", "q31", "loop"),
@@ -58,7 +59,10 @@ UNITS = (
     ("worn", "q15", "loop"),
     ("straight", "q31", "loop"),
     ("relaxing", "q15", "loop"),
+    ("wider", "q31", "loop"),
+    ("viscous_twin", "q15", "loop"),
     ("drifting", "float32", "loop"),
+    ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
@@ -93,7 +97,8 @@ def _blocks(values: SimpleNamespace) -> list[str]:
     if not values.variant.chain:
         return []
     blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
-    return [file for file in blocks if not file.startswith("preview") or len(values.numbers.tap)]
+    missing = {"preview": not len(values.numbers.tap), "delay": not values.numbers.delay.samples}
+    return [file for file in blocks if not missing.get(file.split(".")[0].split("_")[0])]
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from stage import DAMPERS, FULL, SAMPLE_TIME, Stage, turns
 
 import hystgen
+from hystgen.basics import drawing
 from hystgen.closed_loop import CompiledC
 from hystgen.parameters.files import dump_parameters
-from hystgen.report import drawing
 
 Array = NDArray[np.float64]
 

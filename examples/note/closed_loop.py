@@ -20,8 +20,8 @@ import numpy as np
 from printed import ESTIMATE_2, STAGE_1, MismatchError, save
 from scipy import signal
 
+from hystgen.basics import drawing
 from hystgen.closed_loop import CompiledC, Loop, PIController, Response
-from hystgen.report import drawing
 
 HERE = Path(__file__).resolve().parent
 PLANT = ([8.8e16], [1.0, 1.6e4, 6.6e8, 5.3e12, 8.8e16])

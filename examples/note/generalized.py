@@ -11,9 +11,9 @@ import numpy as np
 import printed as note
 
 from hystgen import DeadZone
+from hystgen.basics import drawing
 from hystgen.front.tanh import kernels
 from hystgen.plays import operators
-from hystgen.report import drawing
 
 
 def make(folder: Path) -> None:

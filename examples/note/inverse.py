@@ -10,7 +10,7 @@ import numpy as np
 import printed as note
 
 from hystgen import PI
-from hystgen.report import drawing
+from hystgen.basics import drawing
 
 
 def make(folder: Path) -> None:

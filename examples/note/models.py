@@ -9,8 +9,8 @@ import numpy as np
 import printed as note
 
 from hystgen import PI
+from hystgen.basics import drawing
 from hystgen.plays import density, operators
-from hystgen.report import drawing
 
 
 def make(folder: Path) -> None:

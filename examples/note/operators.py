@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import printed as note
 
+from hystgen.basics import drawing
 from hystgen.plays import elastoplastic, operators
-from hystgen.report import drawing
 
 
 def make(folder: Path) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import hystgen
 from hystgen import PI, Cascade, DeadZone, TanhEnvelope
-from hystgen.report import drawing
+from hystgen.basics import drawing
 
 Array = NDArray[np.float64]
 

@@ -45,6 +45,11 @@ def error(x: float | Fraction) -> float:
     return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
 
 
+def lifted(x: float, bits: int) -> int:
+    """Of `bits` that a product with x is to add, those that it leaves out so that it is one with a factor."""
+    return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
+
+
 @jit
 def times(x: Any, mantissa: Any, shift: Any) -> Any:
     """x times a factor, to the nearest whole number; for |x| < LARGEST."""

@@ -35,9 +35,9 @@ R = TypeVar("R")
 # Python because there is no numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling for this machine, once: about 20 s, for C of models with effects two minutes"
+ONCE = "compiling for this machine, once: about 20 s, for C of models with effects 40 s"
 EVERY_TIME = (
-    "compiling for this machine: about 20 s, for C of models with effects two minutes, every time, since no folder for "
+    "compiling for this machine: about 20 s, for C of models with effects 40 s, every time, since no folder for "
     "the result can be written to; set NUMBA_CACHE_DIR to one that can"
 )
 
@@ -80,14 +80,25 @@ class Jit(Generic[P, R]):
         if _plain.get():
             return self.py_func(*given, **named)
         if _has_numba():
-            return self.dispatcher(*given, **named)  # type: ignore[no-any-return]
+            return self.entry(*given, **named)  # type: ignore[no-any-return]
         _announce(interpreted)
         with plain():
             return self.py_func(*given, **named)
 
     @functools.cached_property
-    def dispatcher(self) -> Any:
-        """The function compiled by numba."""
+    def entry(self) -> Any:
+        """The function compiled by numba, to be called from Python."""
+        return self._dispatcher("entry", self.targetoptions)
+
+    @functools.cached_property
+    def inner(self) -> Any:
+        """The function compiled by numba, to be called from compiled code only.
+
+        What takes a model's tables apart for it would be more code than the function itself.
+        """
+        return self._dispatcher("inner", {**self.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
+
+    def _dispatcher(self, kind: str, options: dict[str, Any]) -> Any:
         import numba
 
         _listen()
@@ -97,8 +108,8 @@ class Jit(Generic[P, R]):
             function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
         )
         twin.__module__ = function.__module__
-        twin.__qualname__ = f"{function.__name__}_{self.mark}"
-        made = numba.njit(**self.targetoptions)(twin)
+        twin.__qualname__ = f"{function.__name__}_{kind}_{self.mark}"
+        made = numba.njit(**options)(twin)
         with contextlib.suppress(RuntimeError):  # no folder that can be written to
             made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
         return made
@@ -106,7 +117,7 @@ class Jit(Generic[P, R]):
     @property
     def _numba_type_(self) -> Any:
         """Numba's type of the function where another one calls it."""
-        return self.dispatcher._numba_type_
+        return self.inner._numba_type_
 
     @functools.cached_property
     def mark(self) -> str:

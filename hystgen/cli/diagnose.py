@@ -25,7 +25,7 @@ from hystgen.cli.common import (
 
 def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | None, sample_time: float | None) -> None:
     """Write the drive records that a diagnosis needs; prints the files and the command to run on the measured ones."""
-    from hystgen.report import drawing
+    from hystgen.basics import drawing
     from hystgen.report.plan import plan
 
     def run() -> None:
@@ -81,11 +81,10 @@ def diagnose(
     if max_rate is not None:
         raise click.UsageError("--max-rate is for drives; give --plan with it")
     from hystgen import diagnosis
-    from hystgen.basics import extras
+    from hystgen.basics import drawing, extras
     from hystgen.effects import load_user_effects
     from hystgen.emission import files
     from hystgen.report import diagnosis as report
-    from hystgen.report import drawing
 
     model = load_model(params, effects)
     guarded(params, partial(extras.require_fit, "diagnose"))

@@ -92,6 +92,7 @@ def identify(
 
     def run() -> None:
         from hystgen import records
+        from hystgen.basics import drawing
         from hystgen.emission import files
         from hystgen.identification import settings
         from hystgen.report import plots
@@ -101,7 +102,7 @@ def identify(
             if file:
                 writing.check_writable(file)
         if plot:
-            plots.check_path(plot)
+            drawing.check_path(plot)
         if report:
             pages.check_folder(report)
             files.check(Path(report), pages.names())

@@ -19,15 +19,16 @@ def show(params: str, plot: str | None, effects: tuple[str, ...]) -> None:
 
     Example: hystgen show stage_x.yaml --plot stage_x.svg
     """
-    from hystgen.report import plots, properties
+    from hystgen.basics import drawing
+    from hystgen.report import properties
 
     model = load_model(params, effects)
     if plot:
         keep_inputs([plot], [params])
-        guarded(params, partial(plots.check_path, plot))
+        guarded(params, partial(drawing.check_path, plot))
     console.say(guarded(params, lambda: properties.properties(model)))
     for warning in properties.warnings(model):
         console.note(f"warning: {warning}")
     if plot:
-        guarded(params, lambda: plots.show_model(model, plot))
+        guarded(params, lambda: model.plot(plot))
         console.say(plot)

@@ -37,7 +37,7 @@ def track(
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """
     from hystgen import records, tracking
-    from hystgen.basics import extras
+    from hystgen.basics import drawing, extras
     from hystgen.report import plots
 
     model = load_model(params, effects)
@@ -45,7 +45,7 @@ def track(
     visited = history_values(history)
     if plot:
         keep_inputs([plot], [params, *data])
-        guarded(params, partial(plots.check_path, plot))
+        guarded(params, partial(drawing.check_path, plot))
     read = guarded(params, partial(records.read_records, data, need=("v", "y"), **reading_options(**reading)))
     for record in read:
         for note in record.notes:

@@ -61,10 +61,10 @@ def _chain_operations(
     return chain_step.made_of(own.BLOCKS, own.CODES, drives, outputs)
 
 
-def new_state(t: Tables | FixedTables | ChainTables) -> Any:
-    """Memory for one instance; `init` of its operations gives it its values."""
+def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
+    """Memory for one instance of an operator; `init` of its operations gives it its values."""
     if isinstance(t, ChainTables):
-        return chain_step.new_state(t)
+        return chain_step.new_state(t, inverse)
     if t.engine == LOOP:
         return loop.new_state(t)
     memory = new_fixed_memory if t.fixed else new_memory
@@ -85,7 +85,7 @@ def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
-    code, state = operations(t), new_state(t)
+    code, state = operations(t), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
     with contextlib.nullcontext() if compiled else jit.plain():

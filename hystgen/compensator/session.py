@@ -49,7 +49,7 @@ class Session:
         self.tables = self._build()
         self._range, self._cascade = cascade.input_range, cascade
         self._code = reference.operations(self.tables)
-        self.state = reference.new_state(self.tables)
+        self.state = reference.new_state(self.tables, bool(self._inverse))
         self.init()
 
     def init(self) -> None:

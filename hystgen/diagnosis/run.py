@@ -32,6 +32,7 @@ from hystgen.records import Record, Source, read_records, several
 if TYPE_CHECKING:
     from hystgen.cascade import Cascade
     from hystgen.effects.base import Effect
+    from hystgen.model import ModelSource
     from hystgen.parameters.files import Parameters
 
 Array = NDArray[np.float64]
@@ -43,7 +44,7 @@ STEPS = 120
 
 @arguments.checked
 def diagnose(
-    parameters: Any,
+    parameters: ModelSource,
     records: Source | Iterable[Source],
     *,
     holdout: Source | Iterable[Source] = (),
@@ -58,15 +59,24 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a nominal model is missing.
 
-    `parameters`: a `Model` or a parameter file; `records`: measured, to be fitted; `holdout`: records with other
-    waveforms that judge; without them, or where too little of them can be compared, every third record, or the end of
-    one, is held out. `history`: drive values visited before every record, ignored where the starts of the records
-    contradict it; `rest`: seconds of pause after them. `skip`: seconds at the start of every record that are not
-    compared, though their drive counts. `effects`: further effects that take part.
+    `parameters`: a `Model`, a parameter file, or what `identify` found; `records`: measured, to be fitted, each as
+    `identify` takes them; `holdout`: records with other waveforms that judge; without them, or where too little of them
+    can be compared, every third record, or the end of one, is held out. `history`: drive values visited before every
+    record, ignored where the starts of the records contradict it; `rest`: seconds of pause after them. `skip`: seconds
+    at the start of every record that are not compared, though their drive counts. `effects`: further effects that take
+    part.
 
     The nominal model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
     weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance does
     not explain. Raises RecordError, IdentificationError, ValueError.
+
+    >>> import numpy as np, hystgen
+    >>> t = np.linspace(0.0, 4.0, 4000)
+    >>> v = 5.0 * np.sin(12.0 * t) * np.exp(-0.3 * t)
+    >>> model = hystgen.load("examples/note/example_1.yaml")
+    >>> y = model.simulate(v) + 0.01 * np.random.default_rng(1).standard_normal(len(t))
+    >>> hystgen.diagnose(model, {"t": t, "v": v, "y": y})
+    <Diagnosis example_1: nothing_missing>
     """
     from hystgen.basics.progress import Progress
     from hystgen.effects import Effect

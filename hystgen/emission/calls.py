@@ -12,13 +12,13 @@ from hystgen.basics import arguments
 from hystgen.compensator import engines
 from hystgen.emission import files, module, worth
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
-from hystgen.model import Model, as_model, check_arithmetic
+from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
 
 if TYPE_CHECKING:
     from hystgen.emission.stale import Difference
 
-Sources: TypeAlias = "Model | str | os.PathLike[str] | Iterable[Model | str | os.PathLike[str]]"
+Sources: TypeAlias = "ModelSource | Iterable[ModelSource]"
 
 
 def _models(source: Sources) -> list[Model]:
@@ -108,7 +108,9 @@ def check_names(models: Sequence[Model]) -> None:
 
 @arguments.taking(emit_options, "emit")
 def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[Path]:
-    """Write the C files of a model (or parameter file), or of several, into folder `output` and return their paths.
+    """Write the C files of a model, or of several, into folder `output` and return their paths.
+
+    `source`: a model, a parameter file, what `identify` or `diagnose` found, or a list of these.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
     loop; `optimize` auto, speed or size, for what `engine` auto chooses; `layout` self-contained, shared-runtime or

@@ -26,6 +26,7 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.effects.drift import compensator as drift
+from hystgen.effects.drift import fixed as drift_fixed
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
 from hystgen.plays import slots
@@ -104,10 +105,10 @@ def _table(declared: str, entries: Sequence[str]) -> str:
     lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
     return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
-def sides(t: ChainTables) -> tuple[list[Block], list[Block]]:
-    """The blocks in front of the plays, from the drive on, and those behind them."""
+def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
+    """The blocks of an operator in front of the plays, from the drive on, and those behind them."""
     found: list[list[Block]] = []
-    for side in blocks.sides(t):
+    for side in blocks.sides(t, operator):
         counts: Counter[str] = Counter()
         found.append([])
         for constants in side:
@@ -205,7 +206,7 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
         ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
         ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
-        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""), ("HALF", moving.HALF, ""),
+        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
         ("SEEN", moving.SEEN, "share of a step's way at which the input counts as standing still"),
     )  # fmt: skip
     constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
@@ -214,11 +215,21 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     return arrays, [*constants, *counts]
 
 
-def _relaxing(t: FixedMovingTables, prefix: str) -> list[str]:
-    """Tables of viscous plays in fixed point."""
-    return [
-        *(f"static const {prefix}_factor_t {prefix}_relaxing_{name} = {{{_entries(row, 'f')[1:-1]}}};\n"
-          for name, row in (("late", t.late), ("kept", t.kept))),
+def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> list[str]:
+    """Tables of plays that depend on the rate in fixed point."""
+    kind = f"static const {prefix}_factor_t {prefix}"
+    if not t.scanned:
+        names = ("late", "kept") if t.moves == moving.RELAXING else ("wider",)
+        return [
+            constant(f"{prefix}_factor_t {prefix}_{name}[{len(rows)}]", [f"    {_entries(row, 'f')}," for row in rows])
+            for name, rows in zip(names, (t.first, t.second), strict=False)
+        ]
+    factors = [
+        f"{kind}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
+        for name, rows in (("late", t.first), ("kept", t.second))
+    ]
+    return factors if not inverse else [
+        *factors,
         table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
         table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
         table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
@@ -242,10 +253,10 @@ class Glue:
 def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
-    before, after = sides(t)
-    clocks = [Block(constants, "clock") for constants in drift.constants(t.clock)]
+    named = {op: sides(t, op) for op in operators}
+    clocks = [Block(constants, "clock") for constants in blocks.clocks(t)]
     functions = [
-        line for op in operators for line in _functions(op, before, after, behind, len(t.tap) > 0, clocks)
+        line for op in operators for line in _functions(op, t, *named[op], behind, clocks)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -254,8 +265,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "forward": every,
         "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
-    arrays = [text for block in (*before, *after, *clocks) for text in block.arrays(prefix)]
-    if len(t.tap):
+    own = {op: [*before, *after, *clocks] for op, (before, after) in named.items()}
+    largest = max(own.values(), key=len)  # the forward operator has what the inverse has, and modes
+    arrays = [text for block in largest for text in block.arrays(prefix)]
+    if "forward" in operators and t.delay.samples and t.fixed:
+        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{_entries(t.delay.share, 'f')[1:-1]}}};\n")
+    if "inverse" in operators and len(t.tap):
         arrays.append(
             constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
             if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
@@ -268,18 +283,23 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_FALLING": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
-    constants += [("LEAD", operand(row[drift.MOST_AHEAD]), "samples that references come ahead") for row in t.clock]
+    farthest = (drift_fixed if t.fixed else drift).MOST_AHEAD
+    constants += [("LEAD", operand(row[farthest]), "samples that references come ahead") for row in t.clock]
+    constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
+    if t.delay.samples and not t.fixed:
+        constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
     if isinstance(t.moving, FixedMovingTables):
-        arrays += _relaxing(t.moving, prefix) if t.moving.used else []
+        arrays += _fixed_moving(t.moving, prefix, "inverse" in operators) if t.moving.used else []
+        constants.append(("LARGEST_INPUT", operand(t.moving.farthest), "of the plays, for a search"))
     elif t.moving.used:
         more, numbers = _moving(t.moving, prefix)
         arrays, constants = arrays + more, constants + numbers
-    searched = t.moving.used and not t.moving.scanned
-    both, n = [*before, *after, *clocks], len(t.threshold) - 1
+    searched = t.moving.used and not t.moving.scanned and not t.fixed
+    n = len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
-    fields = {op: instance(op, both, len(t.tap), n, kept, searched) for op in operators}
+    fields = {op: instance(op, t, own[op], n, kept, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
@@ -308,12 +328,14 @@ _PLAYS = "play 0 is the input of the plays"
 _KEPT = "; behind them what each has lost"
 
 
-def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int, moving: bool) -> list[Field]:
+def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
-    inverse = op == "inverse"
+    inverse, taps = op == "inverse", len(t.tap)
+    slew, waiting = t.slew and not inverse, 0 if inverse else t.delay.samples
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
+        *([Field("real", "reached", "what the amplifier made of it")] if slew else []),
         Field("fine", "drive", "what arrived of it in front of the plays"),
         Field("signal", "level", "sum of the plays"),
         Field("signal", "output", "what the output side made of it"),
@@ -321,6 +343,7 @@ def instance(op: str, blocks: Sequence[Block], taps: int, plays: int, kept: int,
         Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
         *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
+        *([Field("real", "waiting", "drives", waiting), Field("status", "oldest", "of them")] if waiting else []),
         Field("flag", "ascending", "direction of the drive's last move"),
         Field("flag", "moving", "a drive was applied"),
         *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),
@@ -347,14 +370,14 @@ def _function(comment: str, head: str, lines: Sequence[str]) -> str:
 
 def _functions(
     op: str,
+    t: ChainTables,
     before: Sequence[Block],
     after: Sequence[Block],
     behind: Sequence[dict[str, Any]],
-    ahead: bool,
     clocks: Sequence[Block],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
-    inverse = op == "inverse"
+    inverse, ahead = op == "inverse", len(t.tap) > 0
     self_t = f"hystgen_{op}_t *self"
 
     def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
@@ -388,7 +411,7 @@ def _functions(
     )
     if inverse:
         lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
-        lines = [f"const hystgen_real_t lead = {lead};"] * len(clocks)
+        lines = [f"const hystgen_signal_t lead = {lead};"] * len(clocks)
         lines.append(f"hystgen_signal_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
         lines += [
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
@@ -401,7 +424,7 @@ def _functions(
         )
         put = [
             line for each in clocks
-            for line in (f"const hystgen_real_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
+            for line in (f"const hystgen_signal_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
                          f"self->{each.name}.lead = lead > HYSTGEN_LEAD ? HYSTGEN_LEAD : lead;")
         ]  # fmt: skip
         put.append("hystgen_preview_put(self->line, &self->filled, y);")
@@ -425,6 +448,8 @@ def _functions(
         f"static void hystgen_{op}_settings_init({self_t})",
         [
             "self->offset = 0;",
+            *(["self->reached = 0;"] if t.slew and not inverse else []),
+            *(["hystgen_delay_rest(self->waiting, &self->oldest, 0);"] if t.delay.samples and not inverse else []),
             *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
             *(f"self->{each.name}.lead = 0;" for each in clocks),
             *(f"hystgen_heat_init(&self->{each.name});" for each in heat),

@@ -186,13 +186,13 @@ def estimate(
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    kinds = [each.kind for each in blocks.every(numbers)] if isinstance(numbers, ChainTables) else []
+    kinds = [each.kind for each in blocks.every(numbers, "forward")] if isinstance(numbers, ChainTables) else []
     memory, avr = (_memory(cascade, options, text, plays, layout, fields, kinds) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
-        more = costs.code_bytes(numbers, options.arithmetic)
-        both = 2 if options.operator == "both" else 1
-        code = {core: size + both * more[core] for core, size in code.items()}
+        for op, _ in worst:
+            more = costs.code_bytes(numbers, options.arithmetic, op)
+            code = {core: size + more[core] for core, size in code.items()}
     return Cost(code, memory, avr if known else None, worst)
 
 
@@ -208,16 +208,18 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     a signal takes two."""
     kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
     envelopes = kinds.count(slots.TANH)
-    absorbed, solved = (sum(each.products[way] for each in blocks.every(t)) for way in (0, 1))
+    everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
+    forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * bool(t.delay.samples)
+    absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
     if t.fixed:
         stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.coefficient.shape[1]
         viscous = 4 * (len(t.threshold) - 1) * t.moving.used
         return {
-            "forward": absorbed + stages + viscous,
+            "forward": forward + stages + viscous,
             "inverse": absorbed + solved + stages + viscous + 2 * len(t.tap),
         }
     stages = len(kinds) + envelopes
-    return {"forward": absorbed + stages, "inverse": absorbed + solved + stages + len(t.tap)}
+    return {"forward": forward + stages, "inverse": absorbed + solved + stages + len(t.tap)}
 
 
 def _memory(

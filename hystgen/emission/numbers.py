@@ -15,7 +15,7 @@ from hystgen.basics.names import comment_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
-from hystgen.compensator.chain.bounds import chain_bounds
+from hystgen.compensator.chain.bounds import chain_bounds, condition
 from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
@@ -92,6 +92,7 @@ def chain_fields(
         "forward_max_error": operand(float_tables.upward(bounds.forward, dtype)),
         "inverse_max_error": operand(float_tables.upward(bounds.inverse, dtype)) if options.inverse else "",
         "inverse_rounding_error": operand(float_tables.upward(bounds.rounding, dtype)) if options.inverse else "",
+        "condition": condition(compiled),
         "glue": glue,
     }
 
@@ -106,7 +107,7 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
     curves, counts = _curves(plays, name, prefix, options) if plays.fronts else ([], [])
     pointers = _fixed_loop_pointers(plays, name, options)
     own = [_loop_tables(pointers, plays, name, prefix)]
-    if tables.moving.used:
+    if tables.moving.scanned and options.inverse:
         others = [f"{name}_relaxing_{part}" for part in ("slope", "reciprocal", "shift")]
         own.append(_loop_tables([*pointers[:2], *others, *pointers[5:]], plays, name, prefix, "relaxing"))
     about = _limits(plays, [*_fixed_constants(plays), *counts, *glue.constants])

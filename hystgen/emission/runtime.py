@@ -30,11 +30,11 @@ FLOAT_KERNELS = (
     "loop_solve.c",
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
-CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "preview.c", "preview_float.c")
+CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c")
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
-    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "preview.c",
-    "preview_fixed.c", "bend.c", "stops.c",
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "mode_fixed.c",
+    "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
 )  # fmt: skip
 """What models with effects have of their own, also beside a shared run time."""
 
@@ -171,8 +171,8 @@ class Variant:
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
     `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `ages`: one is a gain that follows the travel, `moves` and `bends`: how plays move and are bent where that
-    is not as in engine loop.
+    a rate, `waits`: it does not act at once, `ages`: one is a gain that follows the travel, `moves` and `bends`: how
+    plays move and are bent where that is not as in engine loop.
     """
 
     engine: str
@@ -184,6 +184,7 @@ class Variant:
     start_list: bool = False
     chain: bool = False
     slew: bool = False
+    waits: bool = False
     ages: bool = False
     moves: str = ""
     bends: str = ""
@@ -214,14 +215,21 @@ class Variant:
         kind = "fixed" if self.fixed else "float"
         start = "loop_start_list.c" if self.start_list else "loop_start.c"
         if self.chain:
-            slew, more = "chain_slew.c" if self.slew else "chain_free.c", ("chain_ageing.c",) if self.ages else ()
+            slew = "chain_slew.c" if self.slew else "chain_free.c"
+            delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
             kept = () if self.moves == "dashpot" else ("moved_kept.c",)
-            moving = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
-            ending = "_fixed" * self.fixed
-            alone = "relaxing" if self.moves else "plays"
-            plays = moving if self.bends else (f"chain_{alone}{ending}.c",)
+            bent = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
+            searched = ("moved_searched_fixed.c",) if self.bends else ()
+            moving = ("stretched_fixed.c", f"moved_{self.moves}_fixed.c", *searched, "chain_moving_fixed.c")
+            plays: tuple[str, ...]
+            if not self.moves and not self.bends:
+                plays = ("chain_plays_fixed.c" if self.fixed else "chain_plays.c",)
+            elif self.fixed:
+                plays = moving
+            else:
+                plays = bent if self.bends else ("chain_relaxing.c",)
             finer = "chain_finer.c" if self.finer else "chain_whole.c"
-            return (start, f"loop_{front}.c", slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
+            return (start, f"loop_{front}.c", delay, slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

@@ -221,7 +221,7 @@ def _jobs(
             raise ValueError(f"holdout {pattern!r} would be that of every unit; write {{unit}} for the unit's name")
     paths: dict[Path, Path] = {}
     for source in several(sources):
-        if isinstance(source, Record):
+        if not isinstance(source, str | os.PathLike):
             raise TypeError("a fleet is made of files, not of records in memory; fit those with hystgen.identify")
         paths |= {path.resolve(): path for path in _expanded(os.fspath(source))}
     jobs = []

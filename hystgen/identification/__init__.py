@@ -80,7 +80,8 @@ def identify(
 ) -> Fit:
     """Fit a model to measured records.
 
-    `records`: one or several `Record`s or paths (read with `columns`, `sample_time`, `delimiter`), each with a free
+    `records`: one or several of: a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y) of shape
+    (N,), an array (N, 3), all read with `columns`, `sample_time` (s), `delimiter`, or a `Record`; each gets a free
     offset. `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest
     of them whose held-out error is within 3 % of the best. `thresholds`: a number of plays without r_0, or a list of
     thresholds (behind a memoryless part, which keeps the length of the drive range and the place of 0, in its output);
@@ -100,6 +101,16 @@ def identify(
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
     actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
+
+    >>> import numpy as np, hystgen
+    >>> t = np.linspace(0.0, 2.0, 2001)
+    >>> v = 50.0 - 50.0 * np.cos(2.0 * np.pi * t)
+    >>> y = hystgen.PI([0.0, 10.0], [0.12, 0.03]).simulate(v)
+    >>> fit = hystgen.identify({"t": t, "v": v, "y": y}, thresholds=[0, 10], name="stage_x")
+    >>> fit.model
+    <Model stage_x: 1 play, 0 to 100, invertible>
+    >>> [round(weight, 3) for weight in fit.parameters.model.pi.weights]
+    [0.12, 0.03]
     """
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
@@ -155,9 +166,8 @@ def identify(
     with parallel.one_thread():
         sure = quality.intervals(fitted, compared, errors, held_errors)
     offset = rounded(errors[0].offset, pi.DIGITS)
-    return Fit(
-        _parameters(name, units, drive, fitted, offset, compared[0]), tuple(rows), tuple(reported), sure, masks, before
-    )
+    parameters = _parameters(name, units, drive, fitted, offset, compared[0])
+    return Fit(parameters, tuple(rows), tuple(reported), sure, masks, before, tuple(read))
 
 
 def check_options(

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import textwrap
 import warnings as python_warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import arguments
+from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import counted
 from hystgen.identification import faults, joint, quality, reduction
 from hystgen.identification.quality import Intervals, Row, table
@@ -20,6 +21,7 @@ from hystgen.identification.reduction import Course, Start
 from hystgen.records import Record, Source, read_record, write_atomically
 
 if TYPE_CHECKING:
+    from hystgen.model import Model
     from hystgen.parameters.files import Parameters
 
 
@@ -27,13 +29,14 @@ HELD_OUT = 0.25
 """Share of each record, its end, that is held out for the figures when no record is given for that."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fit:
     """A fitted model and how good it is.
 
     `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
     sentence each; `intervals`: 95 % confidence intervals; `used`: what was compared of each record, those held out
-    last; `history`: drive values visited before each record, None when unknown.
+    last; `history`: drive values visited before each record, None when unknown; `records`: those that `used` is about;
+    `draw`: makes the figure of `plot`, None where nothing is drawn.
     """
 
     parameters: Parameters
@@ -42,6 +45,34 @@ class Fit:
     intervals: Intervals
     used: tuple[Used, ...]
     history: tuple[float, ...] | None = None
+    records: tuple[Record, ...] = field(default=(), compare=False)
+    draw: Callable[[Fit], Any] | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        row = next((row for row in self.rows if row.part == "held out"), self.rows[-1])
+        plays = counted(len(self.parameters.model.pi.thresholds) - 1, "play")
+        unit = f" {self.unit}" if self.unit else ""
+        return f"<Fit {self.parameters.name}: {plays}, {row.part} rms {row.rms:.4g}{unit} ({row.rms_percent:.3g} %)>"
+
+    def _repr_html_(self) -> str:
+        return display.block(repr(self), self.table(), None if self.draw is None else partial(self.draw, self))
+
+    @property
+    def model(self) -> Model:
+        """The fitted model, to simulate, invert and emit."""
+        from hystgen.model import Model
+
+        return Model(self.parameters)
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+        """A picture: loop of a record, held out if there is one, with the model's; residuals along time; weights.
+
+        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg, it is written there as well.
+        Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
+        """
+        if self.draw is None:
+            raise drawing.PlotError("nothing draws this fit; use the one that hystgen.identify returns")
+        return drawing.picture(partial(self.draw, self), path)
 
     def table(self) -> str:
         """The fit table as text: rms and largest error, absolute and in % of the output range."""

@@ -1,8 +1,8 @@
 """The operators of the Prandtl-Ishlinskii literature, sample by sample, as they are defined.
 
 These are the definitions that identification builds its regressors from and that everything faster is tested
-against. Signals are one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note named in
-the README.
+against. Signals are one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note that
+`docs/note.md` names.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ import io
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from hystgen.basics import arguments, console
 from hystgen.basics.problems import RecordError, printable
@@ -27,14 +27,16 @@ from hystgen.records.array_files import read_mat, read_npz
 from hystgen.records.columns import LISTED, agreed_units, headers, parse_columns
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
+from hystgen.records.memory import Columns, in_memory
+from hystgen.records.memory import read as read_memory
 from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import SHORTEST, CountingFile, Reading, Table, repaired
 from hystgen.records.record import LARGEST, Record, no_value
 from hystgen.records.tdms import read_tdms
 from hystgen.records.writing import columns_text, write_columns
 
-Source = Record | str | os.PathLike[str]
-"""A record, or the path of a data file."""
+Source = Record | str | os.PathLike[str] | Columns
+"""A record, the path of a data file, or its samples in memory."""
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -61,7 +63,7 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
 
 
 def read_records(
-    sources: Iterable[Record | str | os.PathLike[str]],
+    sources: Source | Iterable[Source],
     columns: Mapping[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
@@ -71,27 +73,34 @@ def read_records(
 ) -> list[Record]:
     """Read several data files as `read_record` does; records that are in memory already are kept.
 
-    `points`: a file without a time is one of points taken one by one, and not refused. `progress`: says on stderr once
-    how files were understood ("read as: .."), with a bar on a terminal when it takes
+    Samples in memory are called `record`, or `record 1`, `record 2`, .. where there are several. `points`: samples
+    without a time are points taken one by one, and not refused.
+
+    `progress`: says on stderr once how files were understood ("read as: .."), with a bar on a terminal when it takes
     more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
     arguments.
     """
     everything = several(sources)
     _check_options(columns, sample_time, delimiter)
     found: list[Record] = []
+    unnamed = [k for k, source in enumerate(everything) if not isinstance(source, Record | str | os.PathLike)]
     refused: list[str] = []
     ways: dict[str, list[str]] = {}
     with Progress(sum(_size(source) for source in everything), progress, "reading") as bar:
-        for source in everything:
+        for k, source in enumerate(everything):
             try:
                 if isinstance(source, Record):
                     _check_arrays(source)
-                else:
+                    record = source
+                elif isinstance(source, str | os.PathLike):
                     path = arguments.path("a record", source)
-                    source = _read(path, columns, sample_time, delimiter, need, bar.tick, points)
-                    if source.read_as:
-                        ways.setdefault(source.read_as, []).append(source.name)
-                found.append(source)
+                    record = _read(path, columns, sample_time, delimiter, need, bar.tick, points)
+                else:
+                    name = f"record {unnamed.index(k) + 1}" if len(unnamed) > 1 else "record"
+                    record = read_memory(source, name, columns, sample_time, need)
+                if record.read_as:
+                    ways.setdefault(record.read_as, []).append(record.name)
+                found.append(record)
             except RecordError as error:
                 refused.extend(error.problems)
     if progress:
@@ -104,21 +113,23 @@ def read_records(
 
 
 def read_record(
-    path: str | os.PathLike[str],
+    path: Source,
     columns: Mapping[str, str] | None = None,
     sample_time: float | None = None,
     delimiter: str | None = None,
     need: Sequence[str] = ("v", "y"),
 ) -> Record:
-    """Read one data file.
+    """Read one data file, or make a record of samples in memory.
 
-    `columns`: our names to the file's (`{"t": "Time"}`), each the whole name (`session1/drive` in HDF5, `data.v` for
-    the field of a MATLAB struct), its last part or that without a unit, as long as only one column is meant, or its
-    number, `#2`. `t`, `v` and `y` are found the same way, else by what the name of one column alone means (`Drive (V)`,
-    `Zeit [ms]`). `sample_time`: seconds, for a file without time; `delimiter`: one character, default what the file
-    shows; `need`: the columns that must be there. When `y` is among them the record is meant for a fit: it then has at
-    least 16 samples and a drive that moves. Samples without a value in `t` or a needed column, and samples whose time
-    does not rise, are dropped with a note up to 5 % of the record. A time in another unit is converted to seconds.
+    `path`: of a file; or a mapping or data frame of columns, an array (N, 3) or a tuple of arrays (N,) in the order t,
+    v, y. `columns`: our names to the file's (`{"t": "Time"}`), each the whole name (`session1/drive` in HDF5, `data.v`
+    for the field of a MATLAB struct), its last part or that without a unit, as long as only one column is meant, or
+    its number, `#2`. `t`, `v` and `y` are found the same way, else by what the name of one column alone means
+    (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a file without time; `delimiter`: one character, default
+    what the file shows; `need`: the columns that must be there. When `y` is among them the record is meant for a fit:
+    it then has at least 16 samples and a drive that moves. Samples without a value in `t` or a needed column, and
+    samples whose time does not rise, are dropped with a note up to 5 % of the record. A time in another unit is
+    converted to seconds.
 
     Raises RecordError with every problem in the file.
     """
@@ -126,18 +137,20 @@ def read_record(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One record or path, or several, as a list. Raises TypeError for anything else, such as a table or arrays."""
+    """One source of a record, or several, as a list. Raises TypeError for what is none."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
-    # Tables and mappings would give the names of their columns, which are no paths
-    named = isinstance(sources, Mapping | bytes) or hasattr(sources, "keys") or hasattr(sources, "readline")
-    found = [] if named or not isinstance(sources, Iterable) else list(sources)
-    strange = [each for each in found if not isinstance(each, Record | str | os.PathLike)]
-    if named or strange or not isinstance(sources, Iterable):
+    listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)
+    if not listed and in_memory(sources):
+        return [sources]
+    stream = isinstance(sources, bytes) or hasattr(sources, "readline")  # which would give lines
+    found: list[Any] = [] if stream or not isinstance(sources, Iterable) else list(sources)
+    strange = [each for each in found if not (isinstance(each, Record | str | os.PathLike) or in_memory(each))]
+    if stream or strange or not isinstance(sources, Iterable):
         of = f" with {arguments.kind(strange[0])} in it" if strange else ""
         raise TypeError(
-            f"give a path, a hystgen.records.Record, or a list of these, not {arguments.kind(sources)}{of}; arrays and "
-            "columns of a table become a record by hystgen.records.Record(name, t, v, y)"
+            f"give a path, a hystgen.records.Record, a data frame, a dict of arrays {{'t': .., 'v': .., 'y': ..}}, a "
+            f"tuple of arrays (t, v, y), or a list of these, not {arguments.kind(sources)}{of}"
         )
     return found
 
@@ -193,10 +206,10 @@ def _read(
     return repaired(reading, table)
 
 
-def _size(source: Record | str | os.PathLike[str]) -> int:
+def _size(source: Source) -> int:
     """Bytes to read; 0 where there is no file, which is reported when it is opened."""
     try:
-        return 0 if isinstance(source, Record) else os.stat(source).st_size
+        return os.stat(source).st_size if isinstance(source, str | os.PathLike) else 0
     except OSError:
         return 0
 

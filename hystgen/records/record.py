@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Record:
     """One experiment: arrays of N samples.
 
@@ -32,6 +33,10 @@ class Record:
     units: Mapping[str, str] = field(default_factory=dict)
     read_as: str = ""
     timed: bool = True
+
+    def __repr__(self) -> str:
+        span = f", {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""
+        return f"<Record {self.name}: {len(self)} samples{span}; {', '.join(self.columns())}>"
 
     def __len__(self) -> int:
         return len(self.t)

@@ -9,15 +9,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 from hystgen import diagnosis
-from hystgen.basics import parallel
+from hystgen.basics import drawing, parallel
+from hystgen.basics.drawing import label
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
-from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure
+from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure, times_noise
 from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
 from hystgen.diagnosis.search.acceptance import is_noise
-from hystgen.report import drawing
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
-from hystgen.report.drawing import label
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
 
 if TYPE_CHECKING:
@@ -36,13 +35,14 @@ P = ParamSpec("P")
 def _with_page(find: Callable[P, Diagnosis]) -> Callable[P, Diagnosis]:
     @functools.wraps(find)
     def found(*given: P.args, **named: P.kwargs) -> Diagnosis:
-        return replace(find(*given, **named), page=html)
+        figures = {name: functools.partial(draw, width=WIDE) for name, draw in FIGURES.items()}
+        return replace(find(*given, **named), page=html, figures=figures)
 
     return found
 
 
 diagnose = _with_page(diagnosis.diagnose)
-"""`hystgen.diagnose`: what the search finds, with a page to write."""
+"""`hystgen.diagnose`: what the search finds, with a page to write and figures to draw."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:
@@ -56,7 +56,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         for name in FIGURES
     }
     sections = [
-        Section("How the gap shrinks", [figures["gap"], *_refitted(result)]),
+        Section("How the gap shrinks", [figures["gap"], *_refitted(result), _noise(result)]),
         Section("What was found", _found(result, found.parameters.model.effects, found.not_emitted())),
         Section("What is left", _left(result)),
         Section("Faults of the data", _faults(result)),
@@ -70,7 +70,18 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
     ]
     warnings = [Text(f"Mind the inverse: {said}.") for said in found.warnings]
-    return page(f"{found.parameters.name}: diagnosis", [Text(found.sentence()), *warnings], sections)
+    top = [Text(found.sentence()), *warnings, _next_step(found)]
+    return page(f"{found.parameters.name}: diagnosis", top, sections)
+
+
+def _next_step(found: Diagnosis) -> Text:
+    """What to do with the diagnosis, and the command."""
+    if found.verdict == "unexplained" and not found.result.effects:
+        plan = "hystgen diagnose --plan params.yaml -o plan/"
+        return Text("Your next step: record drives in which every effect shows.", plan)
+    if found.not_emitted():
+        return Text("Your next step: see what the model would leave.", "hystgen track params.yaml RECORDS")
+    return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
 
 
 def _drawn(found: Diagnosis, name: str, width: float) -> bytes:
@@ -95,6 +106,20 @@ def _refitted(result: Result) -> list[Text]:
             "weights fitted where something is missing take some of it, and other records may miss it in another way."
         )
     ]
+
+
+NOISE_FROM = {
+    "holds": "the holds of the drive",
+    "periods": "what does not repeat from one period of the drive to the next",
+    "differences": "the differences of neighbouring samples, since the records have no holds and no equal periods",
+    "resolution": "the resolution of the recorded numbers, since every other estimate is smaller",
+}
+"""What the noise floor comes from, in words."""
+
+
+def _noise(result: Result) -> Text:
+    floor = f"{label('noise floor', result.unit)} is {result.noise_floor:.3g}"
+    return Text(f"The {floor}, from {NOISE_FROM[result.noise_from]}.")
 
 
 def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
@@ -171,7 +196,7 @@ def _left(result: Result) -> list[Text | Listing | Table]:
         after, noise = result.gap.after.holdout, result.noise_floor
         if is_noise(after, noise):
             return [Text("Nothing but noise.")]
-        times = f"The error that is left is {after / noise:.3g} times the noise" if noise else "Some error is left"
+        times = f"The error that is left is {times_noise(after / noise)}"
         return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
     sentences = [each.sentence(result.unit) for each in seen]
     blocks: list[Text | Listing | Table] = [Listing(sentences)]
@@ -247,11 +272,12 @@ def _ranking(result: Result) -> list[Text | Table]:
     for k, tried in enumerate(result.ranking):
         best = min((each.holdout for each in tried), default=0.0)
         rows: list[Sequence[str]] = [
-            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best"]
+            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best", "why not"]
         ]
         for each in tried:
             margin = f"{100.0 * (each.holdout / best - 1.0):.1f} %" if best > 0.0 else ""
-            rows.append([each.name, each.shape, f"{each.fit:.4g}", f"{each.holdout:.4g}", margin])
+            errors = f"{each.fit:.4g}", f"{each.holdout:.4g}"
+            rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"
-        blocks += [Text(f"Round {k + 1}, the shapes that were fitted to the end{after}:"), Table(rows, (0, 1))]
+        blocks += [Text(f"Round {k + 1}, the shapes that were fitted to the end{after}:"), Table(rows, (0, 1, 5))]
     return blocks or [Text("None: the refitted model leaves no more than noise.")]

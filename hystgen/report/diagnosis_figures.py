@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import drawing
+from hystgen.basics.drawing import label
 from hystgen.diagnosis.data.signals import still
 from hystgen.diagnosis.findings.content import loop_centre
 from hystgen.diagnosis.findings.kinds import Line
 from hystgen.diagnosis.search import acceptance
-from hystgen.report import drawing
-from hystgen.report.drawing import label
 from hystgen.report.fit_figures import binned
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import drawing
+from hystgen.basics.drawing import label
 from hystgen.identification import faults
 from hystgen.model import cascade_of
-from hystgen.report import drawing
-from hystgen.report.drawing import label
 
 if TYPE_CHECKING:
     from hystgen.identification import Fit, Used

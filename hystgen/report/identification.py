@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 import numpy as np
 
-from hystgen.basics import arguments
+from hystgen import identification
+from hystgen.basics import arguments, drawing
 from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
 from hystgen.emission import files
@@ -21,7 +24,7 @@ from hystgen.identification.quality import WORD_COLUMNS, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, read_records, several
-from hystgen.report import drawing, fit_figures, properties
+from hystgen.report import fit_figures, plots, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
 
@@ -29,6 +32,24 @@ if TYPE_CHECKING:
     from hystgen.identification import Row
 
 PAGE = "report.html"
+
+P = ParamSpec("P")
+
+
+def _with_pictures(find: Callable[P, Fit]) -> Callable[P, Fit]:
+    @functools.wraps(find)
+    def found(*given: P.args, **named: P.kwargs) -> Fit:
+        return replace(find(*given, **named), draw=_picture)
+
+    return found
+
+
+def _picture(fit: Fit) -> Any:
+    return plots.fit_figure(fit, fit.records)
+
+
+identify = _with_pictures(identification.identify)
+"""`hystgen.identify`: the fit, with a picture to draw."""
 
 
 def names() -> list[str]:
@@ -146,7 +167,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     if fit.warnings:
         said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {counted(len(fit.warnings), 'warning')} below.")
     command = f"hystgen emit {parameter_file} -o firmware/{operator}"
-    return [*(Text(text) for text in said), Text("To get the C code, run:", command)]
+    return [*(Text(text) for text in said), Text("Your next step: write the C.", command)]
 
 
 def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> list[Section]:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from hystgen.basics import drawing
+from hystgen.basics.drawing import label
 from hystgen.basics.version import __version__
 from hystgen.emission import files
 from hystgen.planning import plan as planning
 from hystgen.planning.plan import EDGE, MEASURED, Drive, lasting
-from hystgen.report import drawing
-from hystgen.report.drawing import label
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)

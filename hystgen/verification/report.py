@@ -7,6 +7,9 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
+from hystgen.basics import display
+from hystgen.basics.problems import counted
+
 
 @dataclass(frozen=True)
 class Row:
@@ -87,7 +90,7 @@ _WHERE_MEASURED: list[tuple[str, Callable[[Row], str]]] = [
 _RIGHT = {"samples", *(name for name, _ in _WHERE_MEASURED)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """All rows of a verification."""
 
@@ -96,6 +99,16 @@ class Report:
     engine: str
     layout: str
     rows: list[Row] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        wrong = sum(not row.ok for row in self.rows)
+        found = f"{wrong} of {counted(len(self.rows), 'build')} wrong" if wrong else (
+            f"bits equal in {counted(len(self.rows), 'build')}"
+        )
+        return f"<Report {self.name}: {self.arithmetic}, {self.engine}, {self.layout}; {found}>"
+
+    def _repr_html_(self) -> str:
+        return display.block(repr(self), self.table())
 
     @property
     def ok(self) -> bool:

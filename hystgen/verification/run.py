@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Sequence
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, writing
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_model
-from hystgen.model import Model, as_model
+from hystgen.model import ModelSource, as_model
 from hystgen.verification import avr, cores, host, sources
 from hystgen.verification.comparison import Expected, expected_records
 from hystgen.verification.report import Report
@@ -19,7 +18,7 @@ from hystgen.verification.targets import AVR, HOST, Board, find
 
 @arguments.checked
 def verify(
-    source: Model | str | os.PathLike[str],
+    source: ModelSource,
     arithmetic: str | None = None,
     operator: str | None = None,
     engine: str | None = None,
@@ -34,12 +33,19 @@ def verify(
 ) -> Report:
     """Compile what `emit` would write and compare it, bit for bit, with the Python reference of the same arithmetic.
 
-    On the host with every compiler that is installed (or those named in `compiler`: 'gcc', 'clang', 'zig'), each under
-    the strict flags and under its own default dialect, over records of `length` calls. On the cores of
-    `verification.targets` with zig and, where installed, Debian's cross gcc, emulated, over records of `target_length`
-    calls (default: as many as that core is fast enough for), with the instructions of every sample counted. On the AVR
-    the emitted self-test alone. What is named twice is done once. A compiler or target that is asked for and missing is
-    a failed row. Raises what `emit` raises, and ValueError for a target that does not exist.
+    `source`: a model, a parameter file, or what `identify` or `diagnose` found. On the host with every compiler that is
+    installed (or those named in `compiler`: 'gcc', 'clang', 'zig'), each under the strict flags and under its own
+    default dialect, over records of `length` calls. On the cores of `verification.targets` with zig and, where
+    installed, Debian's cross gcc, emulated, over records of `target_length` calls (default: as many as that core is
+    fast enough for), with the instructions of every sample counted. On the AVR the emitted self-test alone. What is
+    named twice is done once. A compiler or target that is asked for and missing is a failed row. Raises what `emit`
+    raises, and ValueError for a target that does not exist.
+
+    >>> import hystgen
+    >>> model = hystgen.load("examples/note/example_1.yaml")
+    >>> report = hystgen.verify(model, arithmetic="q15", length=1000)
+    >>> report.ok
+    True
     """
     compiler = tuple(dict.fromkeys(arguments.words("compiler", compiler, "gcc")))
     targets = tuple(dict.fromkeys(arguments.words("targets", targets, HOST)))

@@ -11,27 +11,38 @@ from hystgen.effects.ageing import fixed as ageing_fixed
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.drift import compensator as drift
+from hystgen.effects.drift import fixed as drift_fixed
 from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
 
-KINDS = (creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, drift.KIND)
+KINDS = (
+    creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND, drift.KIND,
+)  # fmt: skip
 """Those of the catalogue, each with a file of its name in `c_runtime/`."""
 
 
-def sides(t: ChainTables) -> tuple[list[Constants], list[Constants]]:
-    """The blocks in front of the plays, from the drive on, and those behind them."""
+def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:
+    """The blocks of an operator in front of the plays, from the drive on, and those behind them."""
+    modes = (resonance_fixed if t.fixed else resonance).constants(t.mode) if operator == "forward" else ()
     if t.fixed:
         gains = [*ageing_fixed.constants(t.ageing), *thermal_fixed.constants(t.gain)]
-        return [*lag_fixed.constants(t.lag)], [*creep_fixed.constants(t.creep), *gains]
+        return [*lag_fixed.constants(t.lag)], [*creep_fixed.constants(t.creep), *gains, *modes]
     given = own.constants(t.own, t.own_effects) if isinstance(t, OwnChainTables) else []
     ahead, behind = given[: t.own.ahead], given[t.own.ahead :]
     gains = [*ageing.constants(t.ageing), *thermal.heat_constants(t.heat), *thermal.constants(t.gain)]
-    return [*lag.constants(t.lag), *ahead], [*creep.constants(t.creep), *behind, *gains]
+    return [*lag.constants(t.lag), *ahead], [*creep.constants(t.creep), *behind, *gains, *modes]
 
 
-def every(t: ChainTables) -> list[Constants]:
+def every(t: ChainTables, operator: str) -> list[Constants]:
     """These, and the clock of a drift."""
-    return [*itertools.chain(*sides(t)), *drift.constants(t.clock)]
+    return [*itertools.chain(*sides(t, operator)), *clocks(t)]
+
+
+def clocks(t: ChainTables) -> list[Constants]:
+    """The clock of a drift, where there is one."""
+    return drift_fixed.constants(t.clock) if t.fixed else drift.constants(t.clock)

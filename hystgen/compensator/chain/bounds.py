@@ -32,6 +32,7 @@ from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LEAST_GAIN
@@ -109,8 +110,9 @@ def _warmed(compiled: Compiled) -> float:
     )
 
 
-def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
-    """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it."""
+def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
+    """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it;
+    `emitted`: with what the C takes in place of the model's law, which double precision itself does not."""
     u = float(np.finfo(kind).eps) / 2
     t, static = compiled.tables.moving, compiled.static
     p, r = np.abs(np.array(static.pi.weights)), np.array(static.pi.thresholds)
@@ -121,13 +123,13 @@ def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
     if t.moves == moving.RELAXING:
         slow = t.first[1:].astype(float)
         play = 8.0 * u * size / float(np.min(slow))
-        if kind != "float64":
+        if emitted:
             play += compiled.largest_step / 4.0  # contacts inside a step, taken at the first touch
     if t.moves == moving.DASHPOT:
         effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_step
         rows = t.yields.astype(float)
         play = 8.0 * u * size + dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, way)
-        if kind != "float64":
+        if emitted:
             play += float(t.number[moving.SEEN]) * way  # at which the input stands still
     each = steep * play + (12.0 + len(static.pi.weights)) * u * size * steep
     error = float(np.sum(p)) * each
@@ -135,9 +137,10 @@ def _moving(compiled: Compiled, kind: str) -> tuple[float, float]:
     return error, error + float(np.sum(p)) * steep * width
 
 
-def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
+def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:
     """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for, for one
-    arithmetic and without the plays' own."""
+    arithmetic and without the plays' own; `emitted` as for `_moving`, `same`: of compensators whose states have seen
+    the same drives."""
     u = float(np.finfo(kind).eps) / 2
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
@@ -149,15 +152,18 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
         inverse = taps * (inverse + u * (len(compiled.taps.weights) + 1) * sizes.displacement * slope)
     inverse = gain * (inverse + 3.0 * u * gains * taps * sizes.output)
     late = 0.0
-    if t.ageing.turns.size and kind != "float64":  # the gain of the travel one sample before, and its table
+    if t.ageing.turns.size and emitted:  # the gain of the travel one sample before, and its table
         late = _late(compiled) * sizes.output
         inverse += gain * late
-    if t.heat.turns.size and kind != "float64":  # the heat of one sample
+    if t.heat.turns.size and emitted:  # the heat of one sample
         inverse += gain * _warmed(compiled) * (1.0 / LEAST_GAIN)
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
+    moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
+    if emitted and len(t.lag.exact) and static.branches_differ:  # what arrives comes to rest on either branch
+        forward += static.pi.slopes[-1] * static.branch_gap
     size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
     roundings = []
     for each in compiled.own[t.own.ahead :]:
@@ -169,16 +175,24 @@ def _one(compiled: Compiled, kind: str) -> tuple[float, float]:
     for j in range(len(t.creep.block)):
         rounding, back_gain = _creep(compiled, j, size, u)
         forward = forward * float(t.creep.block[j, creep.REST]) + rounding
-        inverse = back_gain * (inverse + rounding)
+        inverse = (1.0 / float(t.creep.block[j, creep.SLOPE]) if same else back_gain) * (inverse + rounding)
         size *= float(t.creep.block[j, creep.REST])
     for each, (there_own, _) in zip(compiled.own[t.own.ahead :], roundings, strict=True):
         forward = forward * each.forward.largest + there_own
-    forward = gain * (forward + 3.0 * u * sizes.output * gains) + TABLE_ERROR * sizes.output * (late > 0.0) + there
-    return forward + 3.0 * u * sizes.displacement, inverse
+    forward = gain * (forward + 3.0 * u * sizes.output * gains) + TABLE_ERROR * sizes.output * (late > 0.0)
+    size, ringing = gain * sizes.output + sizes.displacement, 1.0
+    for mode in compiled.modes:
+        forward = mode.largest * forward + resonance.rounding(mode, size, u)
+        size, ringing = mode.largest * size, ringing * mode.largest
+    return forward + ringing * there + 3.0 * u * ringing * sizes.displacement, inverse
 
 
-def _lags(compiled: Compiled, error: float, u: float) -> float:
-    """The error of the drive, for one of what is in front of the plays."""
+def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
+    """The error of the drive, for one of what is in front of the plays; `same` as for `_one`.
+
+    States that have seen the same drives pass on `goal/rate`, and of the target before, which followed from targets,
+    `W = theta^2 e + theta (1 - theta) W`.
+    """
     drive = _sizes(compiled).drive
     for each in reversed(compiled.own[: compiled.tables.own.ahead]):
         error = each.passed(error) + each.rounding(drive, u)[1]
@@ -189,9 +203,32 @@ def _lags(compiled: Compiled, error: float, u: float) -> float:
             continue
         theta = float(row[lag.THETA])
         states = u * drive * (5.0 + u / rate)
-        goal = (1.0 + 2.0 * theta) / (1.0 - theta) * (error + states) + 6.0 * u * drive
-        error = (goal + states) * (2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
+        farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
+        before = lag.shifted(theta) if same else farthest
+        goal = before * error + farthest * states + 6.0 * u * drive
+        error = (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
     return error
+
+
+def _seen_by_creep(compiled: Compiled) -> float:
+    """What the states of creep, which see what the plays give, make of an error of what they are asked for."""
+    t, found = compiled.tables.creep, 1.0
+    for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
+        found *= slope * _creep(compiled, j, 0.0, 0.0)[1]
+    return max(found, 1.0)
+
+
+def condition(compiled: Compiled) -> str:
+    """What `rounding` holds for where drives can part without a bound but the range, in words; "" where they cannot.
+
+    A lag that is led follows its target but for a second difference, so that plays and creep behind it have not seen
+    what was solved for; what they remember differs with the drives, and the lead makes more of that. Thresholds that
+    grow with the rate make more of a difference of the drives before.
+    """
+    led = not all(compiled.tables.lag.exact)
+    remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
+    dilated = compiled.tables.moving.moves == moving.DILATED
+    return "both have seen the same drives" if dilated or (led and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
@@ -201,21 +238,29 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     pi = static.pi
     gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
     if compiled.tables.moving.used:
-        gain = 2.0 / moving.least_slope(static, compiled.parts.plays) / static.front_slopes[0]
-        pairs = zip(_moving(compiled, arithmetic), _moving(compiled, "float64"), strict=True)
+        least = moving.least_slope(static, compiled.parts.plays) / 2.0
+        if compiled.tables.moving.moves == moving.DILATED:
+            least = min(least, moving.least_dilated(static, compiled.parts.plays, compiled.seconds))
+        gain = 1.0 / least / static.front_slopes[0]
+        pairs = zip(_moving(compiled, arithmetic, True), _moving(compiled, "float64", False), strict=True)
         there, back = (sum(each) for each in pairs)
         plays = ErrorBounds(plays.forward + there, plays.inverse + gain * back, plays.rounding + gain * back)
     u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
-    forward, asked = (sum(each) for each in zip(_one(compiled, arithmetic), _one(compiled, "float64"), strict=True))
+    same = bool(condition(compiled))
+    ways = _one(compiled, arithmetic, True, same), _one(compiled, "float64", False, same)
+    forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]
+    seen = 1.0 if same else _seen_by_creep(compiled)
     inverse, rounding = (
-        min(SECOND_ORDER * _lags(compiled, own + gain * asked, u), whole) for own in (plays.inverse, plays.rounding)
+        min(SECOND_ORDER * _lags(compiled, seen * own + gain * asked, u, same), whole)
+        for own in (plays.inverse, plays.rounding)
     )
-    if compiled.tables.slew and len(compiled.tables.lag.exact):
+    if same or (compiled.tables.slew and len(compiled.tables.lag.exact)):
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
     rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])
     most = (1.0 / LEAST_GAIN) ** (
         len(compiled.tables.gain) + len(compiled.tables.ageing.turns) + len(compiled.tables.heat.turns)
     ) * rest
+    most *= math.prod(mode.largest for mode in compiled.modes)
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

@@ -14,14 +14,17 @@ from hystgen.plays import slots
 
 PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "tanh", "dead_zone",
-    "relaxing", "dilated", "dashpot", "polynomial", "centre",
+    "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay",
 )  # fmt: skip
 """What is counted: `any` once for a model with effects, the others for each kind of block that there is; `dilated`
 for all plays that a search finds."""
 
+OPERATORS = {"preview": "inverse", "mode": "forward", "delay": "forward"}
+"""Of those that not both operators have, the one that does."""
 
-def parts(t: ChainTables) -> list[str]:
-    """The parts that a model has; two blocks of one kind share their code."""
+
+def parts(t: ChainTables, operator: str) -> list[str]:
+    """The parts that an operator of a model has; two blocks of one kind share their code."""
     exact = [bool(each) for each in t.lag.exact]
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter({
@@ -31,14 +34,15 @@ def parts(t: ChainTables) -> list[str]:
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "dashpot": t.moving.moves == moving.DASHPOT,
+        "mode": len(t.mode), "delay": t.delay.samples,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
-    return ["any", *(part for part in PARTS[1:] if found[part])]
+    return ["any", *(part for part in PARTS[1:] if found[part] and OPERATORS.get(part, operator) == operator)]
 
 
-def code_bytes(t: ChainTables, arithmetic: str) -> dict[str, int]:
-    """Bytes of code at -O2 that effects add on each of `engines.CORES`, one operator; not less than those of parts."""
-    found = [_sizes()[part, arithmetic] for part in parts(t)]
+def code_bytes(t: ChainTables, arithmetic: str, operator: str) -> dict[str, int]:
+    """Bytes of code at -O2 that effects add to an operator on each of `engines.CORES`."""
+    found = [_sizes()[part, arithmetic] for part in parts(t, operator)]
     return {core: sum(each[core] for each in found) for core in engines.CORES}
 
 

@@ -17,11 +17,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 from hystgen.arithmetic.factors import error as missed
+from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.layout import ChainTables, Parts
+from hystgen.compensator.chain.moving import DILATED, least_dilated
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
@@ -29,6 +32,8 @@ from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.resonance import fixed as resonance_fixed
+from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS
@@ -40,12 +45,14 @@ DOUBLE = 2.0**-40
 @dataclass(frozen=True)
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes: forwards the sum of the plays, the input of each
-    creep and of each saturation, and the output; back what is left of a reference behind each saturation, the target
-    that the output side is given, and the sum that is asked of the plays."""
+    creep, mode and saturation, the output if modes stand still, and the output; back what is left of a reference behind
+    each saturation, the target that the output side is given, and the sum that is asked of the plays."""
 
     plays: float
     creeps: list[float]
+    modes: list[float]
     saturations: list[float]
+    still: float
     output: float
     undone: list[float]
     target: float
@@ -54,7 +61,8 @@ class Sizes:
     @property
     def largest(self) -> float:
         """Of all of them."""
-        return max(self.plays, *self.creeps, *self.saturations, self.output, *self.undone, self.target, self.asked)
+        forwards = (self.plays, *self.creeps, *self.modes, *self.saturations, self.output)
+        return max(*forwards, *self.undone, self.target, self.asked)
 
 
 @dataclass(frozen=True)
@@ -76,8 +84,8 @@ class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
     `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
-    whole codes; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
-    `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
+    whole codes; `drifted`: error of drifts in signals; `reached`: whether all that is asked in front of the plays can
+    be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
     """
 
     static: StaticModel
@@ -89,6 +97,8 @@ class Bounds:
     drop: int
     creeps: list[CreepNumbers]
     lags: list[tuple[bool, tuple[float, float, float, float]]]
+    modes: list[ModeNumbers]
+    drifted: float
     taps: list[float]
     bends: list[Bend]
     ends: tuple[float, float]
@@ -96,6 +106,7 @@ class Bounds:
     reached: bool
     largest_step: float
     finer: int
+    seconds: float
 
     @property
     def _fine(self) -> int:
@@ -121,7 +132,7 @@ class Bounds:
         state = 2.0**-bits * self._signal
         found = 0.0
         for rate, _, late, weight in numbers.terms.tolist():
-            scale = 2.0 ** (bits - creep_fixed.lifted(late, bits))
+            scale = 2.0 ** (bits - lifted(late, bits))
             found += state * (0.5 / rate + 2.0**drop) + 0.5 * self._signal / scale / rate
             found += 0.5 * self._signal + missed(weight) * size + 2.0 * size * missed(late * scale) / scale / rate
             found += 2.0 * weight * size * missed(rate * 2.0**drop) / 2.0**drop / rate
@@ -134,9 +145,10 @@ class Bounds:
         moved = self.sizes.asked + size * numbers.rest
         return numbers.slope * (missed(1.0 / numbers.slope) * moved + 0.5 * self._signal)
 
-    @staticmethod
-    def _creep_gain(numbers: CreepNumbers) -> float:
+    def _creep_gain(self, numbers: CreepNumbers) -> float:
         """Largest gain of its inverse, as in `hystgen.compensator.chain.bounds`."""
+        if self.condition:
+            return 1.0 / numbers.slope
         total, late = (float(sum(numbers.terms[:, column])) for column in (creep.WEIGHT, creep.LATE))
         around = numbers.rest - 2.0 * total + 2.0 * late
         return 1.0 / around if around > 0.0 else 2.0 / numbers.slope - 1.0 / numbers.rest
@@ -220,38 +232,67 @@ class Bounds:
         rounded = bool(self.static.stages) or self._fine > 0
         return here, code * rounded
 
-    def _viscous(self) -> float:
-        """What roundings, and contacts inside a step, make of the sum of viscous plays, in output codes."""
+    @cached_property
+    def _shares(self) -> list[tuple[float, float]]:
+        """Factors of how each play moves, as in `FixedMovingTables`."""
+        t = self.tables.moving
+        return [
+            (float(m) / 2.0 ** int(shift), float(n) / 2.0 ** int(second))
+            for (m, shift), (n, second) in zip(t.first[1:].tolist(), t.second[1:].tolist(), strict=True)
+        ]
+
+    def _moved(self) -> float:
+        """What roundings, and contacts inside a step, make of the sum of plays that depend on the rate, in codes."""
         t = self.tables.moving
         if not t.used:
             return 0.0
-        late, kept = (float(row[0]) / 2.0 ** int(row[1]) for row in (t.late, t.kept))
-        low, high = self.inner.hull
-        wrong = 2.0 * float(high - low) * (2.0**-30 * (late + kept))
-        play = (1.0 + wrong) / min(late, 1.0) * float(self.inner.step) + 0.25 * self.largest_step
-        slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * float(high - low)
-        return math.fsum(self.static.pi.weights[1:]) * play / float(self.inner.output_lsb) + slopes
+        travel, step = float(self.inner.hull[1] - self.inner.hull[0]), float(self.inner.step)
+        plays = []
+        for first, second in self._shares:
+            if t.moves == DILATED:
+                plays.append((1.0 + 2.0**-30 * first * travel) * step)
+            elif first < 1.0:
+                wrong = 2.0 * travel * (2.0**-30 * (first + second))
+                plays.append((1.0 + wrong) / first * step + 0.25 * self.largest_step)
+            else:
+                plays.append(step)
+        slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
+        found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], plays, strict=True))
+        return float(found / float(self.inner.output_lsb) + slopes)
+
+    @cached_property
+    def _steepest(self) -> float:
+        """Largest change of the sum of the plays for one of their input, at all samples."""
+        if self.tables.moving.moves != DILATED:
+            return float(self.static.pi.slopes[-1])
+        first, *others = map(abs, self.static.pi.weights)
+        more = (p * (1.0 + 2.0 * wider) for p, (wider, _) in zip(others, self._shares, strict=True))
+        return float(first + math.fsum(more))
 
     def _plays(self, arriving: float) -> float:
         """Error of the sum of the plays for one of what arrives in front of the memoryless part, in output codes."""
-        steep = self.static.front_slopes[1] * self.static.pi.slopes[-1] / float(self.inner.output_lsb)
+        steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
-        return float(self.inner.sum_error()) + self._viscous() + steep * arriving * self._arriving + level
+        return float(self.inner.sum_error()) + self._moved() + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
         """In output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        error = self._plays(self._arrival()[0] + short)
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
+        error = self._plays(self._arrival()[0] + short + waited)
         if self.lags and self.static.branches_differ:  # what arrives comes to rest on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):
             error = error * numbers.rest + self._creep(j)
         gains, share = self._gains()
-        error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.output + self._signal))
+        error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.still + self._signal))
         if self.parts.ageing:
-            error += ageing.TABLE_ERROR * self.sizes.output
-        there = self._saturation()[2]
-        return upward(Fraction(SECOND_ORDER * (error + there + 0.5 + self._signal) + DOUBLE * self.sizes.output))
+            error += ageing.TABLE_ERROR * self.sizes.still
+        for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
+            scale = 2.0**self.bits
+            error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
+        beside = self._saturation()[2] + 0.5 + (1.0 + self.drifted) * self._signal
+        return upward(Fraction(SECOND_ORDER * (error + beside) + DOUBLE * self.sizes.output))
 
     def _asked(self) -> float:
         """Error of the sum that the inverse asks of the plays, in output codes."""
@@ -259,14 +300,14 @@ class Bounds:
         low, high = (end / float(self.inner.output_lsb) for end in self.ends)
         limits = self.tables.limits
         short = max(high - float(limits[3]), float(limits[2]) - low, 0.0)
-        error = slope * (short + self._signal) + back
+        error = slope * (short + (1.0 + self.drifted) * self._signal) + back
         if self.taps:
             size = max(self.sizes.undone)
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
             error = error * math.fsum(map(abs, self.taps)) + own
         gains, share = self._gains()
-        late = self._late() * self.sizes.output
-        error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.output + self._signal) + late)
+        late = self._late() * self.sizes.still
+        error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds
         for j, numbers in reversed(list(enumerate(self.creeps))):
@@ -279,11 +320,12 @@ class Bounds:
         code = self._arrival()
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         steep = self.static.front_slopes[1]
-        solved = float(self.inner.solved()) / self._arriving + steep * float(self.inner.back())
+        t = self.tables.moving
+        solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
+        solved = solution / self._arriving + steep * float(self.inner.back())
         slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
-        solved += steep * (sum(code) + short + slowed)
-        outer = self.static.pi.slopes[-1]
-        missed_by = self._plays(0.0) * float(self.inner.output_lsb) + outer * solved * self._arriving
+        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # what both have seen, or not
+        missed_by = self._plays(0.0) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
         for numbers in self.creeps:  # whose states have seen what the plays gave
             missed_by *= numbers.slope * self._creep_gain(numbers)
         residual = self._asked() * float(self.inner.output_lsb) + missed_by
@@ -291,6 +333,8 @@ class Bounds:
 
     def _gain(self) -> float:
         """Largest change of the drive in front of the memoryless part for one of the plays' sum."""
+        if self.tables.moving.moves == DILATED:  # for plays that have seen the same drives
+            return 1.0 / least_dilated(self.static, self.parts.plays, self.seconds) / self.static.front_slopes[0]
         if self.tables.moving.used:  # as in floating point: each play is stretched further than it would be
             return 2.0 / self.static.pi.weights[0] / self.static.front_slopes[0]
         return float(self.inner.gain())
@@ -301,11 +345,13 @@ class Bounds:
             exact, (rate, second, late, _) = self.lags[j]
             _, kept, answer = self._lag(j, *self._lag_sizes()[j])
             code = 0.5 * 2.0**self._fine if j == 0 else 0.5
-            if exact:
-                error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
+            if not exact:  # whose states have seen the same drives
+                goal = lag.shifted(second) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
+                error = (goal + kept) / rate + answer + code
+            elif self.condition:
+                error = (error + kept) / late + answer + code
             else:
-                goal = (1.0 + 2.0 * second) / (1.0 - second) * (error + kept + rate * code)
-                error = (goal + kept) * (2.0 - rate) / rate + (2.0 - rate) * code + answer
+                error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
         return error
 
     def _codes(self, error: float) -> float:
@@ -324,7 +370,8 @@ class Bounds:
     def condition(self) -> str:
         """What `rounding` holds for where drives in front of a lag can part without a bound but the range."""
         led = any(not exact for exact, _ in self.lags)
-        if not (led or (self.lags and (not self.reached or self.parts.slew))):
+        dilated = self.tables.moving.moves == DILATED
+        if not (led or dilated or (self.lags and (not self.reached or self.parts.slew))):
             return ""
         return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
 

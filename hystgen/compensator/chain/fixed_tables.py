@@ -34,13 +34,13 @@ from hystgen.compensator.chain.layout import (
     LEVEL_DROP,
     MOST_CODE,
     OFFSET,
-    SAMPLES_A_SWEEP,
     SHARE_BITS,
     VERIFIED_SHARE,
     ChainTables,
     Codes,
     Compiled,
     Parts,
+    fastest,
     output_range,
     taps_of,
 )
@@ -50,8 +50,14 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing import fixed as ageing_fixed
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep import fixed as creep_fixed
+from hystgen.effects.delay import compensator as delay
+from hystgen.effects.delay.compensator import DelayTables
+from hystgen.effects.drift import fixed as drift
+from hystgen.effects.drift.fixed import ClockNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.saturation.fixed import Saturations
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
@@ -101,6 +107,7 @@ class _Builder:
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
         self.taps = taps_of(self.parts, seconds, how)
         self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
+        self.modes = [resonance.numbers(each, seconds) for each in self.parts.modes]
         self.lags = [lag.numbers(each, seconds) for each in self.parts.lags]
         self.given = (lsb[0] is not None, lsb[1] is not None)
 
@@ -125,34 +132,38 @@ class _Builder:
         tables = ChainTables(
             plays,
             limits,
-            self._need(lambda: moving.build_fixed(plays, static, self.parts.plays, self.seconds), "rate_dependence"),
+            self._need(lambda: self._moving(plays), "rate_dependence"),
             self._need(self._lags, "a lag"),
             self._need(self._creep_tables, "creep"),
+            self._need(self._delay, "a delay"),
+            self._need(self._mode_tables, "resonance"),
             self._need(lambda: self._ageing(span), "ageing"),
             self._need(self._gains, "a temperature"),
             HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
-            np.zeros((0, 8), np.int64),
+            self._need(self._clock_tables, "drift"),
             OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
             behind,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
         )
-        step = min((self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)) * self.seconds, span)
-        slowed = 0.0
+        max_rate, slowed = fastest(static, self.parts, self.seconds, self.how), 0.0
         if self.parts.slew:
             slowed = max(1.0 - math.floor(rate) / float(rate) for rate in self.rates())
+            max_rate = min(max_rate, math.floor(min(self.rates())) * float(self.drive_lsb) / self.seconds)
+        step = min(max_rate * self.seconds, span)
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
-            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags, weights,
+            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
+            self.modes, sum(each.error for each in self.clocks), weights,
             self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
+            self.seconds,
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
-        max_rate = self.how.max_rate or span / (SAMPLES_A_SWEEP * self.seconds)
         return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)
 
     # ------------------------------------------------------------ refusals
@@ -192,13 +203,18 @@ class _Builder:
             size *= thermal.LARGEST_GAIN
         for _ in self.parts.thermal:
             size = size * thermal.LARGEST_GAIN + span
+        still = size
+        modes = []
+        for mode in self.modes:
+            modes.append(size)
+            size = size * mode.largest * slack + 1.0
         saturations = [size] * len(self.parts.saturations)
-        output = size + abs(self._code(static.output_offset)) + span
-        back = float(self.about.code_max) + abs(self._code(static.output_offset)) + span + 1.0
+        away = abs(self._code(static.output_offset)) + span * (1 + len(self.parts.drift))
+        back = float(self.about.code_max) + away + 1.0
         undone = [back]
         for effect in reversed(self.parts.saturations):
             if isinstance(effect, TanhSaturation):
-                back = self.led_back(effect, settled, size)
+                back = self.led_back(effect, settled, still)
             elif isinstance(effect, HardSaturation):
                 back = min(back, self._code(effect.level) + 1.0)
             elif isinstance(effect, Stops):
@@ -214,7 +230,7 @@ class _Builder:
         for each, inside in zip(reversed(self.creeps), reversed(creeps), strict=True):
             moved = inside + (asked + inside * each.rest) / each.slope
             asked = max(moved, asked / each.rest) * slack + 1.0
-        return Sizes(plays, creeps, saturations, output, undone, target, asked)
+        return Sizes(plays, creeps, modes, saturations, still + away, size + away, undone, target, asked)
 
     def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
         """Largest input to which a displacement is led back: any that the model has at rest at least."""
@@ -233,6 +249,14 @@ class _Builder:
         return min(spans, BEYOND), spans <= BEYOND
 
     # ------------------------------------------------------------ constants
+
+    @property
+    def _farthest(self) -> int:
+        """Largest input that is asked of the plays."""
+        return int(max(map(abs, self.inner.hull)) + self.inner.margin)
+
+    def _moving(self, plays: Any) -> Any:
+        return moving.build_fixed(plays, self.static, self.parts.plays, self.seconds, self._farthest)
 
     def _limits(self, plays: Any) -> Any:
         """Those of the whole chain."""
@@ -262,8 +286,7 @@ class _Builder:
         found[2], found[3] = self.slew(span)
         found[4] = round(VERIFIED_SHARE * (self.about.code_max + 1))
         found[LEVEL_BITS], found[LEVEL_DROP] = self.bits, self.drop
-        hull = max(map(abs, self.inner.hull)) + self.inner.margin
-        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * hull >> self.drop, LARGEST)
+        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * self._farthest >> self.drop, LARGEST)
         found[LEAST_CODE] = self.inner.drive[0] - 2 * span
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits
@@ -324,6 +347,26 @@ class _Builder:
         scale = 2.0**self.bits
         sizes = [size * scale for size in self.sizes.creeps]
         return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
+
+    @cached_property
+    def clocks(self) -> list[ClockNumbers]:
+        """Drifts that are counted, for references as far ahead as they may come."""
+        ahead = self.how.preview if self.how.preview is not None else max(self.taps.ahead, 0) if self.taps else 0
+        signal = self.output_lsb / 2**self.bits
+        farthest = float(self.signal(self.high - self.low))
+        return [drift.numbers(each, self.seconds, signal, farthest, ahead) for each in self.parts.drift]
+
+    def _clock_tables(self) -> Any:
+        return np.array([one.table for one in self.clocks], dtype=np.int64).reshape(-1, 7)
+
+    def _delay(self) -> DelayTables:
+        waited, waiting = delay.numbers(self.parts.delay, self.seconds)
+        return DelayTables(np.array(factor(waited) if waiting else (), dtype=np.int64), waiting)
+
+    def _mode_tables(self) -> Any:
+        scale = 2.0**self.bits
+        pairs = zip(self.modes, self.sizes.modes, strict=True)
+        return resonance_fixed.tables([resonance_fixed.row(one, size * scale) for one, size in pairs])
 
     def _ageing(self, span: float) -> Any:
         rows = [

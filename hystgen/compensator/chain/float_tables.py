@@ -15,13 +15,13 @@ from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving, own
 from hystgen.compensator.chain.layout import (
-    SAMPLES_A_SWEEP,
     VERIFIED_SHARE,
     ChainTables,
     Compiled,
     OwnChainTables,
     Parts,
     Stages,
+    fastest,
     output_range,
     taps_of,
 )
@@ -30,9 +30,12 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.delay import compensator as delay
+from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
+from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import HeatTables
@@ -138,7 +141,8 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
     most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
     reals([most], "intermediate results")
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
-    max_rate = how.max_rate or drive_span / (SAMPLES_A_SWEEP * seconds)
+    waited, waiting = delay.numbers(parts.delay, seconds)
+    max_rate = fastest(static, parts, seconds, how)
     tables = ChainTables(
         plays,
         plays.limits,
@@ -152,6 +156,8 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
             first.astype(np.int64),
             reals(np.concatenate([np.empty((0, 4)), *(one.terms for one in creeps)]), "constants of the creep"),
         ),
+        DelayTables(reals([waited] * (waiting > 0), "the delay"), waiting),
+        reals([resonance.numbers(each, seconds).table for each in parts.modes], "the modes").reshape(-1, 5),
         _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
         reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
         _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),

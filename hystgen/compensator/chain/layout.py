@@ -19,9 +19,12 @@ from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
+from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
+from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import Compensation
@@ -69,10 +72,12 @@ class ChainTables(NamedTuple):
     moving: Any  # `MovingTables` or `FixedMovingTables`
     lag: LagTables
     creep: CreepTables
+    delay: DelayTables  # of the forward operator, like the modes
+    mode: Reals  # (k, 5), in fixed point (k, 13)
     ageing: AgeingTables
     gain: Reals  # (k, 8)
     heat: HeatTables
-    clock: Reals  # (k, 8)
+    clock: Reals  # (k, 8), in fixed point (k, 7)
     own: OwnTables
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
@@ -193,6 +198,11 @@ class Compiled:
         return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
 
     @cached_property
+    def modes(self) -> list[ModeNumbers]:
+        """Modes of the stage."""
+        return [resonance.numbers(each, self.seconds) for each in self.parts.modes]
+
+    @cached_property
     def noise_gain(self) -> float:
         """Largest gain, over all frequencies, from the reference to the drive, over that at rest."""
         z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
@@ -213,6 +223,15 @@ class Compiled:
         for block in self.own:
             gain = gain * block.backward.response(z) * block.rest
         return float(np.max(np.abs(gain)))
+
+
+def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
+    """NAME_MAX_RATE, in drive units a second: what is asked for, or a slow sweep, and no more than the amplifier does.
+
+    A drive beyond a slew limit is another than the one that the C is given, by where in a step it is reached.
+    """
+    asked = how.max_rate or (static.input_range[1] - static.input_range[0]) / (SAMPLES_A_SWEEP * seconds)
+    return float(min([asked, *(rate for each in parts.slew for rate in (each.rate, each.falling_rate))]))
 
 
 def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:

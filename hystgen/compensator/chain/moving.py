@@ -29,6 +29,7 @@ from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
 from hystgen.front.tanh.kernels import TanhTables, tanh
+from hystgen.plays.fixed import loop_solve
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals
 
@@ -68,14 +69,16 @@ class MovingTables(NamedTuple):
 
 
 class FixedMovingTables(NamedTuple):
-    """The same in fixed point, which has no more than viscous plays of one time constant: `late`, `kept` (2,), factors
-    of what a stretch gains, and `relaxed`, tables of plays whose sums have the slopes that these have in a step."""
+    """The same in fixed point, which has viscous plays and those that are dilated: `first`, `second` are factors
+    (n + 1, 2), `farthest` the largest input that a search takes, and `relaxed` tables of plays whose sums have the
+    slopes that viscous ones of one time constant have in a step."""
 
     moves: int
     bends: int
     scanned: int
-    late: Reals
-    kept: Reals
+    first: Reals
+    second: Reals
+    farthest: int
     relaxed: FixedTables
 
     @property
@@ -98,6 +101,16 @@ def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: floa
     for effect in effects:
         if isinstance(effect, ThresholdRate) and not Movement(effect, r, p).by_threshold(seconds):
             yield effect, "viscous plays stand in for it, which only the inverse may; emit the inverse alone"
+
+
+def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> float:
+    """Least change of the sum per change of the plays' input in one step, of plays whose thresholds grow with it."""
+    p = np.array(static.pi.weights)
+    found = float(p[0])
+    for effect in effects:
+        if isinstance(effect, ThresholdRate):
+            found += float(np.sum(p[1:] * np.minimum(0.0, 1.0 - np.array(effect.betas) / seconds)))
+    return found
 
 
 def least_slope(static: StaticModel, bends: Sequence[Effect]) -> float:
@@ -173,13 +186,13 @@ def build(
 
 
 def build_fixed(
-    plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float
+    plays: FixedTables, static: StaticModel, effects: Sequence[Effect], seconds: float, farthest: int
 ) -> FixedMovingTables:
-    """The same in fixed point, for effects without `beyond_fixed`. Raises OverflowError."""
+    """The same in fixed point, for effects without `beyond_fixed` and inputs up to `farthest`. Raises OverflowError."""
     own = build(static, effects, seconds, np.ptp(static.input_range), np.float64)
+    first, second = (np.array([factor(x) for x in each], dtype=np.int64) for each in (own.first, own.second))
     if not own.scanned:
-        none = np.zeros(2, dtype=np.int64)
-        return FixedMovingTables(PLAIN, STRAIGHT, 0, none, none, plays)
+        return FixedMovingTables(own.moves, STRAIGHT, 0, first, second, farthest, plays)
     late = float(own.first[1])
     weight = plays.weight
     sums = [0, int(weight[0])]
@@ -191,18 +204,15 @@ def build_fixed(
         reciprocal=np.array([pair[0] for pair in pairs], dtype=np.int64),
         shift=np.array([pair[1] for pair in pairs], dtype=np.int64),
     )
-    gained, kept = (np.array(factor(x), dtype=np.int64) for x in (late, float(own.second[1])))
-    return FixedMovingTables(RELAXING, STRAIGHT, 1, gained, kept, relaxed)
+    return FixedMovingTables(RELAXING, STRAIGHT, 1, first, second, farthest, relaxed)
 
 
-def beyond_fixed(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
+def beyond_fixed(effects: Sequence[Effect]) -> Iterator[tuple[Effect, str]]:
     """What fixed point does not have of effects on plays."""
-    if effects and not build(static, effects, seconds, np.ptp(static.input_range), np.float64).scanned:
-        words = (
-            "in fixed point there is no C for plays that are bent, have a nonlinear dashpot or do not all relax with "
-            "one time constant"
-        )
-        yield from ((effect, f"{words}; use float32") for effect in effects)
+    for effect in effects:
+        if effect.bends_plays() or dashpot.nonlinear(effect):
+            words = "in fixed point there is no C for plays that are bent or have a nonlinear dashpot"
+            yield effect, f"{words}; use float32"
 
 
 def _viscous(seconds: float, tau: float) -> tuple[float, float]:
@@ -356,15 +366,30 @@ def stretched(x: Any, r: Any, share: Reals) -> Any:
 
 
 @jit
-def fixed_relaxing_follow(t: FixedMovingTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
-    """Viscous plays follow their input w in fixed point; their sum. They stay as near to each other as they are to be,
-    give or take no rounding."""
+def fixed_moved(t: FixedMovingTables, r: Reals, i: int, s: State, w: Any) -> Any:
+    """Play i once the input of the plays has gone to w, in fixed point."""
+    q = s.play[i]
+    if t.moves == RELAXING:
+        return q + stretched(w - q, r[i], t.first[i])
+    before = s.play[0]
+    way = w - before if w > before else before - w
+    threshold = r[i] + times(way, t.first[i, 0], t.first[i, 1])
+    low = w - threshold
+    high = w + threshold
+    upper = high if q > high else q
+    return low if upper < low else upper
+
+
+@jit
+def fixed_moved_follow(t: FixedMovingTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
+    """Plays follow their input w in fixed point; their sum. Those of one time constant stay as near to each other as
+    they are to be, give or take no rounding."""
     total = p[0] * w
     for i in range(1, len(r)):
-        z = s.play[i] + stretched(w - s.play[i], r[i], t.late)
+        z = fixed_moved(t, r, i, s, w)
         total = total + p[i] * z
-        rest = z + stretched(w - z, r[i], t.kept)
-        if i > 1:
+        rest = z + stretched(w - z, r[i], t.second[i]) if t.moves == RELAXING else z
+        if t.scanned and i > 1:
             room = r[i] - r[i - 1]
             if rest > s.play[i - 1] + room:
                 rest = s.play[i - 1] + room
@@ -373,6 +398,37 @@ def fixed_relaxing_follow(t: FixedMovingTables, r: Reals, p: Reals, s: State, w:
         s.play[i] = rest
     s.play[0] = w
     return total
+
+
+@jit
+def fixed_moved_sum(t: FixedMovingTables, r: Reals, p: Reals, s: State, w: Any) -> Any:
+    """What the plays give once their input has gone to w, in fixed point."""
+    total = p[0] * w
+    for i in range(1, len(r)):
+        total = total + p[i] * fixed_moved(t, r, i, s, w)
+    return total
+
+
+@jit
+def fixed_moved_input(t: FixedMovingTables, r: Reals, p: Reals, s: State, h: Any) -> Any:
+    """Input of the plays at which their sum is h: of one time constant by a scan, else by halves between where it is
+    and the farthest, the nearer of two neighbours."""
+    if t.scanned:
+        s.play[0] = s.play[1]
+        return loop_solve(t.relaxed, s, h)
+    here = s.play[0]
+    total = fixed_moved_sum(t, r, p, s, here)
+    if total == h:
+        return here
+    low = here if total < h else -t.farthest
+    high = t.farthest if total < h else here
+    while high - low > 1:
+        middle = low + (high - low) // 2
+        if fixed_moved_sum(t, r, p, s, middle) >= h:
+            high = middle
+        else:
+            low = middle
+    return low if h - fixed_moved_sum(t, r, p, s, low) < fixed_moved_sum(t, r, p, s, high) - h else high
 
 
 @jit

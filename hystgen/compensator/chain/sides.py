@@ -7,6 +7,7 @@ change with time, so that their order makes no difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
@@ -16,36 +17,73 @@ from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.thermal.compensator import heat_absorb, heat_solve
 from hystgen.plays.slots import Reals
 
+Function = Callable[..., Any]
+
 
 class Blocks(NamedTuple):
-    """What the blocks of a chain do in one arithmetic, each function as in the C of the same name."""
+    """What the blocks of a chain do in one arithmetic: modules with functions named as in the C, and functions."""
 
-    lag: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # rest, absorb, solve
-    creep: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # and resting
-    ageing: tuple[Callable[..., Any], Callable[..., Any]]  # absorb, solve
-    ageing_settings: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # move, set, set_travel
-    gain: tuple[Callable[..., Any], Callable[..., Any]]
-    gain_settings: tuple[Callable[..., Any], Callable[..., Any]]  # reset, heat
-    saturation: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
-    target: Callable[..., Any]  # of the preview's line
-    front: tuple[Callable[..., Any], Callable[..., Any]]  # forward, inverse
-    plays: tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # follow, started, inverse input
-    finer: Callable[..., Any]  # what has to arrive, with bits below an input of the plays
+    lag: ModuleType
+    creep: ModuleType
+    ageing: ModuleType
+    thermal: ModuleType
+    resonance: ModuleType
+    drift: ModuleType
+    saturation: tuple[Function, Function]  # forward, inverse
+    target: Function  # of the preview's line
+    delayed: Function  # drive, of the line of those that wait
+    front: tuple[Function, Function]  # forward, inverse
+    plays: tuple[Function, Function, Function]  # follow, started, inverse input
+    finer: Function  # what has to arrive, with bits below an input of the plays
 
 
 class Sides(NamedTuple):
     """What both sides of the plays do, of tables, state and a number."""
 
-    drive_rest: Callable[..., Any]
-    drive_absorb: Callable[..., Any]
-    drive_solve: Callable[..., Any]
-    output_rest: Callable[..., Any]
-    output_absorb: Callable[..., Any]
-    output_resting: Callable[..., Any]
-    output_solve: Callable[..., Any]
+    drive_rest: Function
+    drive_absorb: Function
+    drive_solve: Function
+    output_rest: Function
+    output_absorb: Function
+    output_resting: Function
+    output_solve: Function
 
 
-def _one(block: OwnBlock, verb: str, j: int) -> Callable[..., Any]:
+def _each(verb: Function) -> Function:
+    """What n blocks of a kind do one after the other, of their tables and memory."""
+
+    @jit
+    def through(t: Any, s: Any, n: int, x: Any) -> Any:
+        for j in range(n):
+            x = verb(t, s, j, x)
+        return x
+
+    return through
+
+
+def _back(verb: Function) -> Function:
+    """The same from the last one to the first."""
+
+    @jit
+    def through(t: Any, s: Any, n: int, x: Any) -> Any:
+        for j in range(n - 1, -1, -1):
+            x = verb(t, s, j, x)
+        return x
+
+    return through
+
+
+def _tabled(verb: Function) -> Function:
+    """A verb that takes no tables, as one that does."""
+
+    @jit(inline=True)
+    def call(t: Any, s: Any, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        return verb(s, j, x)
+
+    return call
+
+
+def _one(block: OwnBlock, verb: str, j: int) -> Function:
     """What block `j` of the user's own does."""
     function = block.compiled[verb]
     if verb == "resting":
@@ -63,8 +101,8 @@ def _one(block: OwnBlock, verb: str, j: int) -> Callable[..., Any]:
     return call
 
 
-def _through(calls: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """What blocks do one after the other."""
+def _through(calls: Sequence[Function]) -> Function:
+    """What blocks of the user's own do one after the other."""
     if not calls:
 
         @jit(inline=True)
@@ -84,106 +122,82 @@ def _through(calls: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
 
 
 def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
-    """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them."""
-    lag_rest, lag_absorb, lag_solve = blocks.lag
-    creep_rest, creep_absorb, creep_solve, creep_resting = blocks.creep
-    ageing_absorb, ageing_solve = blocks.ageing
-    gain_absorb, gain_solve = blocks.gain
+    """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them.
 
-    def own(verb: str, given: Sequence[OwnBlock], begin: int, backwards: bool = False) -> Callable[..., Any]:
+    Modes have memory in the forward operator alone, so that the inverse passes over them.
+    """
+    lag, creep, mode = blocks.lag, blocks.creep, blocks.resonance
+    lag_rest, lag_absorb, lag_solve = _each(lag.lag_rest), _each(lag.lag_absorb), _back(lag.lag_solve)
+    creep_rest, creep_absorb = _each(creep.creep_rest), _each(creep.creep_absorb)
+    creep_solve, creep_resting = _back(creep.creep_solve), _back(creep.creep_resting)
+    ageing_absorb, ageing_solve = (
+        _each(_tabled(blocks.ageing.ageing_absorb)), _back(_tabled(blocks.ageing.ageing_solve))
+    )  # fmt: skip
+    heats_absorb, heats_solve = _each(_tabled(heat_absorb)), _back(_tabled(heat_solve))
+    gain_absorb, gain_solve = _each(_tabled(blocks.thermal.gain_absorb)), _back(_tabled(blocks.thermal.gain_solve))
+    mode_rest, mode_absorb = _each(_tabled(mode.mode_rest)), _each(mode.mode_absorb)
+
+    def own(verb: str, given: Sequence[OwnBlock], begin: int) -> Function:
         calls = [_one(block, verb, begin + j) for j, block in enumerate(given)]
-        return _through(calls[::-1] if backwards else calls)
+        return _through(calls[::-1] if verb in ("solve", "resting") else calls)
 
-    own_drive_rest, own_drive_absorb = own("rest", drives, 0), own("absorb", drives, 0)
-    own_drive_solve = own("solve", drives, 0, backwards=True)
+    own_drive_rest, own_drive_absorb, own_drive_solve = (own(verb, drives, 0) for verb in ("rest", "absorb", "solve"))
     ahead = len(drives)
-    own_output_rest, own_output_absorb = own("rest", outputs, ahead), own("absorb", outputs, ahead)
-    own_output_resting = own("resting", outputs, ahead, backwards=True)
-    own_output_solve = own("solve", outputs, ahead, backwards=True)
+    own_output_rest, own_output_absorb = (own(verb, outputs, ahead) for verb in ("rest", "absorb"))
+    own_output_resting, own_output_solve = (own(verb, outputs, ahead) for verb in ("resting", "solve"))
 
     @jit
     def drive_side_rest(t: ChainTables, s: Any, v: Any) -> Any:
         """Everything in front of the plays settles at drive v; what arrives there."""
-        x = v
-        for j in range(len(t.lag.exact)):
-            x = lag_rest(t.lag, s.lag, j, x)
-        return own_drive_rest(t.own, s.own, x)
+        return own_drive_rest(t.own, s.own, lag_rest(t.lag, s.lag, len(t.lag.exact), v))
 
     @jit
     def drive_side_absorb(t: ChainTables, s: Any, v: Any) -> Any:
         """The drive is v at this sample; what arrives in front of the plays."""
-        x = v
-        for j in range(len(t.lag.exact)):
-            x = lag_absorb(t.lag, s.lag, j, x)
-        return own_drive_absorb(t.own, s.own, x)
+        return own_drive_absorb(t.own, s.own, lag_absorb(t.lag, s.lag, len(t.lag.exact), v))
 
     @jit
     def drive_side_solve(t: ChainTables, s: Any, y: Any) -> Any:
         """The drive that leads to y in front of the plays."""
-        x = own_drive_solve(t.own, s.own, y)
-        for j in range(len(t.lag.exact) - 1, -1, -1):
-            x = lag_solve(t.lag, s.lag, j, x)
-        return x
+        return lag_solve(t.lag, s.lag, len(t.lag.exact), own_drive_solve(t.own, s.own, y))
+
+    @jit(inline=True)
+    def gains_absorb(t: ChainTables, s: Any, x: Any) -> Any:
+        """What gains make of x."""
+        x = ageing_absorb(t.ageing, s.ageing, len(t.ageing.turns), x)
+        x = heats_absorb(t.heat, s.heat, len(t.heat.turns), x)
+        return gain_absorb(t.gain, s.gain, len(t.gain), x)
+
+    @jit(inline=True)
+    def gains_solve(t: ChainTables, s: Any, y: Any) -> Any:
+        """What gains make y of."""
+        y = gain_solve(t.gain, s.gain, len(t.gain), y)
+        y = heats_solve(t.heat, s.heat, len(t.heat.turns), y)
+        return ageing_solve(t.ageing, s.ageing, len(t.ageing.turns), y)
 
     @jit
     def output_side_rest(t: ChainTables, s: Any, h: Any) -> Any:
         """Everything behind the plays settles at their sum h; the output."""
-        x = h
-        for j in range(len(t.creep.block)):
-            x = creep_rest(t.creep, s.creep, j, x)
-        x = own_output_rest(t.own, s.own, x)
-        for j in range(len(t.ageing.turns)):
-            x = ageing_absorb(s.ageing, j, x)
-        for j in range(len(t.heat.turns)):
-            x = heat_absorb(s.heat, j, x)
-        for j in range(len(t.gain)):
-            x = gain_absorb(s.gain, j, x)
-        return x
+        x = own_output_rest(t.own, s.own, creep_rest(t.creep, s.creep, len(t.creep.block), h))
+        return mode_rest(t.mode, s.mode, len(s.mode), gains_absorb(t, s, x))
 
     @jit
     def output_side_absorb(t: ChainTables, s: Any, h: Any) -> Any:
         """The sum of the plays is h at this sample; the output."""
-        x = h
-        for j in range(len(t.creep.block)):
-            x = creep_absorb(t.creep, s.creep, j, x)
-        x = own_output_absorb(t.own, s.own, x)
-        for j in range(len(t.ageing.turns)):
-            x = ageing_absorb(s.ageing, j, x)
-        for j in range(len(t.heat.turns)):
-            x = heat_absorb(s.heat, j, x)
-        for j in range(len(t.gain)):
-            x = gain_absorb(s.gain, j, x)
-        return x
+        x = own_output_absorb(t.own, s.own, creep_absorb(t.creep, s.creep, len(t.creep.block), h))
+        return mode_absorb(t.mode, s.mode, len(s.mode), gains_absorb(t, s, x))
 
     @jit
     def output_side_resting(t: ChainTables, s: Any, y: Any) -> Any:
         """The sum of the plays that gives the output y once everything has settled."""
-        x = y
-        for j in range(len(t.gain) - 1, -1, -1):
-            x = gain_solve(s.gain, j, x)
-        for j in range(len(t.heat.turns) - 1, -1, -1):
-            x = heat_solve(s.heat, j, x)
-        for j in range(len(t.ageing.turns) - 1, -1, -1):
-            x = ageing_solve(s.ageing, j, x)
-        x = own_output_resting(t.own, s.own, x)
-        for j in range(len(t.creep.block) - 1, -1, -1):
-            x = creep_resting(t.creep, s.creep, j, x)
-        return x
+        x = own_output_resting(t.own, s.own, gains_solve(t, s, y))
+        return creep_resting(t.creep, s.creep, len(t.creep.block), x)
 
     @jit
     def output_side_solve(t: ChainTables, s: Any, y: Any) -> Any:
         """The sum of the plays that gives the output y at this sample."""
-        x = y
-        for j in range(len(t.gain) - 1, -1, -1):
-            x = gain_solve(s.gain, j, x)
-        for j in range(len(t.heat.turns) - 1, -1, -1):
-            x = heat_solve(s.heat, j, x)
-        for j in range(len(t.ageing.turns) - 1, -1, -1):
-            x = ageing_solve(s.ageing, j, x)
-        x = own_output_solve(t.own, s.own, x)
-        for j in range(len(t.creep.block) - 1, -1, -1):
-            x = creep_solve(t.creep, s.creep, j, x)
-        return x
+        x = own_output_solve(t.own, s.own, gains_solve(t, s, y))
+        return creep_solve(t.creep, s.creep, len(t.creep.block), x)
 
     return Sides(
         drive_side_rest, drive_side_absorb, drive_side_solve, output_side_rest, output_side_absorb,

@@ -27,7 +27,7 @@ from hystgen.compensator.step import (
 from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
 from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
-from hystgen.effects.drift.compensator import LEAD, MOST_AHEAD, ONE, clock_drift, clock_start, clock_tick
+from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.thermal.compensator import heat_move, heat_reset
 from hystgen.plays import loop
@@ -69,13 +69,13 @@ from hystgen.plays.slots import (
     Reals,
 )
 
-SET, OUTPUT, APPLIED = 0, 1, 2
+SET, OUTPUT, APPLIED, REACHED = range(4)
 MOVING = 0
 
 
 class ChainState(NamedTuple):
-    """One instance. `real`: the offset that was set, what the output side gave last, and the drive applied last;
-    `flags`: whether any drive has been applied yet."""
+    """One instance. `real`: the offset that was set, what the output side gave last, the drive applied last, and what a
+    slew limit in the forward operator made of that; `flags`: whether any drive has been applied yet."""
 
     plays: State
     lost: Reals  # (n + 1,), what each play has lost below its last bit, where a nonlinear dashpot moves them
@@ -85,16 +85,19 @@ class ChainState(NamedTuple):
     ageing: AgeingState
     gain: Reals  # (k, 3)
     heat: Reals  # (k, 5)
-    clock: Reals  # (k, 3)
+    clock: Reals  # (k, 3), in fixed point (k, 5)
+    mode: Reals  # (k, 3), of the forward operator
+    waiting: Waiting  # of the forward operator
     own: Reals  # (m,)
     line: Line
     real: Reals
     flags: Counts
 
 
-def new_state(t: ChainTables) -> ChainState:
-    """Memory for one instance of the model; `init` gives it its values."""
+def new_state(t: ChainTables, inverse: bool) -> ChainState:
+    """Memory for one instance of an operator; `init` gives it its values."""
     dtype = t.threshold.dtype
+    modes, waiting = (0, 0) if inverse else (len(t.mode), t.delay.samples)
     return ChainState(
         loop.new_state(t.plays),
         np.zeros(len(t.threshold), dtype),
@@ -104,10 +107,12 @@ def new_state(t: ChainTables) -> ChainState:
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
         np.zeros((len(t.heat.turns), 5), dtype),
-        np.zeros((len(t.clock), 3), dtype),
+        np.zeros((len(t.clock), 5 if t.fixed else 3), dtype),
+        np.zeros((modes, 3), dtype),
+        Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),
         np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
-        np.zeros(3, dtype),
+        np.zeros(4, dtype),
         np.zeros(1, np.int64),
     )
 
@@ -130,10 +135,14 @@ def made_of(
 ) -> Operations:
     """The operations of models with effects in one arithmetic, with blocks of the user's own in front of the plays and
     behind them."""
-    ageing_move, ageing_set, ageing_set_travel = blocks.ageing_settings
-    gain_reset, gain_heat = blocks.gain_settings
+    ageing, thermal = blocks.ageing, blocks.thermal
+    ageing_move, ageing_set, ageing_set_travel = ageing.ageing_move, ageing.ageing_set, ageing.ageing_set_travel
+    gain_reset, gain_heat = thermal.gain_reset, thermal.gain_heat
+    drift = blocks.drift
+    clock_start, clock_tick, clock_drift = drift.clock_start, drift.clock_tick, drift.clock_drift
+    LEAD, MOST_AHEAD, ONE = drift.LEAD, drift.MOST_AHEAD, drift.ONE
     saturated, unsaturated = blocks.saturation
-    preview_target = blocks.target
+    preview_target, delayed = blocks.target, blocks.delayed
     front_forward, front_inverse = blocks.front
     follow, started, inverse_input = blocks.plays
     finer = blocks.finer
@@ -233,12 +242,12 @@ def made_of(
             s.plays.real[ANSWER] = expected(t, s)
 
     @jit
-    def absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """The actuator has seen drive v; the first one finds everything at rest."""
+    def absorb(t: ChainTables, s: ChainState, v: Any, reached: Any) -> None:
+        """The actuator has seen drive v, which `reached` came of; the first one finds everything at rest."""
         moving = s.flags[MOVING] != 0
         if moving:
             travelled(t, s, v)
-        x = entered_drive(t, v)
+        x = entered_drive(t, reached)
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
         h = follow(t, s, arrive(t.plays, s.plays, arriving(t, a)))
         s.plays.real[LEVEL] = h
@@ -247,7 +256,42 @@ def made_of(
         s.flags[MOVING] = 1
 
     @jit
-    def settle(t: ChainTables, s: ChainState, v: Any) -> None:
+    def slewed(t: ChainTables, s: ChainState, before: Any, v: Any) -> Any:
+        """The drive nearest to v that can be reached from another one in one step."""
+        if not t.slew or not s.flags[MOVING]:
+            return v
+        if v > before + t.number[RISING]:
+            return before + t.number[RISING]
+        if v < before - t.number[FALLING]:
+            return before - t.number[FALLING]
+        return v
+
+    @jit
+    def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
+        """The drive is v: it waits, and the amplifier follows."""
+        late = v
+        if len(s.waiting.sample):
+            if s.flags[MOVING]:
+                delay_put(s.waiting, v)
+            else:
+                delay_rest(s.waiting, v)
+            late = delayed(t.delay, s.waiting)
+        reached = slewed(t, s, s.real[REACHED], late)
+        if reached != late:
+            s.plays.counts[STATUS] |= SLEW_LIMITED
+        s.real[REACHED] = reached
+        absorb(t, s, v, reached)
+
+    @jit
+    def seen(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
+        """The drive is v."""
+        if inverse:
+            absorb(t, s, v, v)
+        else:
+            forward_absorb(t, s, v)
+
+    @jit
+    def settle(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
         """Everything is at rest at drive v, where the plays move like with any other."""
         if not finite(t, v):
             s.plays.counts[STATUS] |= HELD
@@ -258,18 +302,7 @@ def made_of(
         if s.flags[MOVING]:
             travelled(t, s, inside)
         s.flags[MOVING] = 0
-        absorb(t, s, inside)
-
-    @jit
-    def slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """The drive nearest to v that can be reached in one step."""
-        if not t.slew or not s.flags[MOVING]:
-            return v
-        if v > s.real[APPLIED] + t.number[RISING]:
-            return s.real[APPLIED] + t.number[RISING]
-        if v < s.real[APPLIED] - t.number[FALLING]:
-            return s.real[APPLIED] - t.number[FALLING]
-        return v
+        seen(t, s, inverse, inside)
 
     @jit
     def forward_step(t: ChainTables, s: ChainState, v: Any) -> Any:
@@ -280,10 +313,7 @@ def made_of(
         inside = clamp_drive(t, v)
         if inside != v:
             s.plays.counts[STATUS] |= INPUT_CLAMPED
-        reached = slewed(t, s, inside)
-        if reached != inside:
-            s.plays.counts[STATUS] |= SLEW_LIMITED
-        absorb(t, s, reached)
+        forward_absorb(t, s, inside)
         s.plays.real[ANSWER], bits = output_code(t, displacement(t, s, s.real[OUTPUT]))
         s.plays.counts[STATUS] |= bits
         return s.plays.real[ANSWER]
@@ -292,7 +322,7 @@ def made_of(
     def inverse_take(t: ChainTables, s: ChainState) -> None:
         """What is pending is what the actuator has seen."""
         if s.plays.counts[HAS_PENDING]:
-            absorb(t, s, s.plays.real[PENDING])
+            absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
             s.plays.counts[HAS_PENDING] = 0
 
     @jit
@@ -334,7 +364,7 @@ def made_of(
         w = inverse_input(t, s, h)
         a = finer(t, s, h, w, inverse_drive(t.plays, s.plays, h, w))
         v = drive_code(t, drive_side_solve(t, s, a) if moving else a)
-        reached = slewed(t, s, v)
+        reached = slewed(t, s, s.real[APPLIED], v)
         if reached != v:
             s.plays.counts[BITS] |= SLEW_LIMITED
         inside = clamp_drive(t, reached)
@@ -420,7 +450,7 @@ def made_of(
                 inverse_push(t, s, x[i])
             elif op[i] == OP_SETTLE:
                 inverse_take(t, s)
-                settle(t, s, x[i])
+                settle(t, s, inverse, x[i])
             elif op[i] == OP_OFFSET:
                 set_offset(t, s, entered_level(t, x[i]))
             elif op[i] == OP_TEMPERATURE:
@@ -448,8 +478,8 @@ def made_of(
             s.plays.counts[STATUS] = 0
 
     @jit
-    def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
+    def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
         """Let the actuator be at drive v before the next sample."""
-        absorb(t, s, v)
+        seen(t, s, inverse, v)
 
     return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)

@@ -22,16 +22,19 @@ from hystgen.compensator.chain.layout import (
     TRAVEL_BITS,
     ChainTables,
 )
-from hystgen.compensator.chain.moving import fixed_relaxing_follow
+from hystgen.compensator.chain.moving import PLAIN, fixed_moved_follow, fixed_moved_input
 from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import MOVING, ChainState, Codes
 from hystgen.compensator.layout import FixedTables
-from hystgen.effects.ageing.fixed import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
-from hystgen.effects.creep.fixed import creep_absorb, creep_rest, creep_resting, creep_solve
-from hystgen.effects.lag.fixed import lag_absorb, lag_rest, lag_solve
+from hystgen.effects.ageing import fixed as ageing
+from hystgen.effects.creep import fixed as creep
+from hystgen.effects.delay.compensator import fixed_delayed
+from hystgen.effects.drift import fixed as drift
+from hystgen.effects.lag import fixed as lag
+from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.saturation.fixed import saturated, unsaturated
-from hystgen.effects.thermal.fixed import gain_absorb, gain_heat, gain_reset, gain_solve
+from hystgen.effects.thermal import fixed as thermal
 from hystgen.front import curve
 from hystgen.plays.fixed import loop_solve, nearest, over_slope
 from hystgen.plays.loop import loop_absorb, loop_output
@@ -54,7 +57,7 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
     return w, 0
 
 
-# ---------------------------------------------------------------- chain_plays_fixed.c or chain_relaxing_fixed.c
+# ---------------------------------------------------------------- chain_plays_fixed.c or chain_moving_fixed.c
 
 
 @jit
@@ -66,8 +69,8 @@ def started(t: ChainTables, s: ChainState) -> Any:
 @jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
     """The plays follow their input w; their sum."""
-    if t.moving.scanned and s.flags[MOVING]:
-        total = fixed_relaxing_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
+    if t.moving.moves != PLAIN and s.flags[MOVING]:
+        total = fixed_moved_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
         return nearest(total, t.number[LEVEL_DROP])
     loop_absorb(t.plays, s.plays, w)
     return started(t, s)
@@ -81,9 +84,9 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
         inside = t.number[LARGEST_LEVEL]
     elif inside < -t.number[LARGEST_LEVEL]:
         inside = -t.number[LARGEST_LEVEL]
-    if t.moving.scanned and s.flags[MOVING]:
-        s.plays.play[0] = s.plays.play[1]
-        return loop_solve(t.moving.relaxed, s.plays, inside << t.number[LEVEL_DROP])
+    if t.moving.moves != PLAIN and s.flags[MOVING]:
+        given = inside << t.number[LEVEL_DROP]
+        return fixed_moved_input(t.moving, t.plays.threshold, t.plays.weight, s.plays, given)
     return loop_solve(t.plays, s.plays, inside << t.number[LEVEL_DROP])
 
 
@@ -189,18 +192,9 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 
 BLOCKS = Blocks(
-    (lag_rest, lag_absorb, lag_solve),
-    (creep_rest, creep_absorb, creep_solve, creep_resting),
-    (ageing_absorb, ageing_solve),
-    (ageing_move, ageing_set, ageing_set_travel),
-    (gain_absorb, gain_solve),
-    (gain_reset, gain_heat),
-    (saturated, unsaturated),
-    preview_target,
-    (front_forward, front_inverse),
-    (follow, started, inverse_input),
-    finer,
-)
+    lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
+    (front_forward, front_inverse), (follow, started, inverse_input), finer,
+)  # fmt: skip
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
 )  # fmt: skip

@@ -19,10 +19,13 @@ from hystgen.compensator.chain.moving import (
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import MOVING, ChainState, Codes
-from hystgen.effects.ageing.compensator import ageing_absorb, ageing_move, ageing_set, ageing_set_travel, ageing_solve
-from hystgen.effects.creep.compensator import creep_absorb, creep_rest, creep_resting, creep_solve
-from hystgen.effects.lag.compensator import lag_absorb, lag_rest, lag_solve
-from hystgen.effects.thermal.compensator import gain_absorb, gain_heat, gain_reset, gain_solve
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.delay.compensator import delayed
+from hystgen.effects.drift import compensator as drift
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.thermal import compensator as thermal
 from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays.loop import loop_absorb, loop_output, loop_solve
 
@@ -108,16 +111,7 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 
 BLOCKS = Blocks(
-    (lag_rest, lag_absorb, lag_solve),
-    (creep_rest, creep_absorb, creep_solve, creep_resting),
-    (ageing_absorb, ageing_solve),
-    (ageing_move, ageing_set, ageing_set_travel),
-    (gain_absorb, gain_solve),
-    (gain_reset, gain_heat),
-    (saturated, unsaturated),
-    preview_target,
-    (front_forward, front_inverse),
-    (follow, started, inverse_input),
-    finer,
-)
+    lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
+    (front_forward, front_inverse), (follow, started, inverse_input), finer,
+)  # fmt: skip
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

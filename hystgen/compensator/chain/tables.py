@@ -11,6 +11,7 @@ from hystgen.compensator.chain.layout import Compiled, Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import SHAPES as AGEING
 from hystgen.effects.base import USER, Effect, Place
+from hystgen.effects.delay import compensator as delay
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.model import SelfHeating
 from hystgen.parameters.schema import Compensation
@@ -47,8 +48,11 @@ def refusals(
     low, high = chain.cascade.input_range
     parts = Parts.of(chain.effects)
     for effect in chain.effects:
-        if operator != "inverse" and effect.name in ("delay", "resonance"):
-            yield effect, "only the inverse has it; emit the inverse alone"
+        if operator != "inverse" and effect.name == "delay" and parts.delay > delay.MOST_SAMPLES * seconds:
+            yield effect, (
+                f"{parts.delay / seconds:.6g} samples, and the forward operator keeps {delay.MOST_SAMPLES} at most; "
+                "emit the inverse alone"
+            )
         elif effect.name == "drift" and "drift" not in how.compensate:
             yield effect, (
                 "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
@@ -61,8 +65,8 @@ def refusals(
             )
         elif effect.name == "thermal" and not effect.columns and not isinstance(effect, SelfHeating):
             yield effect, "the heat of loops, open loop: its temperature drifts with the room's; measure it"
-        elif ARITHMETICS[arithmetic].fixed and (effect.name == "drift" or isinstance(effect, SelfHeating)):
-            yield effect, "in fixed point there is no C for a clock and for own heat; use float32"
+        elif ARITHMETICS[arithmetic].fixed and isinstance(effect, SelfHeating):
+            yield effect, "in fixed point there is no C for own heat; use float32"
         elif ARITHMETICS[arithmetic].fixed and effect.block:
             yield effect, "an effect of your own, whose block is in floating point; use float32"
         elif isinstance(effect, SelfHeating):
@@ -82,4 +86,4 @@ def refusals(
     without = list(moving.problems(chain.cascade, parts.plays))
     yield from without
     if ARITHMETICS[arithmetic].fixed and not without:
-        yield from moving.beyond_fixed(chain.cascade, parts.plays, seconds)
+        yield from moving.beyond_fixed(parts.plays)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis.data.items import Item, Model
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.data.signals import peaks, still
+from hystgen.diagnosis.data.signals import converter_step, peaks, still
 from hystgen.diagnosis.findings.kinds import Line, Ripple, StickSlip
 from hystgen.diagnosis.search import acceptance
 
@@ -310,14 +310,9 @@ def _ripple(
         amplitude=float(np.hypot(solution[0], solution[1])),
         share=share,
         records=tuple(dict.fromkeys(items[k].name for k in parts)),
-        converter_step=all(abs(_step(items[k].y) / pitch - 1.0) < acceptance.CONVERTER_STEP for k in parts),
+        converter_step=all(abs(converter_step(items[k].y) / pitch - 1.0) < acceptance.CONVERTER_STEP for k in parts),
     )
     return Removed(finding, after, share)
-
-
-def _step(y: Array) -> float:
-    """The smallest step between two outputs that occur."""
-    return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))
 
 
 # The strongest line or ripple first --------------------------------------------------------------------------
@@ -440,7 +435,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
     """How often the output stands and leaps over stretches in which the prediction moves by a few times the noise.
 
     What a lag or ringing misses is smooth: it continues from one stretch to the next, where a leap makes up for the
-    standing before it.
+    standing before it. And a jump is one: the output hardly moves before and after it, whatever a model predicts.
     """
     known = np.isfinite(error) & np.isfinite(item.y)
     e, y = error[known], item.y[known]
@@ -466,7 +461,14 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
         return None
     step = np.diff(e)
     at = np.flatnonzero((np.abs(step) > resolved) & (np.sign(step) == np.sign(np.diff(predicted))))
-    if len(at) < acceptance.SLIP_JUMPS:
+    if np.count_nonzero(_alone(np.abs(np.diff(y)), at)) < max(acceptance.SLIP_JUMPS, 0.5 * len(at)):
         return None
     first = float(item.run.t[np.flatnonzero(known)[at[0] + 1]])
     return StickSlip(item.name, len(at), first, float(np.median(np.abs(step[at]))))
+
+
+def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether the moves at some samples are far larger than those around them; a filter may spread them to the next."""
+    beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
+    around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
+    return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

@@ -112,6 +112,14 @@ def rms(errors: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(joined**2))) if len(joined) else float("nan")
 
 
+def compared(items: Sequence[Item]) -> tuple[int, int]:
+    """Samples that are compared, and samples recorded; the two ends of a record are two items."""
+    known: dict[str, Mask] = {}
+    for item in items:
+        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
+    return sum(int(np.count_nonzero(x)) for x in known.values()), sum(map(len, known.values()))
+
+
 class Model(Protocol):
     """A fitted model, as far as the records are judged by it."""
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import counted
 from hystgen.chain import chain
 from hystgen.diagnosis.data.items import Item, Model, rms
+from hystgen.diagnosis.data.signals import unresolved_edges
 from hystgen.diagnosis.findings.kinds import (
     DropOuts,
     ExchangedRecords,
@@ -208,8 +209,8 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
 def contradicted(items: Sequence[Item], fitted: Model) -> OtherHistory | None:
     """The finding where the starts, which depend on the history, are off by far more than the rest, else None.
 
-    `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. Of a session only
-    the first record begins behind the history.
+    `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. The history
+    precedes every one of them, of a session too.
     """
     return _off(*_parts(items, fitted, False))
 
@@ -229,7 +230,7 @@ def _parts(items: Sequence[Item], fitted: Model, own: bool) -> tuple[list[Array]
     """Errors that depend on the history, and errors that do not; `own`: with the offset of the latter."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
-        if item.history is None or (item.session is not None and item.part.start):
+        if item.history is None:
             continue
         end = settled(item.run.v, fitted.reach)
         if own and np.isfinite(e[end:]).any():
@@ -311,6 +312,9 @@ def prepare(
             if len(wrong):
                 notes.append(faults.sentence(course.name, wrong, what))
                 repaired.append(IsolatedSamples(course.name, channel, float(record.t[wrong[0]]), len(wrong)))
+        edges = np.count_nonzero(unresolved_edges(course.v)[course.first :])
+        if edges:
+            notes.append(f"{course.name}: {counted(int(edges), 'sample')} at steps within one or two not compared")
     to_fit = [_item(c, r, rest) for c, r in zip(fit_courses, records, strict=True)]
     held = [_item(c, r, rest) for c, r in zip(held_courses, holdout, strict=True)]
     to_fit, held = _in_session(to_fit, held)
@@ -371,6 +375,7 @@ def _without_faults(ready: Prepared) -> Prepared:
 def _item(course: Course, record: Record, rest: float) -> Item:
     y = course.y.copy()
     y[: course.first] = np.nan
+    y[unresolved_edges(course.v)] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
     turns = None if course.start is None else course.start.turns
     return Item(course.name, run, y, course.history, course.output_range, turns=turns, timed=record.timed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,16 +23,19 @@ Places = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise rms in output units by each way that the records allow, and the one that is used.
+    """Noise rms in output units by each way that the records allow, the one that is used, and its name `ruled`.
 
     Holds contain all noise that is faster than they last; repeated periods everything that does not repeat; differences
-    only the changes from sample to sample, so they are a lower bound where the noise is coloured.
+    only the changes from sample to sample, so they are a lower bound where the noise is coloured. No record has less
+    than the rounding of its numbers, `resolution`, and a share of the range that no sensor resolves.
     """
 
     rms: float
     holds: float | None
     differences: float | None
     periods: float | None
+    resolution: float = 0.0
+    ruled: str = "differences"
 
 
 def noise_floor(items: Sequence[Item]) -> NoiseFloor:
@@ -39,8 +43,21 @@ def noise_floor(items: Sequence[Item]) -> NoiseFloor:
     holds = _pooled([part for item in items for part in _holds(item)], acceptance.QUIET_HOLDS)
     differences = _pooled([part for item in items for part in _differences(item)], 0.5)
     periods = _pooled([part for item in items for part in _periods(item)], 0.5)
-    measured = [x for x in (holds, periods) if x is not None]
-    return NoiseFloor(min(measured) if measured else differences or 0.0, holds, differences, periods)
+    measured = {name: x for name, x in (("holds", holds), ("periods", periods)) if x is not None}
+    ruled = min(measured, key=lambda name: measured[name]) if measured else "differences"
+    rms = measured.get(ruled, differences or 0.0)
+    seen = [item.y[item.known] for item in items if item.known.any()]
+    least = acceptance.LEAST_NOISE * max((float(np.ptp(y)) for y in seen), default=0.0)
+    steps = [step for step in map(converter_step, seen) if math.isfinite(step)]
+    resolution = max(float(np.median(steps)) / math.sqrt(12.0) if steps else 0.0, least)
+    if rms <= resolution:
+        rms, ruled = resolution, "resolution"
+    return NoiseFloor(rms, holds, differences, periods, resolution, ruled)
+
+
+def converter_step(y: Array) -> float:
+    """The smallest step between two outputs that occur; infinite where there is one alone."""
+    return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))
 
 
 def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None:
@@ -52,13 +69,21 @@ def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None
 
 def still(v: Array, least: int) -> list[tuple[int, int]]:
     """Stretches [first, last) of at least `least` samples over which the drive stands still."""
-    tolerance = acceptance.HOLD_DRIVE * max(float(np.ptp(v)), 1e-300)
+    tolerance = max(stands_within(v), 1e-300)
     found, first = [], 0
     for k in np.append(np.flatnonzero(np.abs(np.diff(v)) > tolerance), len(v) - 1):
         if k + 1 - first >= least and np.ptp(v[first : k + 1]) <= 2.0 * tolerance:
             found.append((first, int(k) + 1))
         first = int(k) + 1
     return found
+
+
+def stands_within(v: Array) -> float:
+    """The change of a drive from sample to sample up to which it stands: noise of its measurement, or a code of it."""
+    swing = float(np.ptp(v))
+    code = converter_step(v)
+    jitter = 1.001 * code if code <= acceptance.COARSE_DRIVE * swing else 0.0
+    return max(acceptance.HOLD_DRIVE * swing, jitter)
 
 
 def _holds(item: Item) -> list[tuple[float, int]]:
@@ -68,8 +93,8 @@ def _holds(item: Item) -> list[tuple[float, int]]:
         begin = first + int(acceptance.HOLD_SETTLING * (last - first))
         y, t = item.y[begin:last], item.run.t[begin:last]
         known = np.isfinite(y)
-        if np.count_nonzero(known) < acceptance.HOLD_SAMPLES // 2:
-            continue
+        if np.count_nonzero(known) < acceptance.HOLD_SAMPLES // 2 or np.ptp(y[known]) == 0.0:
+            continue  # too little, or less than a converter's step
         y, t = y[known], t[known] - item.run.t[first]
         # creep and drift within a hold are smooth in the logarithm of time
         s = np.log(np.maximum(t, 1e-12))
@@ -96,7 +121,7 @@ def _rings(x: Array) -> bool:
 
 def _differences(item: Item) -> list[tuple[float, int]]:
     """Variance of white noise with the third differences of a record, and its samples."""
-    y = item.y[item.known]
+    y = _sampled(item.y[item.known])
     if len(y) < acceptance.HOLD_SAMPLES:
         return []
     # third differences of white noise have 20 times its variance; their median absolute deviation ignores events
@@ -105,8 +130,23 @@ def _differences(item: Item) -> list[tuple[float, int]]:
     return [(scale**2 / 20.0, len(y))]
 
 
+def _sampled(y: Array) -> Array:
+    """The samples that were measured, without those held or interpolated between them, if these are most."""
+    for order in (1, 2):
+        changes = np.abs(np.diff(y, order))
+        at = np.flatnonzero(changes > EXACT * float(np.ptp(y))) if len(y) > order else np.empty(0, dtype=np.intp)
+        if 2 <= len(at) <= acceptance.HELD_SHARE * len(changes):
+            every = max(2, int(np.median(np.diff(at))))
+            return y[(int(at[0]) + 1) % every :: every]
+    return y
+
+
+EXACT = 1e-9
+"""Changes of an output below this share of its range come from the arithmetic alone."""
+
+
 def _periods(item: Item) -> list[tuple[float, int]]:
-    """Variance of what does not repeat from one period of the drive to the next, behind the first one."""
+    """Variance of what does not repeat from one period of the drive to the next."""
     v = item.run.v
     n = len(v)
     swing = float(np.ptp(v))
@@ -118,14 +158,15 @@ def _periods(item: Item) -> list[tuple[float, int]]:
     falls = np.flatnonzero(correlation < 0.5 * correlation[0])
     if not len(falls):
         return []
-    peak = int(falls[0] + np.argmax(correlation[falls[0] : n // 2])) if falls[0] < n // 2 else 0
+    peak = int(falls[0] + np.argmax(correlation[falls[0] : n // 2 + 1])) if falls[0] <= n // 2 else 0
     for period in range(max(peak - 2, least), peak + 3):
         apart = v[period:] - v[:-period]
         if len(apart) > least and np.sqrt(np.mean(apart**2)) < acceptance.PERIOD_REPEATS * swing:
-            changed = item.y[2 * period :] - item.y[period:-period]
-            changed = changed[np.isfinite(changed)]
-            if len(changed) > least:
-                return [(float(np.var(changed) / 2.0), len(changed))]
+            for first in (period, 0):  # behind the first period, or of two alone
+                changed = item.y[first + period :] - item.y[first : n - period]
+                changed = changed[np.isfinite(changed)]
+                if len(changed) > least:
+                    return [(float(np.var(changed) / 2.0), len(changed))]
     return []
 
 
@@ -135,6 +176,26 @@ def _periods(item: Item) -> list[tuple[float, int]]:
 def reversals(v: Array) -> Places:
     """Samples at which the drive turns, by more than a share of its range."""
     return _moves(v)[1]
+
+
+def unresolved_edges(v: Array) -> NDArray[np.bool_]:
+    """Samples of which nobody knows what the drive did between them: its jumps from one stand to the next.
+
+    A jump within a sample, or two if the converter averages, may begin anywhere in it, held or straight. So its samples
+    and the one behind them show what is assumed of the edge, where even a small lag makes a difference.
+    """
+    swing = float(np.ptp(v))
+    step = np.abs(np.diff(v))
+    moves = step > stands_within(v)
+    found = np.zeros(len(v), dtype=bool)
+    stands, longest = acceptance.EDGE_STANDS, acceptance.EDGE_SAMPLES
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(np.int8)))
+    for first, last in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
+        jumps = last - first <= longest and float(np.sum(step[first:last])) > acceptance.EDGE * swing
+        alone = not moves[max(first - stands, 0) : first].any() and not moves[last : last + stands].any()
+        if jumps and alone:
+            found[first + 1 : last + 2] = True
+    return found
 
 
 def one_loop(items: Sequence[Item]) -> bool:

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.data import disturbances, preparing
-from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.data.items import Item, compared, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure
 from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, Stretch
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted
-from hystgen.diagnosis.search.selection import Found, Outcome
+from hystgen.diagnosis.search.selection import Found, Outcome, Ranked
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -77,13 +77,35 @@ def result_of(
             *([ONE_LOOP] if (rivals or structured) and one_loop else []),
             *(more for each in remaining for more in each.advice()),
         ),
-        ranking=tuple(
-            tuple(Contender(t.name, t.option.label, t.fitted.rms, t.held_out) for t in each) for each in found.rankings
-        ),
+        ranking=tuple(tuple(_contender(each, unit) for each in ranked) for ranked in found.rankings),
         inverse=inverse,
+        noise_from=noise.ruled,
+        compared=compared(everything),
+        withdrawn=found.withdrawn,
     )
     in_digits: Result = _in_digits(result)
     return in_digits
+
+
+def _contender(ranked: Ranked, unit: str | None) -> Contender:
+    tried, refused = ranked.tried, ranked.refused
+    why = None if refused is None else REFUSALS[refused.why].format(
+        value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else ""
+    )  # fmt: skip
+    return Contender(tried.name, tried.option.label, tried.fitted.rms, tried.held_out, why)
+
+
+REFUSALS = {
+    "one_loop": "it leaves {value:.0%} of the gap above the noise, and of one loop at most {limit:.0%} supports a name",
+    "little": "on equal terms it removes {value:.3g}{unit} rms, and {limit:.3g}{unit} is needed",
+    "chance": "chance explains what it removes from held-out records (p = {value:.1g}, at most {limit:g} is needed)",
+    "unsure": "neither held-out nor fitted records are sure of it (p = {value:.1g}, at most {limit:g} is needed)",
+    "small": "it removes {value:.0%} of the gap, and a name needs {limit:.0%}",
+    "most": "the effects found leave {value:.3g}{unit} rms, most of {limit:.3g}{unit}",
+    "few": "{value:.0%} of the samples were compared, and a name needs {limit:.0%}",
+    "other": "another shape does better, or as well with fewer numbers",
+}
+"""Why an effect that was tried has no name, in words."""
 
 
 def _in_digits(value: Any) -> Any:
@@ -132,19 +154,27 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
     effects = []
     for k, each in enumerate(found.found):
         later = sum(other.name == each.name for other in found.found[k + 1 :])
+        parameters = _parameters_of(found.fitted, each.name, later)
         effects.append(
             NamedEffect(
                 each.name,
-                _parameters_of(found.fitted, each.name, later),
+                parameters,
                 sure.of(found.fitted, each.name, later),
                 (each.before - each.after) / refitted if refitted else 0.0,
                 each.before,
                 each.after,
                 each.p_value,
                 _evidence(each),
+                fits.at_an_end(found.fitted, each.name, later) or _twice(parameters.get("time_constants", ())),
             )
         )
     return tuple(effects)
+
+
+def _twice(times: Sequence[float]) -> bool:
+    """Whether two time constants are one."""
+    ordered = sorted(times)
+    return any(b <= (1.0 + acceptance.BETTER) * a for a, b in itertools.pairwise(ordered))
 
 
 def _advice(one: str, other: str) -> str:
@@ -172,6 +202,10 @@ DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
 
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 """Time constants of the averages of the drive that stand for rates and creep, in samples."""
+
+
+LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
+"""Distances of the averages of the drive over its travel, as shares of the drive range: as many as of the times."""
 
 
 @dataclass(frozen=True)
@@ -253,10 +287,13 @@ def described(items: Sequence[Item], errors: Sequence[Array], noise: float, held
 
 
 def _rate_free(free: float, with_rates: float) -> bool | None:
-    """Whether drive and memory explain the error without rates; None where nothing explains much of it."""
+    """Whether drive and memory explain the error without rates; None where nothing explains much of it, or rates add to
+    a small share what does not matter either."""
     if with_rates < acceptance.VARIABLE_SHARE and free < acceptance.VARIABLE_SHARE:
         return None
-    return bool(free > acceptance.RATE_FREE_SHARE * with_rates)
+    if free > acceptance.RATE_FREE_SHARE * with_rates:
+        return True
+    return False if with_rates - free > acceptance.VARIABLE_SHARE else None
 
 
 def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[str, float]]:
@@ -293,8 +330,11 @@ def _folds(n: int) -> NDArray[np.intp]:
 
 
 def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
-    """Cross-validated shares explained by rate-free variables (drive and plays), and by these together with averages of
-    the drive over several times, which stand for rates and creep."""
+    """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over the distance
+    that it travels), and by these together with averages over several times, which stand for rates and creep.
+
+    What is left of a hysteresis that plays do not follow goes with both averages: only what the second add is rate.
+    """
     widest = max(float(np.ptp(item.run.v)) for item in items)
     low = min(float(item.run.v.min()) for item in items)
     every = max(1, sum(int(np.isfinite(e).sum()) for e in errors) // acceptance.SEARCHED)
@@ -306,8 +346,9 @@ def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, flo
         v = (item.run.v - low) / max(widest, 1e-300)
         plays = operators.plays(v, DESCRIBED_PLAYS, np.full(len(DESCRIBED_PLAYS), v[0])) - v
         powers = [v, v**2, v**3]
+        free = [*powers, *plays, *(plays * v), *(v - _averaged_over_travel(v, length) for length in LENGTHS)]
         rates = [v - _averaged(v, np.exp(-1.0 / n)) for n in MEMORIES]
-        tables.append(np.stack([*powers, *plays, *(plays * v), *rates])[:, at])
+        tables.append(np.stack([*free, *rates])[:, at])
         values.append(error[at])
     if not values:
         return 0.0, 0.0
@@ -315,8 +356,8 @@ def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, flo
     if len(e) < acceptance.DESCRIBED_SAMPLES:
         return 0.0, 0.0
     x = (x - x.mean(axis=1, keepdims=True)) / np.maximum(x.std(axis=1, keepdims=True), 1e-12)
-    free, with_rates = _regressed(x[: 3 + 2 * len(DESCRIBED_PLAYS)], e), _regressed(x, e)
-    return free, max(free, with_rates)
+    rate_free, with_rates = _regressed(x[: -len(MEMORIES)], e), _regressed(x, e)
+    return rate_free, max(rate_free, with_rates)
 
 
 def _averaged(v: Array, decay: float) -> Array:
@@ -324,6 +365,18 @@ def _averaged(v: Array, decay: float) -> Array:
 
     found, _ = lfilter([1.0 - decay], [1.0, -decay], v, zi=[decay * v[0]])
     return np.asarray(found)
+
+
+def _averaged_over_travel(v: Array, length: float) -> Array:
+    """The same over a distance of the drive: it does not depend on the rate, and stands where the drive does."""
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(v)))])
+    if travelled[-1] == 0.0:
+        return v
+    places = np.linspace(0.0, travelled[-1], 2 * len(v))
+    moving = np.concatenate([[True], np.diff(travelled) > 0.0])
+    even = np.interp(places, travelled[moving], v[moving])
+    averaged = _averaged(even, float(np.exp(-(places[1] - places[0]) / length)))
+    return np.asarray(np.interp(travelled, places, averaged))
 
 
 def _regressed(x: Array, e: Array) -> float:

@@ -301,7 +301,7 @@ class Structure(Finding):
     held_out_alone: tuple[str, ...]
 
     def sentence(self, unit: str | None) -> str:
-        times = f", {self.above_floor:.3g} times the noise" if self.above_floor else ""
+        times = f", {times_noise(self.above_floor)}" if self.above_floor else ""
         return f"an error of {self.rms:.3g}{_unit(unit)} rms is left{times}; it {self.words()}"
 
     def words(self) -> str:
@@ -363,6 +363,15 @@ def faults(findings: Sequence[Finding]) -> str:
 def several(names: Sequence[str]) -> str:
     """Names of records, in short where there are more than three."""
     return ", ".join(names) if len(names) <= 3 else f"{len(names)} records ({names[0]}, {names[1]}, ..)"
+
+
+MANY = 100.0
+"""[times the noise] More is not said in figures: the noise is an estimate, and twice as much would mean the same."""
+
+
+def times_noise(ratio: float) -> str:
+    """An error as a multiple of the noise, in words."""
+    return f"{ratio:.2g} times the noise" if ratio <= MANY else f"more than {MANY:g} times the noise"
 
 
 def _unit(unit: str | None) -> str:

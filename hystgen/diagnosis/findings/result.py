@@ -7,18 +7,20 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics import arguments, display, drawing
 from hystgen.diagnosis.findings import kinds
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Structure
 from hystgen.diagnosis.search import acceptance
 
 if TYPE_CHECKING:
+    from hystgen.model import Model
     from hystgen.parameters.files import Parameters
 
 Array = NDArray[np.float64]
@@ -45,7 +47,8 @@ class Gap:
 class NamedEffect:
     """An effect that was found: `parameters` as its entry of a parameter file has them, `intervals` of 95 % for them.
 
-    `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units.
+    `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units;
+    `at_an_end`: whether a number of it is at an end of its range, or two of its parts are one: its shape is open.
     """
 
     name: str
@@ -56,6 +59,7 @@ class NamedEffect:
     holdout_after: float
     p_value: float
     evidence: str
+    at_an_end: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,13 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Contender:
-    """A shape of an effect that was fitted to the end, with its rms errors."""
+    """A shape of an effect that was fitted to the end, with its rms errors; `refused`: why it has no name, or None."""
 
     name: str
     shape: str
     fit: float
     holdout: float
+    refused: str | None = None
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,12 @@ class Inverse:
 
 @dataclass(frozen=True)
 class Result:
-    """Everything in `diagnosis.json`, under the names of its keys; numbers have eight digits."""
+    """Everything in `diagnosis.json`, under the names of its keys; numbers have eight digits.
+
+    `noise_from`: what the noise floor was estimated from, `holds`, `periods`, `differences` or `resolution`;
+    `compared`: samples that took part, and samples recorded; `withdrawn`: effects that were accepted one by one and
+    do not stand in the end, since together they leave most of the gap, or too few samples were compared.
+    """
 
     verdict: str
     noise_floor: float
@@ -102,6 +112,9 @@ class Result:
     advice: tuple[str, ...]
     ranking: tuple[tuple[Contender, ...], ...]
     inverse: Inverse
+    noise_from: str = "differences"
+    compared: tuple[int, int] = (0, 0)
+    withdrawn: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -117,12 +130,13 @@ class Signals:
     after: Array
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosis:
     """A finished diagnosis: its `result`, and `parameters` with the effects added.
 
     `notes`: what was done to the records, one sentence each; `signals`: the records with their errors; `page`: makes
-    `report.html` of this and the text of the parameter file, None where no report is written.
+    `report.html` of this and the text of the parameter file, None where no report is written; `figures`: what draws
+    each figure of the page, by name.
     """
 
     result: Result
@@ -131,7 +145,33 @@ class Diagnosis:
     signals: tuple[Signals, ...] = field(compare=False)
     page: Callable[[Diagnosis, str], str] | None = field(default=None, compare=False, repr=False)
 
+    figures: Mapping[str, Callable[[Diagnosis], Any]] = field(default_factory=dict, compare=False)
+
     FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
+
+    def __repr__(self) -> str:
+        effects = ", ".join(effect.name for effect in self.result.effects)
+        return f"<Diagnosis {self.parameters.name}: {self.verdict}{': ' if effects else ''}{effects}>"
+
+    def _repr_html_(self) -> str:
+        first = next(iter(self.figures.values()), None)
+        return display.block(repr(self), self.sentence(), None if first is None else partial(first, self))
+
+    @property
+    def model(self) -> Model:
+        """The model with the effects that were found, to simulate, invert and emit."""
+        from hystgen.model import Model
+
+        return Model(self.parameters)
+
+    def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Any:
+        """A figure of the report, by default how each effect shrinks the held-out error.
+
+        `which`: gap, overlay, records, time, against or frequency. Returns matplotlib's Figure, which a notebook shows;
+        with `path`, a .png or .svg, it is written there as well. Raises ValueError, PlotError, OSError.
+        """
+        arguments.choice("which", which, tuple(self.figures))
+        return drawing.picture(partial(self.figures[which], self), path)
 
     @cached_property
     def content(self) -> dict[str, Any]:
@@ -150,37 +190,80 @@ class Diagnosis:
         return self.result.verdict
 
     def sentence(self) -> str:
-        """The verdict in a sentence."""
+        """The verdict in a few sentences, what limits it first."""
+        parts = [*self._limits(), self._finding()]
+        ends = dict.fromkeys(effect.name for effect in self.result.effects if effect.at_an_end)
+        if ends:
+            parts.append(f"A number of {', '.join(ends)} is at an end of its range: its shape is not certain")
+        wrong = kinds.faults(self.result.unexplained)
+        if wrong:
+            parts.append(f"The data have faults: {wrong}")
+        return " ".join(f"{part}." for part in parts)
+
+    def _limits(self) -> list[str]:
+        """What a reader has to know before any name: how few samples were compared, how much is left."""
+        result = self.result
+        compared, recorded = result.compared
+        said = []
+        if compared < acceptance.FEW_COMPARED * recorded:
+            said.append(f"Only {compared} of {recorded} samples were compared")
+        left = result.gap.after.holdout
+        if self.verdict == "effects_found" and left > acceptance.MUCH_LEFT * result.noise_floor:
+            said.append(f"An error of {self._rms(left)} rms is not explained, {self._times(left)}")
+        return said
+
+    def _finding(self) -> str:
+        """The verdict itself."""
         result = self.result
         gap, unit, seen = result.gap, result.unit, result.unexplained
-        before, after = (
-            f"{error:.4g}{' ' if unit else ''}{unit or ''}" for error in (gap.refitted.holdout, gap.after.holdout)
-        )
-        wrong = kinds.faults(seen)
-        but = f" The data have faults: {wrong}." if wrong else ""
+        before, after = self._rms(gap.refitted.holdout), self._rms(gap.after.holdout)
         structured = any(isinstance(each, Structure) for each in seen)
         if self.verdict == "effects_found":
             names = ", ".join(self._name(effect.name) for effect in result.effects)
-            more = ""
-            if result.noise_floor and structured:
-                times = gap.after.holdout / result.noise_floor
-                more = f", {times:.2g} times the noise and with structure"
-            return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}.{but}"
+            more = f", {self._times(gap.after.holdout)} and with structure" if structured else ""
+            if gap.after.holdout > acceptance.MUCH_LEFT * result.noise_floor:
+                return f"Part of it: {names}. The held-out rms error falls from {before} to {after}"
+            return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
-            noise = f"the refitted model leaves {after} rms on held-out records, which is noise"
-            return f"Nothing is missing: {noise}.{but}"
-        missing = (
-            f"Something is missing that the catalogue does not hold or the records cannot show: {after} rms is left"
-        )
+            return f"Nothing is missing: the refitted model leaves {after} rms on held-out records, which is noise"
+        missing = f"{self._missing()}: {after} rms is left{self._nearest()}"
         disturbing = [each for each in seen if not isinstance(each, Fault | Structure)]
         if not disturbing:
-            return f"{missing}.{but}"
+            return missing
         first = disturbing[0].sentence(unit)
         more = f", and {len(disturbing) - 1} more below" if len(disturbing) > 1 else ""
         share = max(getattr(each, "share", 1.0) for each in disturbing)
         if share >= acceptance.MAIN_SHARE or not structured:
-            return f"The records are disturbed, and no effect is named: {first}{more}.{but}"
-        return f"{missing}. The records are disturbed too: {first}{more}.{but}"
+            return f"The records are disturbed, and no effect is named: {first}{more}"
+        return f"{missing}. The records are disturbed too: {first}{more}"
+
+    def _missing(self) -> str:
+        """The subject of a verdict without a name."""
+        if self._closest() is None:
+            return "Something is missing that the catalogue does not hold or the records cannot show"
+        return "Something is missing, and no effect is named"
+
+    def _nearest(self) -> str:
+        """The candidate that leaves least, and why it has no name; empty if none removes anything."""
+        closest = self._closest()
+        if closest is None:
+            return ""
+        if self.result.withdrawn and not self._limits():
+            named = " and ".join(self.result.withdrawn)
+            return f". {named[0].upper()}{named[1:]} would explain a part of it, but most would remain"
+        return f". The nearest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
+
+    def _closest(self) -> Contender | None:
+        first = self.result.ranking[0] if self.result.ranking else ()
+        enough = (1.0 - acceptance.BETTER) * self.result.gap.refitted.holdout
+        return min((each for each in first if each.holdout <= enough), key=lambda each: each.holdout, default=None)
+
+    def _rms(self, error: float) -> str:
+        unit = self.result.unit
+        return f"{error:.4g}{' ' if unit else ''}{unit or ''}"
+
+    def _times(self, error: float) -> str:
+        return kinds.times_noise(error / self.result.noise_floor)
 
     def not_emitted(self) -> str:
         """Why there is no C for the model with the effects yet; empty where `emit` takes it."""

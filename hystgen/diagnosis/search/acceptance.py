@@ -95,10 +95,10 @@ BLOCKS = 20
 """[blocks] Least number of blocks of a record where its errors remember longer than that allows. Changed by:
 acceptance::test_blocks_are_longer_than_errors_remember."""
 
-SEEN_IN_FIT = 0.25
-"""[times the remaining error or the noise] What an effect removes at least from the records its numbers are fitted to;
-an effect of held-out records alone may be another one's. Changed by: blind pair,
-acceptance::test_an_effect_has_to_show_in_fitted_records."""
+SEEN_IN_BOTH = 0.25
+"""[times the remaining error or the noise] What an effect removes at least from fitted and from held-out records, while
+it removes `FIRST_REMOVES` or `FURTHER_REMOVES` from either; what one kind alone shows may be another one's. Changed by:
+blind pair, acceptance::test_an_effect_has_to_show_in_both."""
 
 ALIKE = 0.25
 """[share of the held-out rms] Effects within this are not separable, unless chance explains it with less than
@@ -121,6 +121,21 @@ MOST_OF_GAP = 0.5
 """[share of the gap above the noise] Records of one loop support a name only where at most this is left, and leave open
 all names that leave at most this: two functions, up and down, show little more than whose shape is handier. Set by: 180
 fresh cases of kind poor, 7 of which had a false second name without it (commit 86e5f08, seeds not recorded)."""
+
+LEAST_EXPLAINED = 0.5
+"""[share of the variance above the noise] Names stand only where together they leave at most this of held-out and of
+fitted records: most is explained. What a disturbance shares with an effect is less: room temperature on the gain and
+a slow crosstalk line kept 0.74 to 0.79 of the fitted variance under false names, right names at most 0.28. Set by:
+second_plants foreign 0:10, single 0:13. Changed by: acceptance::test_names_explain_most."""
+
+MUCH_LEFT = 3.0
+"""[times the noise floor] A verdict that names effects says first what they leave if it is more. Changed by: blind
+single, acceptance::test_what_a_verdict_says_first."""
+
+FEW_COMPARED = 0.25
+"""[share of the samples] If fewer took part a verdict says so first and names nothing: of blind records without a known
+history at least 0.5 do, of a test whose amplitude grows to the end 0.02 to 0.06. Set by: blind of all kinds, first
+71000, and second_plants. Changed by: acceptance::test_what_a_verdict_says_first."""
 
 MOST_EFFECTS = 5
 """[effects] Most effects that are added: no case of any block has more than two. Changed by: run time of blind."""
@@ -279,6 +294,15 @@ THIN_COLUMN = 0.01
 """[share of its range, rms] The same for a further column. Changed by:
 acceptance::TestThinning::test_a_column_that_jitters."""
 
+EDGE = 0.03
+"""[share of the drive range] A jump of the drive is larger: of less the output moves by no more than some tens of times
+the noise, and a sample of it counts little. Changed by: acceptance::TestEdges::test_a_jump."""
+
+EDGE_SAMPLES, EDGE_STANDS = 2, 4
+"""[samples], [samples] Most of a jump that is not resolved, from one sample to the next or over one that averages, and
+fewest over which the drive stands before and behind it. With these samples compared a lag, a delay or a rate dependence
+left 2 to 8 times the noise, without them 1.0 to 1.1. Set by: second_plants single 0:13, pair 0:6."""
+
 # Noise floor -------------------------------------------------------------------------------------------------
 
 HOLD_SAMPLES = 40
@@ -288,6 +312,10 @@ Changed by: acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 HOLD_DRIVE = 2e-4
 """[share of the drive range] The drive holds while it stays within this: three codes of a 14-bit converter. Changed by:
 acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
+
+COARSE_DRIVE = 1e-3
+"""[share of the drive range] A drive also holds while it changes by one code of its converter, if that is no larger:
+ten bits. Coarser values are levels. Changed by: acceptance::TestNoiseFloor::test_a_coarse_drive."""
 
 HOLD_SETTLING = 0.4
 """[share of a hold] Its beginning, which is left out: what still moves there is no noise. Changed by:
@@ -310,6 +338,15 @@ acceptance::TestNoiseFloor::test_a_hold_that_rings."""
 PERIOD_REPEATS = 2e-3
 """[share of the drive range, rms] Periods whose drives differ by less measure noise: the response to the difference
 adds as large a share of the output to it. Changed by: acceptance::TestNoiseFloor::test_periods_of_a_jittering_drive."""
+
+HELD_SHARE = 0.55
+"""[share of the changes] An output with at most this of them other than 0 has samples that were held or interpolated:
+of one of which every other sample was, half are. Changed by: acceptance::TestNoiseFloor::test_samples_between."""
+
+LEAST_NOISE = 1e-5
+"""[share of the output range] Noise that every record is taken to have: 17 bits, more than sensors of a stage resolve
+sample by sample. Without it records of a simulation would have a floor of 0, and an error of any size would be far
+above it. Changed by: acceptance::TestNoiseFloor::test_records_without_noise."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 
@@ -501,6 +538,11 @@ acceptance::TestStickSlip::test_samples_that_hardly_move_do_not_count."""
 SLIP_JUMPS = 5
 """[jumps] Fewest of stick-slip; ten times as many samples, and five times as many stretches, have to move. Changed by:
 acceptance::TestStickSlip::test_how_many_jumps."""
+
+SLIP_ALONE = 3.0
+"""[times the moves around it] Of a jump: the moves of a smooth output, however fast, are about as large as those two to
+five samples away. Most jumps are of that kind. Changed by:
+acceptance::TestStickSlip::test_a_fast_output_does_not_jump."""
 
 # What drives are like ----------------------------------------------------------------------------------------
 

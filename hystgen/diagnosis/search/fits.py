@@ -150,6 +150,19 @@ class Fitted:
         return [actuator.error(item, self.weights, other) for item in items]
 
 
+def at_an_end(fitted: Fitted, name: str, later: int) -> bool:
+    """Whether a number of an effect behind the front is at an end of its range; `later` as in `place`.
+
+    No amount of it, the least, is no end: what has several parts may do without one.
+    """
+    k = place(fitted, name, later)
+    if k is None:
+        return False
+    numbers, found = fitted.structure.pieces(fitted.shape)[1][k], fitted.structure.parts[k].candidate
+    none = found.low == 0.0
+    return bool(np.any(((numbers <= found.low) & ~none) | (numbers >= found.high)))
+
+
 @dataclass(frozen=True, eq=False)
 class Search:
     """The state of a search for the numbers of a structure, from which it can continue."""

@@ -14,7 +14,7 @@ from hystgen import effects
 from hystgen.basics import parallel
 from hystgen.basics.problems import EffectsError
 from hystgen.diagnosis.data import signals
-from hystgen.diagnosis.data.items import Item, everything, needed, rms, thinned
+from hystgen.diagnosis.data.items import Item, compared, everything, needed, rms, thinned
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, Search
 from hystgen.diagnosis.search.hypothesis import Part, Structure
@@ -213,6 +213,8 @@ class Records:
     """whether all of them pass the same loop"""
     one_speed: bool
     """whether the fitted ones pass their loops in the same time"""
+    compared: float
+    """share of the recorded samples that are compared"""
 
     @classmethod
     def of(
@@ -233,9 +235,10 @@ class Records:
         thin, thin_held = thinned(groups, acceptance.SCREENED, masks)
         gap = rms(refitted.errors(to_fit))
         known = about(to_fit, structure.thresholds)
+        taking_part, recorded = compared([*to_fit, *held])
         return cls(
             to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
-            signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit),
+            signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit), taking_part / recorded,
         )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:

@@ -52,38 +52,91 @@ class Merit:
         )
 
 
-def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
-    """Merit of a tried effect, or None.
+@dataclass(frozen=True)
+class Refusal:
+    """Why an effect that was tried has no name: the number that it fell short by, and the limit of that.
 
-    None where chance explains the difference, where too little is removed to stand out of the noise, where hardly any
-    of it is in the records that its numbers come from, and where records of one loop alone do not support a name.
+    `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
+    fitted ones], `small` [share of the gap], `most` [rms left], `few` [share of samples], `other`: another shape was
+    chosen.
+    """
+
+    why: str
+    value: float = math.nan
+    limit: float = math.nan
+
+
+def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
+    """Merit of a tried effect, or None where `judged` refuses it."""
+    found = judged(now, best, records, least)
+    return found if isinstance(found, Merit) else None
+
+
+def judged(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | Refusal:
+    """Merit of a tried effect, or why it has none.
+
+    It has none where chance explains the difference, where too little is removed to stand out of the noise, where
+    hardly any of it is in the held-out or in the fitted records, and where records of one loop alone do not support a
+    name.
 
     `least`: what has to be removed, as a multiple of the remaining error or the noise; by default the number of a first
     or a further effect.
     """
     if not _supported(now, best, records):
-        return None
-    errors = _without_merit(now, best, records.held)
-    equal = rms(errors)
-    if not removes(now, best, records, least):
-        return None
-    p_value = difference(errors, best.errors)
+        gap = apart(records.residual(now), records.noise)
+        left = apart(best.held_out, records.noise)
+        return Refusal("one_loop", left / gap if gap > 0.0 else math.inf, acceptance.MOST_OF_GAP)
+    held, fitted = _removed(now, best, records)
+    needed = _least(now) if least is None else least
+    if not _enough(held, fitted, needed, records.noise):
+        short = held if held.removed < acceptance.SEEN_IN_BOTH * max(records.noise, held.left) else fitted
+        return Refusal("little", short.removed, needed * max(records.noise, short.left))
+    p_value = difference(held.without, held.errors)
     if p_value > acceptance.P_REPEATED:
-        return None
-    without, fitted = _without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)
-    sure = p_value <= acceptance.P_SURE or difference(without, fitted) <= acceptance.P_SURE
-    explained, unexplained = apart(rms(without), rms(fitted)), rms(fitted)
-    if not sure or explained < acceptance.SEEN_IN_FIT * max(records.noise, unexplained):
-        return None
-    return Merit(apart(equal, best.held_out), explained, best.held_out / equal, p_value)
+        return Refusal("chance", p_value, acceptance.P_REPEATED)
+    if p_value > acceptance.P_SURE:
+        of_fitted = difference(fitted.without, fitted.errors)
+        if of_fitted > acceptance.P_SURE:
+            return Refusal("unsure", of_fitted, acceptance.P_SURE)
+    return Merit(held.removed, fitted.removed, held.left / rms(held.without), p_value)
+
+
+@dataclass(frozen=True)
+class _Removed:
+    """What an effect removes from some records on equal terms: their errors without it and with it."""
+
+    without: list[Array]
+    errors: list[Array]
+
+    @property
+    def left(self) -> float:
+        return rms(self.errors)
+
+    @property
+    def removed(self) -> float:
+        return apart(rms(self.without), self.left)
+
+
+def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Removed]:
+    """From held-out and from fitted records."""
+    return (
+        _Removed(_without_merit(now, best, records.held), best.errors),
+        _Removed(_without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)),
+    )
+
+
+def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bool:
+    """Whether an effect removes enough from held-out or from fitted records, and shows in the others.
+
+    Held-out records may be of a kind in which it is small, however much of the fitted ones it explains.
+    """
+    shares = [each.removed / max(noise, each.left) for each in (held, fitted)]
+    return max(shares) >= needed and min(shares) >= acceptance.SEEN_IN_BOTH
 
 
 def removes(now: Fitted, best: Tried, records: Records, least: float | None = None) -> bool:
-    """Whether enough is removed from held-out records on equal terms, by chance or not; `least` as in `merit_of`."""
-    if least is None:
-        least = _least(now)
-    removed = apart(rms(_without_merit(now, best, records.held)), best.held_out)
-    return removed >= least * max(records.noise, best.held_out)
+    """Whether enough is removed on equal terms, by chance or not; `least` as in `merit_of`."""
+    return _enough(*_removed(now, best, records), _least(now) if least is None else least, records.noise)
 
 
 def _least(now: Fitted) -> float:
@@ -91,8 +144,9 @@ def _least(now: Fitted) -> float:
 
 
 def leaves_enough(now: Fitted, records: Records) -> bool:
-    """Whether an effect that removed all but the noise of the held-out error could have a name."""
-    return records.residual(now) > acceptance.above_noise(_least(now)) * records.noise
+    """Whether an effect that removed all but the noise of the held-out or of the fitted error could have a name."""
+    most = max(records.residual(now), rms(now.errors(records.to_fit)))
+    return most > acceptance.above_noise(_least(now)) * records.noise
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:
@@ -218,9 +272,23 @@ def bear_two(records: Records) -> bool:
     return not (records.one_loop and records.one_speed)
 
 
-def borne_out(residual: float, records: Records) -> bool:
-    """Whether the final residual is small enough for the names that were found."""
-    return not records.one_loop or residual <= acceptance.FAR_ABOVE_NOISE * records.noise
+def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
+    """Why the names that were found do not stand, or None: together they have to explain most of the gap.
+
+    Of held-out and of fitted records both, with the start states and offsets free that the effects leave free; what is
+    noise is explained. A disturbance lets many an effect remove a part of the error; what it leaves tells it from an
+    effect that is there. Records of one loop support no name above the noise, and a small part of them none at all.
+    """
+    if records.compared < acceptance.FEW_COMPARED:
+        return Refusal("few", records.compared, acceptance.FEW_COMPARED)
+    for group in (records.held, records.to_fit):
+        after, before = rms(now.errors(group)), rms(none.errors(group, now))
+        if records.one_loop and group is records.held and after > acceptance.FAR_ABOVE_NOISE * records.noise:
+            return Refusal("most", after, acceptance.FAR_ABOVE_NOISE * records.noise)
+        left, gap = apart(after, records.noise), apart(before, records.noise)
+        if not is_noise(after, records.noise) and left**2 > acceptance.LEAST_EXPLAINED * gap**2:
+            return Refusal("most", after, before)
+    return None
 
 
 def _supported(now: Fitted, best: Tried, records: Records) -> bool:
@@ -272,13 +340,25 @@ class Found:
 
 
 @dataclass(frozen=True)
+class Ranked:
+    """An effect that was tried in a round, and why it was not the one that was accepted; None of that one."""
+
+    tried: Tried
+    refused: Refusal | None
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """The refitted nominal model, the model with the effects, these effects, and the ranking of each round."""
+    """The refitted nominal model, the model with the effects, these effects, and the ranking of each round.
+
+    `withdrawn`: names of effects that had been accepted and do not stand in the end (`borne_out`).
+    """
 
     refitted: Fitted
     fitted: Fitted
     found: tuple[Found, ...]
-    rankings: tuple[tuple[Tried, ...], ...]
+    rankings: tuple[tuple[Ranked, ...], ...]
+    withdrawn: tuple[str, ...] = ()
 
     @property
     def not_separable(self) -> tuple[tuple[str, str], ...]:
@@ -326,7 +406,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     none = now
     found: list[Found] = []
-    rankings: list[tuple[Tried, ...]] = []
+    rankings: list[tuple[Ranked, ...]] = []
     gap = records.residual(now)
     latest: _Step | None = None
     rounds = acceptance.MOST_EFFECTS if bear_two(records) else 1
@@ -342,28 +422,55 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         if step is not None and step.merit is None and not found and rounds > 1:
             both = _together(step, gap, records)
             if both is not None:
-                rankings.append(tuple(step.tried))
+                rankings.append(_ranked(step, gap, records))
                 first, step = both
                 found.append(first)
         if step is not None:
-            rankings.append(tuple(step.tried))
+            rankings.append(_ranked(step, gap, records))
         if step is None or step.merit is None:
             break
         accepted = _found(step, records)
         found.append(replace(accepted, before=found[-1].after) if found else accepted)
         now, latest = step.best.fitted, step
-        names = {each.option.name for tried in rankings for each in tried}
+        names = {each.tried.option.name for tried in rankings for each in tried}
         now, found = _exchanged(*_without_needless(now, found, records), names, records)
         if now is not step.best.fitted:
             latest = None
         if until(now):
             return Outcome(refitted, now, tuple(found), tuple(rankings))
-    if not borne_out(records.residual(now), records):
-        now, found = none, []
     if found:
-        now = fits.fit(now.structure, records.full, now.shape, now.weights)
-        found[-1] = replace(found[-1], after=records.residual(now))
+        now, found = _finished(now, found, records)
+        refused = borne_out(now, none, records)
+        if refused is not None:
+            withdrawn = tuple(dict.fromkeys(each.name for each in found))
+            ranked = [tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in rankings]
+            return Outcome(refitted, none, (), tuple(ranked), withdrawn)
     return Outcome(refitted, now, tuple(found), tuple(rankings))
+
+
+def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
+    """The effects fitted to all samples, without those that are idle then."""
+    now = fits.fit(now.structure, records.full, now.shape, now.weights)
+    kept, rest, _ = _without_needless(now, found, records)
+    if kept is not now:
+        now = fits.fit(kept.structure, records.full, kept.shape, kept.weights)
+    return now, [*rest[:-1], replace(rest[-1], after=records.residual(now))]
+
+
+def _ranked(step: _Step, gap: float, records: Records) -> tuple[Ranked, ...]:
+    """All that were tried in a step, the best first, with what speaks against each."""
+
+    def refused(tried: Tried) -> Refusal | None:
+        if step.merit is not None and tried is step.best:
+            return None
+        found = judged(step.now, tried, records)
+        if isinstance(found, Refusal):
+            return found
+        if not found.worth(gap, records):
+            return Refusal("small", found.removed / gap, acceptance.NAME_SHARE)
+        return Refusal("other")
+
+    return tuple(Ranked(each, refused(each)) for each in step.tried)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import BEYOND, LARGEST, factor, times
+from hystgen.arithmetic.factors import LARGEST, factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
@@ -53,11 +53,6 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     if bits < 0 or bits + code < wanted - GUARD + 1:
         raise OverflowError("no room")
     return bits, max(0, math.ceil(math.log2(states)) + bits + 2 - (LARGEST.bit_length() - 1))
-
-
-def lifted(late: float, bits: int) -> int:
-    """Bits of a state that the product with `late` leaves out, so that it is a factor; none of a slow state's."""
-    return max(0, math.frexp(late)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 
 def tables(blocks: list[tuple[CreepNumbers, float]], code: int) -> CreepTables:

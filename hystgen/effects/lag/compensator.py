@@ -80,6 +80,14 @@ def numbers(effect: Lag, seconds: float) -> tuple[bool, tuple[float, float, floa
     return False, (rate, one.early / rate, one.late, 1.0 / rate)
 
 
+def shifted(theta: float) -> float:
+    """Largest error of what a lag is led to, for errors up to 1 of what is asked, if it has seen the same drives.
+
+    The target before is what its drive led to: it keeps `W = theta^2 + theta (1 - theta) W` of the errors before.
+    """
+    return 1.0 + theta + theta**3 / (1.0 - theta + theta * theta)
+
+
 # ---------------------------------------------------------------- lag.c, lag_exact.c
 
 RATE, THETA, LATE, INVERSE = 0, 1, 2, 3

@@ -1,13 +1,30 @@
-"""A mode: what leads to a wanted motion, from three samples of it."""
+"""A mode: what leads to a wanted motion, from three samples of it; and as a block of the forward operator.
+
+The block keeps how far the output lies `off` its input, and the `rate` of that, both 0 at rest, so that rounding ends
+with the motion. Only the forward operator has it: the zeros of a second-order system sampled with straight input, near
+-0.27 and -3.7, cannot be inverted.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
+from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.resonance.model import Resonance
+from hystgen.plays.slots import Reals, zero
+
+MOST_SAMPLES = 2**20
+"""Samples that sums over a free oscillation are taken over one by one; what comes behind is bounded as a whole."""
+
+FADED = 45.0
+"""Time constants after which an oscillation is below the last bit of a double."""
 
 
 def denominator(effect: Resonance, step: float) -> tuple[float, float]:
@@ -25,8 +42,97 @@ def led(effect: Resonance, before: Array, now: Array, after: Array, step: float)
     """What the mode has to be given (N,) so that it moves as wanted, from samples a step apart.
 
     `(x_(k+1) + a1 x_k + a2 x_(k-1))/(1 + a1 + a2)`: no recursion, hence stable for every frequency and damping. What
-    arrives is `(x_(k+1) + 4 x_k + x_(k-1))/6`, without delay and without ringing at corners; the zeros of a
-    second-order system sampled with straight input, near -0.27 and -3.7, cannot be inverted.
+    arrives is `(x_(k+1) + 4 x_k + x_(k-1))/6`, without delay and without ringing at corners.
     """
     a1, a2 = denominator(effect, step)
     return np.asarray((after + a1 * now + a2 * before) / (1.0 + a1 + a2))
+
+
+@dataclass(frozen=True)
+class ModeNumbers:
+    """A mode at one step length, and sums of sizes over all samples of what it does.
+
+    `table`: (5,) what `off` and `rate` lose of themselves in a step, how they turn into each other, and what a change
+    of the input adds to both; `largest` and `fastest`: output and rate for inputs within 1; `off_after`, `rate_after`:
+    all that one disturbance of `off`, and of `rate`, makes of the output, `turned` and `slowed` of the rate.
+    """
+
+    table: tuple[float, ...]
+    largest: float
+    fastest: float
+    off_after: float
+    rate_after: float
+    turned: float
+    slowed: float
+
+
+def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
+    """Those at steps of `seconds`: the responses are closed forms, their sums go on until they have faded."""
+    zeta, angle = effect.damping, 2.0 * math.pi * effect.frequency * seconds
+    slow = zeta if zeta < 1.0 else 1.0 / (zeta + math.sqrt(zeta * zeta - 1.0))
+    count = int(min(math.ceil(FADED / (slow * angle)) + 2, MOST_SAMPLES))
+    _, cosine, sine = effect.factors(np.arange(count, dtype=np.float64) * seconds)
+    _, _, lead, push = (float(x[0]) for x in effect.forced(np.array([seconds])))
+    lead -= 1.0
+    c, s = float(cosine[1]), float(sine[1])
+    # |sine| <= k angle q^k and |cosine| <= (1 + k angle) q^k, beyond the samples that are summed
+    lost = -math.expm1(-slow * angle)
+    left = math.exp(-slow * angle * count) / lost
+    tail = left * (1.0 + (1.0 + zeta) * angle * (count + 1.0 / lost))
+    keeping, turning = cosine + zeta * sine, sine
+    rates = cosine - zeta * sine
+    off, rate = lead * keeping + push * turning, push * rates - lead * turning
+    size = abs(lead) + abs(push)
+
+    def total(each: Array) -> float:
+        return float(np.sum(np.abs(each))) + tail
+
+    largest = abs(1.0 + lead) + total(np.diff(off)) + 2.0 * size * tail
+    fastest = abs(push) + total(np.diff(rate)) + 2.0 * size * tail
+    table = (c - 1.0 + zeta * s, s, c - 1.0 - zeta * s, lead, push)
+    return ModeNumbers(table, largest, fastest, total(keeping), total(turning), total(turning), total(rates))
+
+
+def rounding(one: ModeNumbers, size: float, u: float) -> float:
+    """Roundings of the output, in floating point with roundings `u`, for inputs up to `size`."""
+    keep, turn, swing, lead, push = map(abs, one.table)
+    off, rate = (1.0 + one.largest) * size, one.fastest * size
+    steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
+    lost = [u * (state + 5.0 * step) for state, step in zip((off, rate), steps, strict=True)]
+    return lost[0] * one.off_after + lost[1] * one.rate_after + u * one.largest * size
+
+
+# ---------------------------------------------------------------- mode.c
+
+KEEP, TURN, SWING, LEAD, PUSH = range(5)
+BEFORE, OFF, RATE = range(3)
+
+KIND = Kind("mode", ("keep", "turn", "swing", "lead", "push"), ("before", "off", "rate"),
+            reading=("absorb",), own=("rest", "absorb"))  # fmt: skip
+
+
+def constants(t: Reals) -> Iterator[Constants]:
+    """The numbers of each mode, of tables (k, 5)."""
+    for row in t:
+        yield Constants(KIND, row, (6, 0))
+
+
+@jit
+def mode_rest(s: Reals, j: int, x: Any) -> Any:
+    """Settle at the input x; the output."""
+    s[j, BEFORE] = x
+    s[j, OFF] = zero(x)
+    s[j, RATE] = zero(x)
+    return x
+
+
+@jit
+def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
+    """The input is x at this sample; the output."""
+    change = x - s[j, BEFORE]
+    off = s[j, OFF]
+    rate = s[j, RATE]
+    s[j, OFF] = off + ((t[j, KEEP] * off + t[j, TURN] * rate) + t[j, LEAD] * change)
+    s[j, RATE] = rate + ((t[j, SWING] * rate - t[j, TURN] * off) + t[j, PUSH] * change)
+    s[j, BEFORE] = x
+    return x + s[j, OFF]

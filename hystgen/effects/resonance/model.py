@@ -72,7 +72,7 @@ class Resonance(Effect):
     compensated: ClassVar[Compensated] = "approximate"
     compensation: ClassVar[str] = "three samples of the reference around the present one: no ringing, no delay"
 
-    def _factors(self, times: Array) -> tuple[Array, Array, Array]:
+    def factors(self, times: Array) -> tuple[Array, Array, Array]:
         """Times in radians of the undamped oscillation, and the decaying cosine and sine."""
         zeta = self.damping
         angle = 2.0 * np.pi * self.frequency * times
@@ -86,10 +86,10 @@ class Resonance(Effect):
             sine = -slow * np.expm1(-2.0 * apart * angle) / (2.0 * apart) if apart > 0.0 else angle * slow
             return angle, 0.5 * (slow + fast), sine
 
-    def _forced(self, steps: Array) -> Array:
+    def forced(self, steps: Array) -> Array:
         """Decaying cosine and sine of each step, and the responses to a change by 1 over it: output, and its rate."""
         zeta = self.damping
-        x, c, s = self._factors(steps)
+        x, c, s = self.factors(steps)
         with np.errstate(divide="ignore", invalid="ignore"):
             ramp = 1.0 + (2.0 * zeta * (c - 1.0) + (2.0 * zeta * zeta - 1.0) * s) / x
             step = (1.0 - c - zeta * s) / x
@@ -104,14 +104,14 @@ class Resonance(Effect):
         """The play sum as the mode passes it on."""
         rows = np.ascontiguousarray(np.atleast_2d(h))
         out = np.empty_like(rows)
-        factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self._forced))
+        factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self.forced))
         a, b, early, late = factors
         ring(rows, a, b, early, late, self.damping, out)
         return out.reshape(np.shape(h))
 
     def transients(self, run: Run) -> Array:
         """The free oscillation from a start that is not at rest: decaying cosine and sine."""
-        return np.stack(self._factors(run.t - run.t[0])[1:])
+        return np.stack(self.factors(run.t - run.t[0])[1:])
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

@@ -41,19 +41,22 @@ class SensorPolynomial(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """A parabola, then a cubic, over the output range."""
+        """A parabola, then a cubic, over the output range; where that helps, with a quartic term."""
 
         def build(x: Array) -> SensorPolynomial:
             return cls(
                 name="sensor_nonlinearity", coefficients=tuple((0.1 * x).tolist()), scale=about.output_range
             )
 
-        def candidate(label: str, n: int) -> Candidate:
+        def candidate(label: str, n: int, beyond: str = "") -> Candidate:
             none = np.zeros(n)
             one, other = (np.append(side, none[1:]) for side in (-BENT, BENT))
-            return Candidate(label, none - 5.0, none + 5.0, one, build, none, (other,))
+            grown = (lambda x: np.append(x, 0.0)) if beyond else None
+            return Candidate(label, none - 5.0, none + 5.0, one, build, none, (other,), beyond, grown)
 
-        return [candidate("sensor, parabola", 1), candidate("sensor, cubic", 2)]
+        return [candidate("sensor, parabola", 1), candidate(CUBIC, 2), candidate("sensor, quartic", 3, CUBIC)]
 
+
+CUBIC = "sensor, cubic"
 
 SHAPES = (SensorPolynomial,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from typing import ClassVar, Literal
 
@@ -240,10 +241,17 @@ class HysteresisHeating(_OwnHeat):
 
 
 def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, Array, Array, tuple[Array, ...]]:
-    """Least, largest, first and other first numbers: time constant, then a gain, an offset or both."""
+    """Least, largest, first and other first numbers: time constant, then a gain, an offset or both.
+
+    Warmth changes from loop to loop, not within one: what follows the drive within a quarter of a loop over its range
+    is no temperature.
+    """
     n = sum(place is not None for place in row)
     low, high = span(20.0 * about.sample_time, 3.0 * about.session)
-    start, *others = (np.append(high - share * (high - low), np.zeros(n)) for share in SHARES)
+    starts = [high - share * (high - low) for share in SHARES]
+    quarter = 0.5 * (about.drive[1] - about.drive[0]) * about.session / max(about.travel, 1e-300)
+    low = max(low, math.log10(max(min(quarter, 0.3 * about.session), 1e-12)))
+    start, *others = (np.append(max(place, low), np.zeros(n)) for place in starts)
     return np.append(low, np.full(n, -20.0)), np.append(high, np.full(n, 20.0)), start, tuple(others)
 
 

@@ -9,14 +9,16 @@ import io
 import logging
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import extras
+from hystgen.basics import arguments, extras
+from hystgen.basics.writing import write_atomically
 
 Array = NDArray[np.float64]
 
@@ -56,8 +58,35 @@ MOST_POINTS = 4000
 """Lines with more points than this that cannot be thinned become pixels in an SVG; most points of a cloud."""
 
 
+KINDS = (".png", ".svg")
+
+
 class PlotError(ValueError):
     """A plot that cannot be drawn here."""
+
+
+def check_path(path: str | os.PathLike[str]) -> None:
+    """Raise PlotError for a file that cannot hold a plot."""
+    target = Path(path)
+    if target.suffix.lower() not in KINDS:
+        raise PlotError(f"{target}: a plot is a .png or .svg file")
+    if not target.parent.is_dir():
+        raise PlotError(f"{target}: the folder does not exist")
+    require()
+
+
+def picture(draw: Callable[[], Any], path: str | os.PathLike[str] | None = None) -> Any:
+    """The figure that `draw` makes, in the style of all pictures; with a path also written there, all or nothing.
+
+    Raises PlotError.
+    """
+    if path is not None:
+        check_path(arguments.path("path", path))
+    with styled():
+        drawn = draw()
+        if path is not None:
+            write_atomically(path, content(drawn, Path(path).suffix.lower()[1:]))
+    return drawn
 
 
 def require() -> None:

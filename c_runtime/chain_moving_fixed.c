@@ -1,0 +1,44 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: plays that depend on the rate, in fixed point. The first move
+   finds them at rest, like plain ones. */
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
+    return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
+                           HYSTGEN_LEVEL_DROP);
+}
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
+    return hystgen_nearest(hystgen_loop_output(&hystgen_model_tables, self->play),
+                           HYSTGEN_LEVEL_DROP);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+    if (self->moving) {
+        return hystgen_nearest(hystgen_moved_follow(self->play, w), HYSTGEN_LEVEL_DROP);
+    }
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_forward_started(self);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+    if (self->moving) {
+        return hystgen_nearest(hystgen_moved_follow(self->play, w), HYSTGEN_LEVEL_DROP);
+    }
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_inverse_started(self);
+}
+
+/* Input of the plays at which their sum is h. */
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
+    const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
+                                    : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
+                                                                 : h;
+    const hystgen_sum_t sum = inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
+    return self->moving ? hystgen_moved_input(self->play, sum)
+                        : hystgen_loop_solve(&hystgen_model_tables, self->play, sum);
+}

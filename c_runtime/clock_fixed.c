@@ -1,0 +1,31 @@
+#include "hystgen_runtime.h"
+
+/* Drift over the time since the clock was set, in fixed point: what it changes by in a sample is
+   summed, as whole signals and as the part of one. */
+
+static void hystgen_clock_start(hystgen_clock_t *self) {
+    self->whole = 0;
+    self->part = 0;
+    self->gained = 0;
+    self->count = 0;
+}
+
+/* One sample later. */
+static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
+    if (self->count < t->samples) {
+        const int64_t part = self->part + t->slope + self->gained;
+        const int64_t whole = part >> t->bits;
+        self->whole += whole;
+        self->part = part - whole * ((int64_t)1 << t->bits);
+        self->gained += t->change;
+        ++self->count;
+    }
+}
+
+/* The drift so many samples ahead of the clock, at most as large as `farthest`. */
+static int64_t hystgen_clock_drift(const hystgen_clock_table_t *t, const hystgen_clock_t *self,
+                                   int64_t ahead) {
+    const int64_t more = (t->slope + self->gained) * ahead + t->change * (ahead * (ahead - 1) / 2);
+    const int64_t drift = self->whole + ((self->part + more) >> t->bits);
+    return drift > t->farthest ? t->farthest : drift < -t->farthest ? -t->farthest : drift;
+}

@@ -1,0 +1,39 @@
+#include "hystgen_runtime.h"
+
+/* A mode as a block of the forward operator, in fixed point: how far its output lies off the input,
+   and the rate of that, with bits below those of a signal. */
+
+/* A number in units of the states times a factor. */
+HYSTGEN_APART int64_t hystgen_mode_scaled(const hystgen_mode_table_t *t, int64_t x,
+                                          const hystgen_factor_t *f) {
+    return hystgen_times(x >> t->drop, f);
+}
+
+/* A change of the input times a factor, in units of the states. */
+static int64_t hystgen_mode_entered(const hystgen_mode_table_t *t, int64_t change,
+                                    const hystgen_factor_t *f) {
+    return hystgen_times(change, f) * ((int64_t)1 << t->lift);
+}
+
+/* Everything has settled at the input x. Returns the output. */
+static int64_t hystgen_mode_rest(hystgen_mode_t *self, int64_t x) {
+    self->before = x;
+    self->off = 0;
+    self->rate = 0;
+    return x;
+}
+
+/* The input is x at this sample. Returns the output. */
+HYSTGEN_APART int64_t hystgen_mode_absorb(const hystgen_mode_table_t *t, hystgen_mode_t *self,
+                                          int64_t x) {
+    const int64_t change = x - self->before;
+    const int64_t off = self->off;
+    self->before = x;
+    self->off +=
+        hystgen_mode_scaled(t, off, &t->keep) + hystgen_mode_scaled(t, self->rate, &t->turn);
+    self->rate +=
+        hystgen_mode_scaled(t, self->rate, &t->swing) - hystgen_mode_scaled(t, off, &t->turn);
+    self->off += hystgen_mode_entered(t, change, &t->late) - change * ((int64_t)1 << t->bits);
+    self->rate += hystgen_mode_entered(t, change, &t->push);
+    return self->before + hystgen_nearest(self->off, t->bits);
+}

@@ -1,0 +1,23 @@
+"""What a notebook shows of a result: a line, a table as text, a picture where matplotlib is there."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+from hystgen.basics import drawing
+
+
+def block(line: str, table: str = "", draw: Callable[[], Any] | None = None) -> str:
+    """HTML of a line, a table of text below it, and of the figure that `draw` makes, left out without matplotlib."""
+    parts = [f"<p>{html.escape(line.strip('<>'))}</p>"]
+    if table:
+        parts.append(f"<pre>{html.escape(table)}</pre>")
+    if draw is not None:
+        try:
+            with drawing.styled():
+                parts.append(drawing.content(draw(), "svg").decode("utf-8").partition("?>")[2])
+        except drawing.PlotError:
+            pass
+    return "".join(parts)

@@ -1,0 +1,77 @@
+"""A delay in the forward operator: drives wait in a ring, and are straight between samples.
+
+The inverse has it in its preview (`hystgen.compensator.chain.preview`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from hystgen.arithmetic.factors import times
+from hystgen.basics.jit import jit
+from hystgen.plays.slots import Counts, Reals
+
+MOST_SAMPLES = 2**15
+"""Samples that a drive may wait: what a counter of 16 bits addresses, and more memory than small cores have."""
+
+
+class DelayTables(NamedTuple):
+    """`share`: of the step after the oldest sample, the part that is over, (1,), in fixed point a factor (2,);
+    `samples` that wait, 0 without a delay."""
+
+    share: Reals
+    samples: int
+
+
+class Waiting(NamedTuple):
+    """The samples that wait (n,), and the place of the oldest one (1,)."""
+
+    sample: Reals
+    oldest: Counts
+
+
+def numbers(seconds: float, step: float) -> tuple[float, int]:
+    """Share and number of samples of a delay at steps of `step`."""
+    late = seconds / step
+    whole = math.ceil(late)
+    return whole - late, whole + 1 if late > 0.0 else 0
+
+
+# ---------------------------------------------------------------- delay.c, delay_float.c or delay_fixed.c
+
+
+@jit
+def delay_rest(line: Waiting, v: Any) -> None:
+    """The drive has been v for long."""
+    for i in range(len(line.sample)):
+        line.sample[i] = v
+    line.oldest[0] = 0
+
+
+@jit
+def delay_next(line: Waiting) -> Any:
+    """The place behind that of the oldest sample."""
+    following = line.oldest[0] + 1
+    return following if following < len(line.sample) else 0
+
+
+@jit
+def delay_put(line: Waiting, v: Any) -> None:
+    """The drive is v at this sample."""
+    line.sample[line.oldest[0]] = v
+    line.oldest[0] = delay_next(line)
+
+
+@jit
+def delayed(t: DelayTables, line: Waiting) -> Any:
+    """The drive that has waited long enough."""
+    oldest = line.sample[line.oldest[0]]
+    return oldest + t.share[0] * (line.sample[delay_next(line)] - oldest)
+
+
+@jit
+def fixed_delayed(t: DelayTables, line: Waiting) -> Any:
+    """The same in fixed point, to the nearest code."""
+    oldest = line.sample[line.oldest[0]]
+    return oldest + times(line.sample[delay_next(line)] - oldest, t.share[0], t.share[1])

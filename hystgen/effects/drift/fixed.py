@@ -1,0 +1,119 @@
+"""Drift from a clock of the compensator's own, in fixed point: summed sample by sample, without rounding.
+
+Its change in a sample, and what that changes by, are constants of 60 bits below a signal; the sum is kept as whole
+signals and the part of one. The clock stops where the drift has left what an offset may be, for good.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.effects.drift.model import CurvedDrift, LinearDrift
+from hystgen.effects.kinds import Constants, Kind
+from hystgen.plays.slots import Reals, zero
+
+MOST_SAMPLES = 2**44
+"""Samples that are counted: half a year at 1 MHz. A drift that has gone nowhere by then stays where it is."""
+
+STATE_BITS = 58
+"""Bits of a change in a sample, without its sign: some of them in a row are summed with references ahead of time."""
+
+KIND = Kind("clock", own=(), letters="wwwwb", memory="wwwww")
+
+SLOPE, CHANGE, SAMPLES, FARTHEST, BITS, ONE, MOST_AHEAD = range(7)
+LEAD, WHOLE, PART, GAINED, COUNT = 2, 0, 1, 3, 4
+
+
+@dataclass(frozen=True)
+class ClockNumbers:
+    """The table (7,) of a clock, and by how many signals its drift may be wrong."""
+
+    table: list[int]
+    error: float
+
+
+def numbers(
+    effect: LinearDrift | CurvedDrift, step: float, signal: Fraction, farthest: float, ahead: int
+) -> ClockNumbers:
+    """The constants for samples `step` seconds apart, signals of `signal` output units, and a drift of `farthest`
+    signals either way. Raises OverflowError where it goes farther than numbers do before it has left that for good."""
+    rate, change = (Fraction(x) for x in (effect.rate, getattr(effect, "change", 0.0)))
+    own = Fraction(step)
+    twice = change * own * own / signal
+    slope = rate * own / signal + twice / 2
+    samples = _samples(float(slope), float(twice), farthest)
+    peak = 0.0 if not twice else min(max(float(-slope / twice), 0.0), float(samples))
+    far = max(abs(_drift(float(slope), float(twice), n)) for n in (peak, float(samples)))
+    fastest = abs(slope) + abs(twice) * (samples + ahead)
+    room = STATE_BITS - math.ceil(math.log2(2.0 + 2.0 * ahead))
+    bits = min(room - max(math.ceil(math.log2(float(fastest))), 0) if fastest else room, room)
+    if bits < 0 or far > 2.0**60:
+        raise OverflowError("no room")
+    scaled = round(slope * 2**bits), round(twice * 2**bits)
+    reach = samples + ahead
+    error = 1.0 + 0.5 * 2.0**-bits * (reach + 0.5 * float(reach) ** 2 * bool(twice))
+    return ClockNumbers([*scaled, samples, math.floor(farthest), bits, 1, ahead], error)
+
+
+def _drift(slope: float, twice: float, n: float) -> float:
+    return slope * n + 0.5 * twice * n * (n - 1.0)
+
+
+def _samples(slope: float, twice: float, farthest: float) -> int:
+    """After how many the drift lies beyond `farthest`, and goes on away from it; at most `MOST_SAMPLES`."""
+    if abs(_drift(slope, twice, float(MOST_SAMPLES))) <= farthest:
+        return MOST_SAMPLES
+    low, high = max(math.ceil(-slope / twice) + 1, 0) if slope * twice < 0.0 else 0, MOST_SAMPLES  # from where it turns
+    while high - low > 1:
+        middle = (low + high) // 2
+        if _drift(slope, twice, float(middle)) * math.copysign(1.0, twice or slope) > farthest:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def constants(t: Reals) -> list[Constants]:
+    """The numbers of the clock of a model, of tables (k, 7)."""
+    return [Constants(KIND, row[:ONE], (2, 0)) for row in t]
+
+
+# ---------------------------------------------------------------- clock_fixed.c
+
+
+@jit
+def clock_start(s: Reals, j: int) -> None:
+    """The time is that of the drive absorbed last."""
+    s[j, WHOLE] = zero(s[j, WHOLE])
+    s[j, PART] = s[j, WHOLE]
+    s[j, GAINED] = s[j, WHOLE]
+    s[j, COUNT] = s[j, WHOLE]
+
+
+@jit
+def clock_tick(t: Reals, s: Reals, j: int) -> None:
+    """One sample later."""
+    if s[j, COUNT] >= t[j, SAMPLES]:
+        return
+    part = s[j, PART] + t[j, SLOPE] + s[j, GAINED]
+    whole = part >> t[j, BITS]
+    s[j, WHOLE] = s[j, WHOLE] + whole
+    s[j, PART] = part - (whole << t[j, BITS])
+    s[j, GAINED] = s[j, GAINED] + t[j, CHANGE]
+    s[j, COUNT] = s[j, COUNT] + 1
+
+
+@jit
+def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
+    """The drift so many samples ahead of the clock."""
+    more = (t[j, SLOPE] + s[j, GAINED]) * ahead + t[j, CHANGE] * ((ahead * (ahead - 1)) // 2)
+    drift = s[j, WHOLE] + ((s[j, PART] + more) >> t[j, BITS])
+    if drift > t[j, FARTHEST]:
+        return t[j, FARTHEST]
+    if drift < -t[j, FARTHEST]:
+        return -t[j, FARTHEST]
+    return drift

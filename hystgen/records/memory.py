@@ -1,0 +1,156 @@
+"""Records of what is in memory already: columns by name, data frames, arrays side by side.
+
+A data frame is known by what it can do (`columns` or `column_names`, and columns by name), so that pandas, polars and
+Arrow tables are read without importing any of them. Names, units in them, missing values and times are treated as in a
+file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any, Protocol, TypeGuard
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen.basics import arguments
+from hystgen.basics.problems import RecordError
+from hystgen.records.columns import STANDARD, Column, column
+from hystgen.records.reading import Reading, Table, one_dimension, repaired
+from hystgen.records.record import Record
+
+
+class Frame(Protocol):
+    """A data frame, as far as it is looked at."""
+
+    @property
+    def columns(self) -> Any:
+        """Names of the columns."""
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """A column by its name."""
+
+
+Columns = Mapping[str, ArrayLike] | Frame | NDArray[Any] | tuple[ArrayLike, ...]
+"""Samples in memory: a mapping or data frame of named columns; an array (N, 2) or (N, 3), or a tuple of arrays (N,), of
+drive and displacement, with the time before them where there are three."""
+
+_OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
+"""Options in messages about files, in place of which arguments are meant here."""
+
+
+def in_memory(source: object) -> TypeGuard[Columns]:
+    """Whether something holds the samples of one record; judged by its kind alone."""
+    if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
+        return True
+    # One of paths or records is a list of sources
+    return isinstance(source, tuple) and bool(source) and all(_is_samples(each) for each in source)
+
+
+def _is_samples(each: object) -> bool:
+    kind = getattr(each, "dtype", None)
+    return kind is not None or (isinstance(each, list) and bool(each) and isinstance(each[0], int | float))
+
+
+def _names(source: object) -> list[Any] | None:
+    """Names of the columns of a data frame; None for anything else."""
+    if not hasattr(source, "__getitem__") or isinstance(source, type):
+        return None
+    for attribute in ("column_names", "columns"):
+        found = getattr(source, attribute, None)
+        if found is not None and not callable(found):
+            return list(found)
+    return None
+
+
+def read(
+    source: Columns, name: str, columns: Mapping[str, str] | None, sample_time: float | None, need: Sequence[str]
+) -> Record:
+    """The record of samples in memory, called `name` in messages; the other arguments as in `read_record`.
+
+    Raises RecordError with every problem; ValueError and TypeError for arrays of another shape or type.
+    """
+    reading = Reading(name, columns or {}, sample_time, None, tuple(need), lambda _: None)
+    try:
+        return repaired(reading, _table(reading, _named(source, name, sample_time)))
+    except RecordError as error:
+        raise RecordError(map(_as_call, error.problems)) from None
+
+
+def _as_call(problem: str) -> str:
+    """A message about a file with the arguments of a call in place of options."""
+
+    def argument(option: re.Match[str]) -> str:
+        if option[1] is None:
+            return option[0].removeprefix("--").replace("-", "_")
+        return f"columns={dict(pair.split('=', 1) for pair in option[1].split(','))}"
+
+    return _OPTION.sub(argument, problem)
+
+
+def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, Any]:
+    """The columns by name."""
+    if isinstance(source, Mapping):
+        return {str(key): values for key, values in source.items()}
+    if isinstance(source, np.ndarray) or (isinstance(source, tuple) and _names(source) is None):
+        names = _by_place(source, name, sample_time)
+        return dict(zip(names, source if isinstance(source, tuple) else source.T, strict=True))
+    names = _names(source) or []
+    doubled = sorted({str(each) for each in names if names.count(each) > 1})
+    if doubled:
+        raise ValueError(f'{name} has several columns called "{doubled[0]}"; give them different names')
+    found = {str(each): source[each] for each in names}
+    index = getattr(source, "index", None)  # of pandas, which often holds the time
+    kind = getattr(getattr(index, "dtype", None), "kind", "")
+    label = getattr(index, "name", None)
+    if (kind in "mM" and kind) or (label is not None and kind in "fiu"):
+        found.setdefault(str(label or "t"), index)
+    return found
+
+
+def _by_place(source: NDArray[Any] | tuple[Any, ...], name: str, sample_time: float | None) -> Sequence[str]:
+    """Our names for columns that have none."""
+    number = len(source) if isinstance(source, tuple) else source.shape[1] if source.ndim == 2 else 0
+    if number == 3 or (number == 2 and sample_time is not None):
+        return STANDARD[-number:]
+    if number == 2:
+        raise ValueError(f"{name} has two columns, drive and displacement, and no time; give sample_time, or (t, v, y)")
+    got = f"{number} arrays" if isinstance(source, tuple) else arguments.kind(source)
+    raise ValueError(
+        f"{name} is {got}; give columns t, v and y as (t, v, y) or an array of shape (N, 3), or name them in a "
+        "dict {'t': .., 'v': .., 'y': ..}"
+    )
+
+
+def _table(reading: Reading, named: Mapping[str, Any]) -> Table:
+    columns: list[Column] = []
+    ignored: list[str] = []
+    for name, values in named.items():
+        numbers = _numbers(values)
+        length = 0 if numbers is None else one_dimension(numbers.shape)
+        if numbers is not None and length:
+            unit = "s" if np.asarray(values).dtype.kind in "mM" else ""
+            columns.append(column(name, unit=unit, length=length, read=partial(np.array, numbers.ravel())))
+        else:
+            ignored.append(name)
+    return reading.table(columns, ignored)
+
+
+def _numbers(values: Any) -> NDArray[Any] | None:
+    """An array of real numbers, times in seconds from the first; None for anything else."""
+    try:
+        found = np.asarray(values)
+    except ValueError:  # lists of different lengths
+        return None
+    if found.dtype.kind in "mM":
+        known = found[~np.isnat(found)]
+        origin = known[0] if found.dtype.kind == "M" and len(known) else np.timedelta64(0, "s")
+        return np.asarray((found - origin) / np.timedelta64(1, "s"), dtype=np.float64)
+    if found.dtype.kind == "O":
+        try:
+            return np.asarray(values, dtype=np.float64)  # a data frame knows what its missing values are
+        except (TypeError, ValueError):
+            return None
+    return found if found.dtype.kind in "fiub" else None

@@ -1,0 +1,436 @@
+"""The documentation: every command and code block runs, every link leads somewhere, every page fits a phone.
+
+A page is a test: its blocks run from top to bottom in a folder with the examples, a recording, a held-out one and the
+model `stage_x` of them. What a fence's language means:
+
+- `sh`, `console`: commands; behind `$` the exact output, `...` for any text
+- `python`: one name space a page; what is printed stands behind the call as a comment
+- `c`: compiles against the emitted `stage_x`
+- `yaml`, `text`: becomes the file that the sentence before it names; a parameter file, or a part of one, loads
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import doctest
+import glob
+import html
+import html.parser
+import io
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+import urllib.parse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+import hystgen
+from hystgen import verification
+from hystgen.cli import main
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+README = ROOT / "README.md"
+PAGES = {path.relative_to(ROOT).as_posix(): path for path in [README, *sorted(DOCS.rglob("*.md"))]}
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+CALLS = 2000
+"""Calls of a record of `verify` here, for the 100000 that users get; other tests run those."""
+
+BARE = {"docs/tutorials/two-minutes.md", "docs/tutorials/first-recording.md"}
+"""Pages that make the model themselves."""
+
+ELSEWHERE = {
+    "hystgen verify diagnosis/params.yaml --targets host,cortex-m4f": "test_chain.py::test_cores_give_the_same_bits",
+    "hystgen diagnose stage_x.yaml records.csv -o diagnosis --effects my_effect/":
+        "test_own_effects.py::test_it_is_diagnosed_and_goes_into_the_c",
+    "hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/":
+        "test_own_effects.py::test_it_is_diagnosed_and_goes_into_the_c",
+    "hystgen verify diagnosis/params.yaml --targets host,cortex-m4f --effects my_effect/":
+        "test_own_effects.py::test_c_gives_the_same_bits_on_cores_and_beside_a_shared_run_time",
+    "hystgen diagnose stage_x.yaml sweep.csv --holdout other.csv -o diagnosis/":
+        "test_diagnosis.py::test_the_command",
+    "python examples/compensate_plants.py -o docs":
+        "test_hysteretic_plants.py::test_the_page_of_the_plants_is_the_table_of_the_example",
+}  # fmt: skip
+"""Commands that take too long here, and the tests that do what they do."""
+
+
+# Blocks --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: `words` before it, the last paragraph."""
+
+    language: str
+    text: str
+    words: str
+    line: int
+
+    @property
+    def saved_as(self) -> str | None:
+        """The file that the sentence before it names."""
+        found = re.search(r"[Ss]ave\s+(?:this|that|it)\s+as\s+`([^`]+)`[^`]*$", self.words)
+        return found[1] if found else None
+
+
+def blocks(text: str) -> list[Block]:
+    """The fenced blocks of a page but its directives."""
+    found = []
+    for match in re.finditer(r"^```(\{?[\w-]*\}?).*\n((?:.*\n)*?)```$", text, re.MULTILINE):
+        if not match[1].startswith("{"):
+            words = text[: match.start()].rstrip().rpartition("\n\n")[2]
+            found.append(Block(match[1], match[2], words, text.count("\n", 0, match.start()) + 1))
+    return found
+
+
+def commands(text: str) -> list[str]:
+    """The commands of a block, with continued lines joined."""
+    return [line for line in re.sub(r"\\\n\s*", " ", text).splitlines() if line.strip()]
+
+
+@dataclass
+class Page:
+    """A page being run: where, what its Python knows, the last exit code."""
+
+    folder: Path
+    names: dict[str, Any]
+    code: int = 0
+
+    def run(self, block: Block) -> None:
+        """Run or check one block."""
+        if block.saved_as:
+            (self.folder / block.saved_as).write_text(block.text)
+        getattr(self, block.language)(block)
+
+    def text(self, block: Block) -> None:
+        """A file."""
+        assert block.saved_as, "a block of text that is no file"
+
+    def yaml(self, block: Block) -> None:
+        """A parameter file, or part of one."""
+        part = YAML(typ="safe", pure=True).load(block.text)
+        if part is None:  # comments for an editor
+            return
+        whole = part
+        if "hystgen" not in part:
+            whole = merged(YAML(typ="safe", pure=True).load((self.folder / "stage_x.yaml").read_text()), part)
+        with (self.folder / "page.yaml").open("w") as file:
+            YAML(typ="safe", pure=True).dump(whole, file)
+        hystgen.load(self.folder / "page.yaml")
+
+    def c(self, block: Block) -> None:
+        """A C file that compiles beside the emitted module."""
+        (self.folder / "page.c").write_text(block.text)
+        flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", "firmware", "-c", "-o", os.devnull]
+        subprocess.run(["cc", *flags, "page.c"], cwd=self.folder, check=True)
+
+    def python(self, block: Block) -> None:
+        """Code whose prints stand behind them as comments."""
+        ast.parse(block.text)
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            exec(compile(block.text, "page", "exec"), self.names)
+        assert out.getvalue().splitlines() == re.findall(r"^ *print\(.*\)  # (.*)$", block.text, re.MULTILINE)
+
+    def sh(self, block: Block) -> None:
+        """Commands that succeed."""
+        for command in commands(block.text):
+            printed = self.command(command)
+            assert self.code == 0, f"{command}\n{printed}"
+
+    def console(self, block: Block) -> None:
+        """Commands with what they print."""
+        for part in re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]:
+            command, _, shown = part.partition("\n")
+            printed = str(self.code) + "\n" if command == "echo $?" else self.command(command)
+            form = "".join(
+                r"(?:.*\n)*" if line == "...\n" else re.escape(line).replace(r"\.\.\.", ".*")
+                for line in shown.splitlines(keepends=True)
+            )
+            assert re.fullmatch(form, printed), f"$ {command}\n{printed}"
+
+    def command(self, command: str) -> str:
+        """Run one command; what it prints, on both channels in order."""
+        words = shlex.split(re.sub(r"\s+# .*", "", command))
+        if " ".join(words) in ELSEWHERE:
+            self.code = 0
+            return ""
+        if words[0] == "hystgen":
+            return self.own(words[1:])
+        if words[:2] == ["pip", "install"]:
+            self.code = int(not installs(words[2:]))
+            return ""
+        if words[0] == "make":
+            done = subprocess.run(["make", "-n", *words[1:]], cwd=ROOT, capture_output=True, check=False)
+            self.code = done.returncode
+            return ""
+        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        run = partial(subprocess.run, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+        done = run(["bash", "-c", command], cwd=self.folder, env={**os.environ, "PATH": path})
+        self.code = done.returncode
+        return str(done.stdout)
+
+    def own(self, words: list[str]) -> str:
+        """The command line, in this process."""
+        arguments = [each for word in words for each in (sorted(glob.glob(word)) or [word])]
+        to = arguments.index(">") if ">" in arguments else len(arguments)
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out), pytest.raises(SystemExit) as stopped:
+            main(arguments[:to], prog_name="hystgen")
+        self.code = int(stopped.value.code or 0)
+        printed = "".join(
+            line for line in out.getvalue().splitlines(keepends=True) if not line.startswith("compiling for this")
+        )
+        if to < len(arguments):
+            (self.folder / arguments[to + 1]).write_text(printed)
+        return printed
+
+
+def merged(whole: Any, part: Any) -> Any:
+    """A mapping with the entries of another in it."""
+    if not (isinstance(whole, dict) and isinstance(part, dict)):
+        return part
+    return {**whole, **{key: merged(whole.get(key), value) for key, value in part.items()}}
+
+
+def installs(requirements: list[str]) -> bool:
+    """Whether they are this project with extras that it has."""
+    for requirement in (word for word in requirements if word != "-e"):
+        found = re.fullmatch(r"(?:\.|hystgen)(?:\[([\w,]+)\])?", requirement)
+        if found is None or not set((found[1] or "all").split(",")) <= PROJECT["optional-dependencies"].keys():
+            return False
+    return True
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that pages begin with."""
+    folder = tmp_path_factory.mktemp("pages")
+    shutil.copytree(ROOT / "examples", folder / "examples", ignore=shutil.ignore_patterns("__pycache__", "out"))
+    shutil.copytree(folder / "examples" / "my_effect", folder / "my_effect")
+    for name in ("units", "holdout", "diagnosis"):
+        (folder / name).mkdir()
+    for name in ("sweep.csv", "units/a.csv", "units/b.csv"):
+        shutil.copy(ROOT / "examples" / "stage_recording.csv", folder / name)
+    for name in ("other.csv", "held_out.csv", "holdout/a.csv", "holdout/b.csv"):
+        shutil.copy(ROOT / "examples" / "stage_holdout.csv", folder / name)
+    units = {"input": "V", "output": "um"}
+    fit = hystgen.identify(folder / "sweep.csv", holdout=[folder / "other.csv"], name="stage_x", units=units)
+    fit.write(folder / "stage_x.yaml")
+    hystgen.emit(fit, folder / "firmware")
+    creep = "  effects: [{name: creep, time_constants: [0.1], weights: [0.02]}]\n"
+    (folder / "diagnosis" / "params.yaml").write_text(f"sample_time: 5.0e-4\n{fit.text()}{creep}")
+    return folder
+
+
+@pytest.mark.parametrize("name", [name for name, path in PAGES.items() if blocks(path.read_text(encoding="utf-8"))])
+def test_every_block_of_a_page_runs(
+    name: str, start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "page"
+    shutil.copytree(start, folder)
+    if name in BARE:
+        (folder / "stage_x.yaml").unlink()
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, length=CALLS))
+    page = Page(folder, {})
+    for block in blocks(PAGES[name].read_text(encoding="utf-8")):
+        try:
+            page.run(block)
+        except (AssertionError, Exception) as error:
+            raise AssertionError(f"{name}:{block.line}: {error}") from error
+
+
+def test_what_runs_elsewhere_does() -> None:
+    """And nothing is listed that no page has."""
+    named = {command for path in PAGES.values() for block in blocks(path.read_text(encoding="utf-8"))
+             if block.language == "sh" for command in commands(block.text)}  # fmt: skip
+    for command, test in ELSEWHERE.items():
+        file, _, function = test.partition("::")
+        assert f"def {function}(" in (ROOT / "tests" / file).read_text(encoding="utf-8"), test
+        assert command in named, command
+
+
+@pytest.mark.parametrize("name", ["identify", "diagnose", "verify"])
+def test_examples_in_docstrings_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    (example,) = doctest.DocTestFinder(recurse=False).find(getattr(hystgen, name), name)
+    result = doctest.DocTestRunner().run(example)
+    assert (result.failed, result.attempted > 3) == (0, True)
+
+
+def test_a_wrong_block_is_noticed(start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(start, tmp_path / "page")
+    monkeypatch.chdir(tmp_path / "page")
+    page = Page(tmp_path / "page", {})
+    for language, text in (
+        ("sh", "hystgen show nothing.yaml\n"), ("sh", "false\n"), ("sh", "pip install '.[everything]'\n"),
+        ("sh", "make nothing\n"), ("console", "$ hystgen show stage_x.yaml\nstage_y: 10 plays\n...\n"),
+        ("console", "$ hystgen show stage_x.yaml\n...\n$ echo $?\n1\n"), ("python", "print(1)  # 2\n"),
+        ("python", "print(1)\n"), ("yaml", "emit: {arithmetic: float16}\n"), ("text", "words\n"),
+        ("c", "#include \"stage_x.h\"\nint f(void) { return stage_x_step(); }\n"),
+    ):  # fmt: skip
+        with pytest.raises((AssertionError, ValueError, subprocess.CalledProcessError)):
+            page.run(Block(language, text, "", 1))
+
+
+# The site ------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages as HTML, built without a warning."""
+    if shutil.which("doxygen") is None:
+        if os.environ.get("CI"):
+            pytest.fail("CI installs doxygen, but it is not there")
+        pytest.skip("there is no doxygen")
+    folder = tmp_path_factory.mktemp("site")
+    command = ["-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", DOCS, folder / "html"]
+    offline = {**os.environ, "http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
+    done = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False, env=offline)
+    assert done.returncode == 0, done.stderr
+    return folder / "html"
+
+
+class Links(html.parser.HTMLParser):
+    """What a page refers to, and the places in it."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.to: list[str] = []
+        self.places: set[str] = set()
+        self.feed(text)
+
+    def handle_starttag(self, _tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        """Collect both."""
+        for name, value in attributes:
+            if name in ("href", "src") and value:
+                self.to.append(value)
+            if name == "id" and value:
+                self.places.add(value)
+
+
+def broken(folder: Path) -> Iterator[str]:
+    """Links within a site that lead nowhere, and what is loaded from elsewhere."""
+    read = {path: Links(path.read_text(encoding="utf-8")) for path in folder.rglob("*.html")}
+    for path, page in read.items():
+        for link in page.to:
+            parts = urllib.parse.urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / urllib.parse.unquote(parts.path)).resolve() if parts.path else path
+            if not target.exists() or (parts.fragment and target in read and parts.fragment not in read[target].places):
+                yield f"{path.name}: {link}"
+
+
+def test_links_of_the_site_lead_somewhere(site: Path) -> None:
+    assert list(broken(site)) == []
+    pages = {path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md")}
+    assert {path.relative_to(site).as_posix() for path in site.rglob("*.html")} >= pages
+
+
+def test_a_broken_link_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "a.html").write_text('<p id="here"><a href="b.html#gone">b</a><a href="c.html">c</a><a href="#here">')
+    (tmp_path / "b.html").write_text('<img src="https://elsewhere/x.png">')
+    assert sorted(broken(tmp_path)) == ["a.html: b.html#gone", "a.html: c.html"]
+
+
+def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
+    for path in site.rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        loaded = re.findall(r"<(?:script|img|iframe)\b[^>]*\ssrc=\"([^\"]*)|<link\b[^>]*\shref=\"([^\"]*)", text)
+        assert [link for pair in loaded for link in pair if re.match("(?:https?:)?//", link)] == [], path.name
+
+
+def test_the_references_are_of_the_program(site: Path) -> None:
+    """A sample of each page that is generated."""
+    for page, words in {
+        "command-line": ("--allow-partial", "--target-length", "hystgen schema"),
+        "parameter-file": ("input_range", "drive_lsb", "noise_gain", "initial_state"),
+        "effects": ("rate_dependence", "time_constants", "per_decade", "gain_per_degree"),
+        "c-api": ("stage_x_inverse_commit", "STAGE_X_PARAMS_SHA256", "stage_y_inverse_set_temperature",
+                  "One sample: reference u in, drive out"),
+        "python-api": ("identify_batch", "sample_time", "max_error"),
+        "status-bits": ("NAME_STATUS_SLEW_LIMITED", "NAME_STATUS_HELD"),
+        "targets": ("cortex-m33", "atmega1284p", "int16_t"),
+    }.items():  # fmt: skip
+        text = re.sub(r"<[^>]*>", "", (site / "reference" / f"{page}.html").read_text(encoding="utf-8"))
+        assert [word for word in words if word not in text] == [], page
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, tmp_path: Path) -> None:
+    """In a browser: nothing sticks out, every picture is drawn, nothing is complained of."""
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        if os.environ.get("CI"):
+            pytest.fail("CI installs chromium, but it is not there")
+        pytest.skip("there is no chromium")
+    pages = sorted(path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md"))
+    (tmp_path / "frames.html").write_text(
+        f"""<!DOCTYPE html><body><pre></pre><script>
+const pages = {json.dumps([(site / page).as_uri() for page in pages])}, found = {{}};
+async function look(page) {{
+  const frame = document.createElement("iframe");
+  frame.style = "width: {width}px; height: 800px; border: 0";
+  frame.src = page;
+  document.body.append(frame);
+  await new Promise(done => frame.onload = done);
+  const inner = frame.contentDocument, root = inner.documentElement;
+  found[page] = [root.scrollWidth, [...inner.images].filter(i => i.complete && !i.naturalWidth).length];
+  frame.remove();
+}}
+(async () => {{
+  for (const page of pages) await look(page);
+  document.querySelector("pre").textContent = JSON.stringify(found);
+}})();
+</script></body>"""
+    )
+    command = [
+        chromium, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+        "--allow-file-access-from-files", f"--user-data-dir={tmp_path / 'profile'}", "--enable-logging=stderr",
+        "--virtual-time-budget=60000", "--dump-dom", (tmp_path / "frames.html").as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=240)
+    (shown,) = re.findall(r"<pre>(\{.*?\})</pre>", done.stdout)
+    found = json.loads(html.unescape(shown))
+    assert len(found) == len(pages)
+    assert {page: seen for page, seen in found.items() if seen[0] > width or seen[1]} == {}
+    assert [line for line in done.stderr.splitlines() if "CONSOLE" in line and "Error" in line] == []
+
+
+# README --------------------------------------------------------------------------------------------
+
+
+def test_the_readme_is_short_and_leads_to_the_pages() -> None:
+    text = README.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 90
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        target, _, fragment = link.partition("#")
+        if "://" in link:
+            continue
+        assert (ROOT / target).is_file(), link
+        if fragment:
+            headings = re.findall(r"^#+ (.*)$", (ROOT / target).read_text(encoding="utf-8"), re.MULTILINE)
+            assert fragment in {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}, link
+    assert [block.language for block in blocks(text)] == ["sh", "sh", "c"]
+
+
+def test_every_page_is_in_the_table_of_contents() -> None:
+    listed = set(re.findall(r"^[\w/-]+$", (DOCS / "index.md").read_text(encoding="utf-8"), re.MULTILINE))
+    pages = {path.relative_to(DOCS).with_suffix("").as_posix() for path in DOCS.rglob("*.md")} - {"index"}
+    assert pages <= listed

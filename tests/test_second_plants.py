@@ -1,0 +1,101 @@
+"""The second simulator of plants, and what the diagnosis makes of a few of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import second_plants
+from numpy.typing import NDArray
+from second_plants import EFFECTS, FOREIGN, Session, Stage, filtered
+
+import hystgen
+
+Array = NDArray[np.float64]
+
+
+def relays(v: Array, density: float) -> Array:
+    """Equally dense relays over the whole triangle: an Everett function of d^2 by brute force."""
+    places = (np.arange(100) + 0.5) / 100
+    up, down = np.meshgrid(places, places, indexing="ij")
+    there = up >= down
+    state, out = np.zeros_like(up), np.empty(len(v))
+    for k, x in enumerate(v.tolist()):
+        state[up <= x] = 1.0
+        state[down >= x] = 0.0
+        out[k] = np.sum(state[there])
+    return np.asarray(density * out / 100**2)
+
+
+def test_the_stack_of_extremes_is_a_preisach_model() -> None:
+    turns = np.array([0.0, 0.9, 0.3, 0.7, 0.4, 0.6, 0.1, 1.0, 0.5])
+    v = np.interp(np.arange(800) / 100, np.arange(9), turns)
+    _, rest = Stage(0.0, 0.5, 0.0, 0.0).moved(v)
+    assert rest - rest[0] == pytest.approx(relays(v, 1.0) - relays(v, 1.0)[0], abs=0.012)
+
+
+def test_a_mode_and_a_lag_answer_a_step_as_known() -> None:
+    t = np.arange(400) * 1e-3
+    x = np.where(t > 0.0, 1.0, 0.0)
+    assert filtered(t, x, 0.02)[-1] == pytest.approx(1.0 - math.exp(-0.4 / 0.02 + 0.05), abs=1e-6)
+    rings = second_plants._mode(t, x, 20.0, 0.05)
+    damped = 2.0 * np.pi * 20.0 * math.sqrt(1.0 - 0.05**2)
+    at = t[1:] - t[1]
+    decay = np.exp(-0.05 * 2.0 * np.pi * 20.0 * (at + 1e-3))
+    phase = damped * (at + 1e-3)
+    expected = 1.0 - decay * (np.cos(phase) + 0.05 / math.sqrt(1.0 - 0.05**2) * np.sin(phase))
+    assert rings[1:] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["single", "foreign"])
+def test_a_case_is_the_same_every_time(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With its label beside it, and the effect or disturbance as large as the label says."""
+    monkeypatch.setattr(second_plants, "session", _short)
+    for folder in ("a", "b"):
+        assert second_plants.case(kind, 2, tmp_path / folder) == f"{kind}_00002"
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*"))
+    assert len(files) == 11 + 3
+    assert all((tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes() for path in files)
+    label = json.loads((tmp_path / "a" / "labels" / f"{kind}_00002.json").read_text())
+    if kind == "single":
+        assert [each["name"] for each in label["effects"]] == [list(EFFECTS)[2]]
+    else:
+        assert label["foreign"]["name"] == list(FOREIGN)[2]
+
+
+_whole = second_plants.session
+
+
+def _short(rng: np.random.Generator, slow: bool) -> Session:
+    made = _whole(rng, slow)
+    return made if made.samples == 450 else _short(rng, slow)
+
+
+@pytest.mark.thorough
+@pytest.mark.slow(one_in=4)
+@pytest.mark.parametrize(
+    ("kind", "seed", "names"),
+    [
+        ("foreign", 6, []),  # room temperature on the gain, which was named thermal
+        ("foreign", 8, []),  # a slow line of crosstalk, named saturation and creep
+        ("single", 1, ["rate_dependence"]),
+        ("pair", 1, ["ageing", "lag"]),  # named rate dependence and ageing
+    ],
+)
+def test_what_was_named_wrongly(kind: str, seed: int, names: list[str], tmp_path: Path) -> None:
+    content = diagnosed(kind, seed, tmp_path)
+    assert sorted(each["name"] for each in content["effects"]) == names
+    if not names:
+        assert content["verdict"] == "unexplained"
+        assert all(each["refused"] for ranked in content["ranking"] for each in ranked)
+
+
+def diagnosed(kind: str, seed: int, folder: Path) -> dict[str, Any]:
+    home = folder / "cases" / second_plants.case(kind, seed, folder)
+    spec = json.loads((home / "session.json").read_text())
+    to_fit, held = ([home / name for name in spec[key]] for key in ("fit", "holdout"))
+    return dict(hystgen.diagnose(home / "params.yaml", to_fit, holdout=held).content)
