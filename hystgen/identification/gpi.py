@@ -26,15 +26,11 @@ Tick = Callable[[int], None] | None
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
 """Names of what can be fitted; `auto` chooses among them."""
 
-BREAK_COUNTS = (1, 2, 4, 8, 16, 24)
+BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks of a dead-zone sum that are tried."""
 
-FRUITLESS = 2
-"""Fronts one after the other that predict no better than the best one before them, after which no more are tried."""
-
-FRONT_PARSIMONY = 1.05
-"""The front with the fewest shape numbers is taken of those whose validation error is within this factor of the
-best."""
+FRONT_PARSIMONY = 1.02
+"""A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
 
 INVERSE_PLAYS = 10
 """Plays of the measured output in the convex problem that gives a dead-zone sum its start."""
@@ -87,16 +83,16 @@ def solve(
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
-    tried: list[tuple[float, Front, Array]] = []
-    before: tuple[Front, Array] | None = None
+    best: tuple[float, Front, Array] | None = None
+    before: Array | None = None
     for front in fronts_of(kind, compared, breaks):
         shaped = _shaped(compared, front, fine, before, tick)
-        before = front, shaped.shape
-        tried.append((validation(shaped, front), front, shaped.shape))
-        best = min(error for error, _, _ in tried)
-        if all(error > best for error, _, _ in tried[-FRUITLESS:]):
-            break
-    _, front, shape = next(each for each in tried if each[0] <= FRONT_PARSIMONY * best)
+        before = shaped.shape
+        error = validation(shaped, front)
+        if best is None or error * FRONT_PARSIMONY < best[0]:
+            best = error, front, shaped.shape
+    assert best is not None
+    _, front, shape = best
     courses = start.needed(courses, front.stages(shape))
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved, and the shape is to be the best one for them
@@ -138,15 +134,13 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
 
 
 def _shaped(
-    courses: Sequence[Course], front: Front, thresholds: Array, before: tuple[Front, Array] | None, tick: Tick
+    courses: Sequence[Course], front: Front, thresholds: Array, before: Array | None, tick: Tick
 ) -> joint.Shaped:
-    """The best result of several starts; `before`: the front tried before this one, and its shape."""
+    """The best result of several starts; `before`: the shape of the front tried before this one."""
     starts = [front.straight]
     if isinstance(front, Tanh) and front.branches == 2 and before is not None:
-        starts = [front.doubled(before[1])]
+        starts = [front.doubled(before)]
     if isinstance(front, DeadZones):
-        if before is not None and isinstance(before[0], DeadZones):
-            starts = [front.like(before[0], before[1])]
         convex = convex_start(courses, front)
         if convex is not None:
             starts.append(convex)

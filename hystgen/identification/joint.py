@@ -140,12 +140,6 @@ class DeadZones:
         logs = np.log(np.maximum(slopes, least))
         return np.asarray(np.clip(logs[1:] - logs[0], -STEEPEST, STEEPEST))
 
-    def like(self, other: DeadZones, shape: Array) -> Array:
-        """The shape nearest to that of another dead-zone sum: the mean slope of that over each piece."""
-        places = np.array([self.drive[0], *self.breaks, self.drive[1]])
-        (stage,) = other.stages(shape)
-        return self.shape(np.diff(stage.forward(places)) / np.diff(places))
-
     def stages(self, shape: Array) -> tuple[Stage, ...]:
         """The dead-zone sum; its weight at 0 is the slope of the piece that 0 lies in."""
         slopes = self.slopes(shape)
@@ -351,10 +345,6 @@ COMPARED = 200_000
 """Samples that are compared while the shape is sought; of longer records an even selection, though all run through the
 plays."""
 
-ROUNDS = 4
-"""Blocks of each record in a fold of the validation: every part of the drive range has to be in those that a shape is
-fitted to."""
-
 Tick = Callable[[int], None] | None
 
 
@@ -482,7 +472,7 @@ def _linear(
     """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
     every = max(1, sum(item.used for item in courses) // COMPARED)
     source = linear_source(front, shape, p, every)
-    system = reduction.reduce(courses, thresholds, tick, source, len(shape), ROUNDS)
+    system = reduction.reduce(courses, thresholds, tick, source, len(shape))
     columns = np.arange(len(thresholds))
     best = pi.non_negative(system.whole, columns)
     rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)

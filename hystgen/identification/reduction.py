@@ -36,7 +36,7 @@ AS_FAR = 1e-3
 12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
 
 FOLDS = 4
-"""Parts of each record for the blocked validation, of consecutive blocks."""
+"""Consecutive blocks of each record for the blocked validation."""
 
 
 @dataclass(frozen=True)
@@ -213,20 +213,18 @@ def reduce(
     tick: Callable[[int], None] | None = None,
     source: Callable[[Course, Array], Source] = play_rows,
     further: int = 0,
-    rounds: int = 1,
 ) -> Reduced:
     """Reduce the records; `tick` gets the number of samples done, chunk by chunk.
 
     `source`: where the rows of a course come from, with `further` columns behind those of the plays of `thresholds`.
-    `rounds`: blocks of each record in a fold, which take turns.
     """
     width = len(thresholds) + further + 1
     whole = np.empty((0, width))
     folds = [np.empty((0, width)) for _ in range(FOLDS)]
     counts = [0] * FOLDS
     for course in courses:
-        edges = np.linspace(course.first, course.last, FOLDS * rounds + 1).astype(int).tolist()
-        blocks = [np.empty((0, width + 1)) for _ in range(FOLDS * rounds)]
+        edges = np.linspace(course.first, course.last, FOLDS + 1).astype(int).tolist()
+        blocks = [np.empty((0, width + 1)) for _ in range(FOLDS)]
         rows = source(course, thresholds)
         for k, (begin, end) in enumerate(itertools.pairwise([0, *edges])):
             for start in range(begin, end, CHUNK):
@@ -234,12 +232,11 @@ def reduce(
                 found = rows(start, stop, k > 0)
                 if k > 0:
                     blocks[k - 1] = triangle(blocks[k - 1], found)
-                    counts[(k - 1) % FOLDS] += int(np.count_nonzero(np.isfinite(course.y[start:stop])))
+                    counts[k - 1] += int(np.count_nonzero(np.isfinite(course.y[start:stop])))
                 if tick is not None:
                     tick(stop - start)
         whole = triangle(whole, _without_offset(triangle(*blocks)))
-        for k, block in enumerate(blocks):
-            folds[k % FOLDS] = triangle(folds[k % FOLDS], _without_offset(block))
+        folds = [triangle(fold, _without_offset(block)) for fold, block in zip(folds, blocks, strict=True)]
     return Reduced(thresholds, whole, tuple(folds), tuple(counts))
 
 
