@@ -75,7 +75,7 @@ def solve(
     out of the fit about as well as any. Raises IdentificationError.
     """
     # A start memory found without the front is not the one behind it: it counts where there is not enough else
-    courses = start.estimated(courses) if kind == "pi" else start.needed(courses)
+    courses = start.estimated(courses, (), wanted) if kind == "pi" else start.needed(courses)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
         return Fitted(Kept(), np.empty(0), plain), compared
@@ -93,7 +93,7 @@ def solve(
             best = error, front, shaped.shape
     assert best is not None
     _, front, shape = best
-    courses = start.needed(courses, front.stages(shape))
+    courses = start.needed(courses, front.stages(shape), wanted)
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved, and the shape is to be the best one for them
     r = fitted.solution.thresholds

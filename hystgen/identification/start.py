@@ -32,12 +32,16 @@ STARTS, UNLIKE = 8, 3.0
 """Fewest samples of a start, and times the rms error of the rest above which its error shows that the memory it was
 given or found to begin with is not that of the actuator."""
 
+ROUNDING = 1e-6
+"""Share of the output range below which errors are those of the arithmetic, that of records computed without noise."""
+
 LEAST_KNOWN = 0.5
 """Share of the samples of a record that judges a model, or in which effects are sought, from which on those before its
 memory is known are left out: a start memory fitted to them flatters the model, and may pass for what an effect does."""
 
 PLAYS = 12
-"""Thresholds over which start memories are sought: as many as default fits have in the middle of their range."""
+"""Thresholds over which start memories are sought: as many as default fits have in the middle of their range. Those of
+the model itself where they are given and no more than that: the time of a search grows with the cube of their number."""
 
 SPREAD = math.sqrt(3.0)
 """One over the standard deviation of a slope that may be anywhere from -1 to 1."""
@@ -55,11 +59,14 @@ ROUNDS = 2
 """Searches; the first one gives the errors by which the prior is weighed in the next."""
 
 
-def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[Course]:
+def estimated(
+    courses: Sequence[Course], stages: Sequence[Stage] = (), wanted: int | tuple[float, ...] | None = None
+) -> list[Course]:
     """The courses compared from their beginning, with a start memory for those whose history is not known.
 
-    `stages`: the front of the plays. Where no admissible memory explains the start nearly as well as the rest it stays
-    ignored: a transient. So it does where the plays do not move up and down again.
+    `stages`: the front of the plays; `wanted`: their thresholds, over which a memory is then sought that is exact for
+    them, or anything else. Where no admissible memory explains the start nearly as well as the rest it stays ignored: a
+    transient. So it does where the plays do not move up and down again.
     """
     if all(item.history is not None for item in courses):
         return list(courses)
@@ -69,7 +76,10 @@ def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[C
     reach = pi.largest([_whole(joint.through_front(item, stages)) for item in some])
     if reach == 0.0:
         return begun
-    r = np.array(pi.dense(reach, sum(item.last - item.begin for item in some), PLAYS).thresholds)
+    if isinstance(wanted, tuple) and 1 < len(wanted) <= PLAYS + 1:
+        r = np.array(wanted)
+    else:
+        r = np.array(pi.dense(reach, sum(item.last - item.begin for item in some), PLAYS).thresholds)
     for first in range(0, len(places), TOGETHER):
         here = places[first : first + TOGETHER]
         for k, item in zip(here, _started([begun[k] for k in here], stages, r, None), strict=True):
@@ -77,19 +87,23 @@ def estimated(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[C
     return begun
 
 
-def needed(courses: Sequence[Course], stages: Sequence[Stage] = ()) -> list[Course]:
-    """The courses with a start memory where too little of them could be compared without one (`wanted`)."""
-    if not any(wanted(item) for item in courses):
+def needed(
+    courses: Sequence[Course], stages: Sequence[Stage] = (), wanted: int | tuple[float, ...] | None = None
+) -> list[Course]:
+    """The courses with a start memory (`estimated`) where too little of them could be compared without one."""
+    short = [lacking(item) for item in courses]
+    if not any(short):
         return [unknown(item) for item in courses]
-    return [item if wanted(item) else unknown(item) for item in estimated(courses, stages)]
+    found = estimated(courses, stages, wanted)
+    return [item if lacks else unknown(item) for item, lacks in zip(found, short, strict=True)]
 
 
 def of_model(
     courses: Sequence[Course], stages: Sequence[Stage], thresholds: Array, weights: Array
 ) -> list[Course]:
-    """Courses by which a model is judged: its weights stay as they are, and starts that are not `wanted` ignored."""
+    """Courses by which a model is judged: its weights stay as they are, and starts of those not `lacking` ignored."""
     begun = [unknown(item) for item in courses]
-    places = [k for k, item in enumerate(begun) if wanted(item)]
+    places = [k for k, item in enumerate(begun) if lacking(item)]
     if len(thresholds) > 1 and places:
         for k, item in zip(places, _started([begun[k] for k in places], stages, thresholds, weights), strict=True):
             begun[k] = item
@@ -106,7 +120,7 @@ def findable(item: Course) -> bool:
     return item.history is not None or pi.largest([_whole(item)]) > 0.0
 
 
-def wanted(item: Course) -> bool:
+def lacking(item: Course) -> bool:
     """Whether too little of a course can be compared without a start memory, and one can be found for it."""
     return findable(item) and unknown(item).used < LEAST_KNOWN * _whole(item).used
 
@@ -118,12 +132,13 @@ def _started(
     inner = [joint.through_front(item, stages) for item in courses]
     search = _Search(tuple(_System.of(_whole(item), r) for item in inner), r, weights)
     found = search.result()
+    plain = search.behind()
     begun = []
     for item, seen, (slopes, uncertainty) in zip(courses, inner, search.parted(found), strict=True):
         if item.history is None:
             turns = turns_of(r, float(seen.v[0]) + memory_of(slopes, r))
             whole = replace(seen, start=Start(turns, uncertainty), first=item.begin)
-            if not _transient(whole, item.first, r, found.best):
+            if not _transient(whole, item.first, r, found.best, found.best if lacking(item) else plain):
                 item = replace(item, start=Start(_in_front(turns, stages), uncertainty), first=item.begin)
         begun.append(item)
     return begun
@@ -145,14 +160,19 @@ def _in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float,
     return tuple(drives)
 
 
-def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
-    """Whether the errors before the memory is known are far larger than those behind it."""
-    error = pi.compare(item, r, p).error
-    start, rest = (part[np.isfinite(part)] for part in np.split(error, [settled - item.first]))
-    if min(len(start), len(rest)) < STARTS:
+def _transient(item: Course, settled: int, r: Array, p: Array, plain: Array) -> bool:
+    """Whether the errors before the memory is known are far larger than those behind it.
+
+    `p`: weights that fit both, by which the former are judged; `plain`: those by which the latter are, of a fit that a
+    transient cannot bend where there is enough behind it.
+    """
+    known = np.isfinite(item.y)
+    if min(np.count_nonzero(known[item.first : settled]), np.count_nonzero(known[settled : item.last])) < STARTS:
         return False
-    rest = rest - np.mean(rest)
-    return float(np.sqrt(np.mean((start - np.mean(start)) ** 2))) > UNLIKE * float(np.sqrt(np.mean(rest**2)))
+    start = pi.compare(item, r, p).error[: settled - item.first]
+    rest = pi.compare(replace(item, first=settled), r, plain).error
+    least = ROUNDING * item.output_range
+    return float(np.nanstd(start)) > UNLIKE * max(float(np.nanstd(rest)), least)
 
 
 def memory_of(slopes: Array, r: Array) -> Array:
@@ -290,6 +310,13 @@ class _Search:
             found, _ = joint.search(linear, _Bounds(self._slopes), now)
             shape, rms = found.shape, found.rms
         return found
+
+    def behind(self) -> Array:
+        """The weights, those that fit best behind the starts unless they are known."""
+        if self.known is not None:
+            return self.known
+        tails = [reduction.triangle(each.tail)[1:, 1:] for each in self.systems]
+        return pi.non_negative(reduction.triangle(*tails), np.arange(len(self.r)))
 
     def parted(self, found: Shaped) -> list[tuple[Array, float]]:
         """Slopes of each course, and the half width of the 95 % interval of the output that they add at its start."""
