@@ -41,7 +41,7 @@ memory is known are left out: a start memory fitted to them flatters the model, 
 
 PLAYS = 12
 """Thresholds over which start memories are sought: as many as default fits have in the middle of their range. Those of
-the model itself where they are given and no more than that: the time of a search grows with the cube of their number."""
+the model itself where they are given and no more: the time of a search grows with the cube of their number."""
 
 SPREAD = math.sqrt(3.0)
 """One over the standard deviation of a slope that may be anywhere from -1 to 1."""
