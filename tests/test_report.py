@@ -154,8 +154,9 @@ class TestMasks:
         assert first.outliers.tolist() == known
         assert len(known) >= 3
         assert first.skipped.tolist() == [*range(SKIP)], "at the start of the record, not behind the gap"
-        assert CUT in first.ignored
-        assert first.starts == (None, None), "behind a front, where enough is known without"
+        assert SKIP in first.ignored, "most of the first part is known without a start memory"
+        assert CUT not in first.ignored
+        assert [start is None for start in first.starts] == [True, False]
         assert other.skipped.tolist() == [*range(SKIP)]
         for name in ("outliers", "bridged", "gaps", "left_out"):
             assert getattr(other, name).tolist() == []
@@ -196,12 +197,11 @@ class TestMasks:
         part = fit.parameters.model.pi
         drive = record.v.copy()
         good = np.setdiff1d(np.arange(len(drive)), place(SPIKES))
-        for begin, end in ((0, CUT), (CUT, len(record))):
+        assert [found is None for found in used.starts] == [history is not None, False]
+        for (begin, end), found in zip(((0, CUT), (CUT, len(record))), used.starts, strict=True):
             inside = good[(good >= begin) & (good < end)]
             v = np.interp(np.arange(begin, end), inside, drive[inside])
-            start: float | Array = float(v[0])
-            if begin == 0 and history is not None:
-                start = brute_plays(history, part.thresholds, 0.0)[-1]
+            start = brute_plays(history if found is None else found.turns, part.thresholds, 0.0)[-1]
             expected = brute_output(v, part.thresholds, part.weights, start)
             known = used.compared[begin:end]
             expected += np.mean((record.y[begin:end] - expected)[known])

@@ -41,7 +41,7 @@ memory is known are left out: a start memory fitted to them flatters the model, 
 
 PLAYS = 12
 """Thresholds over which start memories are sought: as many as default fits have in the middle of their range. Those of
-the model itself where they are given and no more: the time of a search grows with the cube of their number."""
+the model itself where they are given, no more, and moved by the records: time grows with the cube of their number."""
 
 SPREAD = math.sqrt(3.0)
 """One over the standard deviation of a slope that may be anywhere from -1 to 1."""
@@ -76,7 +76,7 @@ def estimated(
     reach = pi.largest([_whole(joint.through_front(item, stages)) for item in some])
     if reach == 0.0:
         return begun
-    if isinstance(wanted, tuple) and 1 < len(wanted) <= PLAYS + 1:
+    if isinstance(wanted, tuple) and 1 < len(wanted) <= PLAYS + 1 and wanted[-1] <= reach:
         r = np.array(wanted)
     else:
         r = np.array(pi.dense(reach, sum(item.last - item.begin for item in some), PLAYS).thresholds)
