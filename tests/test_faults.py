@@ -110,15 +110,14 @@ class TestOneWrongSample:
     @pytest.mark.parametrize(("channel", "value"), [("v", 118.0), ("v", -30.0), ("y", 40.0), ("y", -200.0)])
     def test_of_the_shipped_recording(self, place: int, channel: str, value: float) -> None:
         _, v, y = (x.copy() for x in columns(EXAMPLES / "stage_recording.csv"))
-        # the start memory begins at the first drive; without that, at the second
-        clean = hystgen.identify(less(record(v, y), [0]) if (place, channel) == (0, "v") else record(v, y))
+        clean = hystgen.identify(record(v, y))
         {"v": v, "y": y}[channel][place] = value
         fit = hystgen.identify(record(v, y))
         assert fit.parameters.input_range == (0.0, 100.0)
         weights = [each.parameters.model.pi.weights for each in (fit, clean)]
         assert weights[0][0] == pytest.approx(weights[1][0], rel=0.003)
         assert row(fit, "all").rms_percent == pytest.approx(row(clean, "all").rms_percent, rel=0.01)
-        assert fit.parameters.model.pi.weights[0] == pytest.approx(0.1211, rel=0.003)
+        assert fit.parameters.model.pi.weights[0] == pytest.approx(0.1195, rel=0.003)
 
     @pytest.mark.parametrize(("channel", "value"), [("v", 118.0), ("y", -200.0), ("y", 9.91e37), ("v", 1e300)])
     def test_in_a_held_out_record(self, channel: str, value: float) -> None:

@@ -26,6 +26,7 @@ from scipy.stats import binned_statistic
 
 import hystgen
 from hystgen.basics import drawing, extras
+from hystgen.basics.problems import percent
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import fit_figures
@@ -127,7 +128,7 @@ def table(page: Page, section: str) -> list[dict[str, str]]:
 @pytest.fixture(scope="module")
 def fitted() -> tuple[Fit, Record, Record]:
     first, other = spoilt(), made("other.csv", 7)
-    return hystgen.identify(first, model="gpi-deadzone", holdout=other, skip=0.001 * SKIP, name="axis"), first, other
+    return hystgen.identify(first, model="gpi-deadzone", holdout=other, skip=SKIP, name="axis"), first, other
 
 
 @pytest.fixture(scope="module")
@@ -154,9 +155,7 @@ class TestMasks:
         assert first.outliers.tolist() == known
         assert len(known) >= 3
         assert first.skipped.tolist() == [*range(SKIP)], "at the start of the record, not behind the gap"
-        assert SKIP in first.ignored, "most of the first part is known without a start memory"
-        assert CUT not in first.ignored
-        assert [start is None for start in first.starts] == [True, False]
+        assert CUT in first.ignored
         assert other.skipped.tolist() == [*range(SKIP)]
         for name in ("outliers", "bridged", "gaps", "left_out"):
             assert getattr(other, name).tolist() == []
@@ -197,11 +196,12 @@ class TestMasks:
         part = fit.parameters.model.pi
         drive = record.v.copy()
         good = np.setdiff1d(np.arange(len(drive)), place(SPIKES))
-        assert [found is None for found in used.starts] == [history is not None, False]
-        for (begin, end), found in zip(((0, CUT), (CUT, len(record))), used.starts, strict=True):
+        for begin, end in ((0, CUT), (CUT, len(record))):
             inside = good[(good >= begin) & (good < end)]
             v = np.interp(np.arange(begin, end), inside, drive[inside])
-            start = brute_plays(history if found is None else found.turns, part.thresholds, 0.0)[-1]
+            start: float | Array = float(v[0])
+            if begin == 0 and history is not None:
+                start = brute_plays(history, part.thresholds, 0.0)[-1]
             expected = brute_output(v, part.thresholds, part.weights, start)
             known = used.compared[begin:end]
             expected += np.mean((record.y[begin:end] - expected)[known])
@@ -467,8 +467,7 @@ class TestDrawing:
     def shown(self, residual: Array, v: Array) -> Shown:
         n, none = len(residual), np.empty(0, dtype=np.intp)
         record = Record("made", np.arange(n) * 0.01, v, residual, sample_time=0.01)
-        used = Used("made", False, n, ((0, n),), (None,), none, none, none, none, none, none, none)
-        return Shown(record, used, np.zeros(n))
+        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none, none), np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
     def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:
@@ -583,3 +582,10 @@ def test_python_call_is_part_of_the_package() -> None:
     assert "report_fit" in hystgen.__all__
     assert pages.names()[0] == "report.html"
     assert set(pages.names()) == FILES
+
+
+def test_shares_of_ten_times_and_more_are_factors() -> None:
+    assert percent(0.1234) == "12.3 %"
+    assert percent(9.994, of="the range") == "999 % of the range"
+    assert percent(32.0, of="the range") == "32 times the range"
+    assert percent(-0.5, "+.0f") == "-50 %"

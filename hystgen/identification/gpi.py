@@ -74,8 +74,8 @@ def solve(
     Of several fronts of a kind the one with the fewest shape numbers is taken that predicts blocks of the records left
     out of the fit about as well as any. Raises IdentificationError.
     """
-    # A start memory found without the front is not the one behind it: it counts where there is not enough else
-    courses = start.estimated(courses, (), wanted) if kind == "pi" else start.needed(courses)
+    # a start memory found without the front is not the one behind it, but better than too little to compare
+    courses = start.needed(courses, (), wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
         return Fitted(Kept(), np.empty(0), plain), compared

@@ -182,7 +182,7 @@ def mask_outliers(
     Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the samples that it misses most,
     as many as may be left out, so that none of them draws it near.
     """
-    first = start.estimated([_without_pulses(_without_runs(item)[0]) for item in to_fit])
+    first = start.needed([_without_pulses(_without_runs(item)[0]) for item in to_fit])
     solution, _ = pi.solve(first, wanted, floor)
     to_fit[:] = [replace(item, start=each.start).resettled(math.inf) for item, each in zip(to_fit, first, strict=True)]
     places = tuple(float(r) for r in solution.thresholds)
