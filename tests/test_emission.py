@@ -503,7 +503,7 @@ def test_nothing_forbidden_in_the_text(name: str) -> None:
     for file, text in emitted_files(model(name), operator="both", arithmetic="float32").items():
         code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
         assert not re.search(r"\b(double|malloc|printf|memcpy)\b", code), file
-        assert " / " not in re.sub(r"\) / 2|middle\) / 2", "", code).replace("+ 1) / 2", ""), file
+        assert " / " not in re.sub(r" / 2\b(?!\.)", "", code), file  # halves are exact, and products to a compiler
         includes = set(re.findall(r"#include <(\w+)\.h>", code))
         assert includes <= {"stdint", "stdbool", "stddef", "float"}, file
 

@@ -109,6 +109,8 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     if name not in INVERSE_ALONE:
         forward = answers(numbers, Run(given.t, v, given.extra), False).astype(float)
         y = one.simulate(v * drive, t=given.t, extra=exact.extra) / float(codes.output_lsb)
+        most = int(numbers.tables.limits[slots.CODE_MAX])
+        y = np.clip(y, -most - 1, most)  # a mode that rings may leave the codes
         assert np.max(np.abs(forward - y)) <= codes.forward_error
 
 

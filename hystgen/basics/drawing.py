@@ -164,6 +164,14 @@ def label(what: str, unit: str | None) -> str:
     return f"{what} ({unit})" if unit else what
 
 
+def noise_lines(axes: Any, noise: float | None) -> None:
+    """The standard deviation of the noise on both sides of zero; nothing where it is not known."""
+    if noise is None:
+        return
+    for side, name in ((noise, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-noise, None)):
+        axes.axhline(side, color=FAULT, linewidth=1.0, linestyle="--", label=name)
+
+
 def legend_above(axes: Any, columns: int = 3) -> None:
     """A legend above the plot area, where it hides nothing."""
     axes.legend(

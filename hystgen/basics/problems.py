@@ -133,3 +133,14 @@ class FormatError(ValueError):
 def counted(number: int, what: str) -> str:
     """`1 sample`, `2 samples`."""
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+FACTOR = 10.0
+"""[times] From here on a share is given as a factor: "32 times" reads more easily than "3200 %"."""
+
+
+def percent(share: float, digits: str = ".3g", of: str = "") -> str:
+    """`12 % of the range`, or `32 times the range`; without `of` the number alone."""
+    if abs(share) >= FACTOR:
+        return f"{share:.3g} times{f' {of}' if of else ''}"
+    return f"{100.0 * share:{digits}} %{f' of {of}' if of else ''}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 from hystgen import diagnosis
 from hystgen.basics import drawing, parallel
 from hystgen.basics.drawing import label
+from hystgen.basics.problems import percent
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure, times_noise
@@ -275,7 +276,7 @@ def _ranking(result: Result) -> list[Text | Table]:
             ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best", "why not"]
         ]
         for each in tried:
-            margin = f"{100.0 * (each.holdout / best - 1.0):.1f} %" if best > 0.0 else ""
+            margin = percent(each.holdout / best - 1.0, ".1f") if best > 0.0 else ""
             errors = f"{each.fit:.4g}", f"{each.holdout:.4g}"
             rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import drawing
 from hystgen.basics.drawing import label
+from hystgen.basics.problems import FACTOR, percent
 from hystgen.diagnosis.data.signals import still
 from hystgen.diagnosis.findings.content import loop_centre
 from hystgen.diagnosis.findings.kinds import Line
@@ -58,19 +59,28 @@ def gap(found: Diagnosis, width: float) -> Any:
     top = max(positive, default=1.0)
     for place, (value, before) in enumerate(zip(values, [values[0], *values[:-1]], strict=True)):
         colour = FLOOR if place == len(values) - 1 else (BEFORE, drawing.MODEL)[place] if place < 2 else AFTER
-        axes.barh(place, value - least, left=least, height=0.6, color=colour)
-        if 0 < place < len(values) - 1 and before > value:
-            axes.barh(place, before - value, left=value, height=0.6, facecolor="none", edgecolor=BEFORE,
-                      linestyle=":", linewidth=1.0)  # fmt: skip
+        removed = 0 < place < len(values) - 1 and before > value
+        if far:  # a bar has to begin at zero, which such an axis does not have
+            axes.plot(value, place, "o", color=colour, markersize=9)
+            if removed:
+                axes.hlines(place, value, before, color=BEFORE, linestyle=":", linewidth=1.4)
+        else:
+            axes.barh(place, value, height=0.6, color=colour)
+            if removed:
+                axes.barh(place, before - value, left=value, height=0.6, facecolor="none", edgecolor=BEFORE,
+                          linestyle=":", linewidth=1.0)  # fmt: skip
         said = f"{value:.3g}"
         if 0 < place < len(values) - 1 and before > 0.0:
-            change = 100.0 * (value / before - 1.0)
-            said += f"  ({change:+.0f} %)" if abs(change) >= 0.5 else "  (no change)"
+            change = value / before - 1.0
+            many = change >= FACTOR
+            changed = f"{percent(change + 1.0)}" if many else f"{100.0 * change:+.0f} %"
+            said += f"  ({changed})" if abs(change) >= 0.005 else "  (no change)"
         end = max(value, before if 0 < place < len(values) - 1 else 0.0)
-        axes.annotate(f" {said}", (end, place), va="center", fontsize=9)
+        aside = (8.0 if far else 4.0, 0.0)
+        axes.annotate(said, (end, place), aside, textcoords="offset points", va="center", fontsize=9)
     axes.axvline(noise, color=FLOOR, linestyle="--", linewidth=1.2)
     axes.set_yticks(range(len(names)), names)
-    axes.invert_yaxis()
+    axes.set_ylim(len(names) - 0.5, -0.5)
     room = 1.4 if width == WIDE else 2.0
     if far:
         _decades(axes, "x")
@@ -110,7 +120,7 @@ def overlay(found: Diagnosis, width: float) -> Any:
         if named:
             bottom.plot(t, each.before[chosen], color=BEFORE, linewidth=0.8, label="refitted")
         bottom.plot(t, each.after[chosen], color=AFTER, linewidth=0.8, label=what)
-        _floor(bottom, found)
+        drawing.noise_lines(bottom, found.result.noise_floor)
         bottom.set(xlabel="time in the record (s)", ylabel=label("error", unit))
         drawing.legend_above(bottom, 3 if width == WIDE else 2)
     drawn.align_ylabels(panels)
@@ -158,7 +168,7 @@ def against(found: Diagnosis, width: float) -> Any:
         for key, colour, what in (*sides, ("after", AFTER, _last(found))):
             e = np.concatenate([getattr(each, key) * (_direction(each) if log else 1.0) for each in shown])
             _binned(axes, x, e, colour, f"{what}, mean \N{PLUS-MINUS SIGN} 1 sd", log)
-        _floor(axes, found)
+        drawing.noise_lines(axes, found.result.noise_floor)
         axes.set(xlabel=name)
         if not log:
             axes.locator_params(axis="x", nbins=7 if wide else 5)
@@ -274,12 +284,6 @@ def _last(found: Diagnosis) -> str:
     return "with the effects" if found.result.effects else "refitted model"
 
 
-def _floor(axes: Any, found: Diagnosis) -> None:
-    noise = found.result.noise_floor
-    for sign, name in ((1.0, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-1.0, None)):
-        axes.axhline(sign * noise, color=FLOOR, linestyle="--", linewidth=1.0, label=name)
-
-
 def _range(axes: Any, values: Sequence[float]) -> None:
     """A horizontal axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
@@ -324,7 +328,7 @@ CAPTIONS = {
 }
 
 ALTERNATIVES = {
-    "gap": "Bars of the held-out error after each step, down to the noise.",
+    "gap": "The held-out error after each step, down to the noise.",
     "overlay": "Measured and predicted displacement along time, and below it the error before and after.",
     "records": "Points for the rms error of every record before and after, with the noise as a line.",
     "time": "rms error before and after along the session, with the noise as a line.",

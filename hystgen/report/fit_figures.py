@@ -228,9 +228,7 @@ def _against_panel(axes: Any, x: Array, residual: Array, noise: float | None) ->
     )  # fmt: skip
     axes.plot(middle, mean, color="#14532d", linewidth=1.6, label="mean in bins", marker="o", markersize=2.2)
     axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
-    if noise is not None:
-        for sign, name in ((1.0, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-1.0, None)):
-            axes.axhline(sign * noise, color=drawing.FAULT, linewidth=1.0, linestyle="--", label=name)
+    drawing.noise_lines(axes, noise)
     margin = 0.02 * (high - low)
     axes.set_xlim(low - margin, high + margin)
 
@@ -298,6 +296,7 @@ def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
         overlay_panel(above, each, units)
         _shade(below, each, False)
         residual_panel(below, each, units)
+        drawing.noise_lines(below, each.noise)
         below.set_xlim(each.time[0], each.time[-1])
         for ax in (above, below):
             ax.yaxis.set_label_coords(-0.06 if wide else -0.15, 0.5)

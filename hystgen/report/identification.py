@@ -14,13 +14,13 @@ import numpy as np
 
 from hystgen import identification
 from hystgen.basics import arguments, drawing
-from hystgen.basics.problems import counted
+from hystgen.basics.problems import counted, percent
 from hystgen.basics.version import __version__
 from hystgen.emission import files
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
 from hystgen.identification.fit import HELD_OUT, Fit
-from hystgen.identification.quality import WORD_COLUMNS, cells
+from hystgen.identification.quality import WORD_COLUMNS, Row, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, read_records, several
@@ -137,13 +137,17 @@ def held_out_row(fit: Fit) -> Row | None:
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 
+def _of_range(row: Row) -> str:
+    return percent(row.rms_percent / 100.0, of="the output range")
+
+
 def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     row, unit = held_out_row(fit), f" {fit.unit}" if fit.unit else ""
     if row is None:
         own = fit.rows[-1]
         error = (
-            f" follows the records it was fitted to within {own.rms:.3g}{unit} rms ({own.rms_percent:.3g} % of the "
-            "output range); nothing was held out, so that it is not known how it does on others"
+            f" follows the records it was fitted to within {own.rms:.3g}{unit} rms ({_of_range(own)}); nothing was "
+            "held out, so that it is not known how it does on others"
         )
     else:
         which = (
@@ -151,12 +155,13 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
             if row.model == "written"
             else f"; fitted to the first {100 * (1 - HELD_OUT):g} % of the records, such a model predicts the rest"
         )
-        error = f"{which} to {row.rms:.3g}{unit} rms, {row.rms_percent:.3g} % of the output range"
+        error = f"{which} to {row.rms:.3g}{unit} rms, {_of_range(row)}"
         if fit.intervals.held_out is not None:
             low, high = fit.intervals.held_out
-            share = 100.0 / row.output_range if row.output_range else 0.0
+            whole = row.output_range or np.inf
             error += (
-                f" (95 % interval {low:.3g} to {high:.3g}{unit}, {low * share:.3g} to {high * share:.3g} %)"
+                f" (95 % interval {low:.3g} to {high:.3g}{unit}, {percent(low / whole)} to "
+                f"{percent(high / whole)})"
             )
     problems = cascade_of(fit.parameters).inverse_problems()
     said = [f"{_kind(fit)}{error}; {'it has no inverse' if problems else 'it is invertible'}."]
@@ -259,7 +264,7 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
         rows.append(
             (
                 each.used.name, fit_figures.role(each), f"{drive.min():.6g}", f"{drive.max():.6g}", str(outside),
-                f"{far:.4g}" if outside else "0", f"{100.0 * far / (high - low):.3g} %",
+                f"{far:.4g}" if outside else "0", percent(far / (high - low)),
             )
         )  # fmt: skip
     said = (

@@ -58,7 +58,8 @@ def fit_figure(fit: Fit, records: Sequence[Record]) -> Any:
     fit_figures.loop_panel(loop, fit_figures.drawn_ones(shown)[-1], units)
     for each, colour in zip(shown, itertools.cycle((drawing.RESIDUAL, drawing.OTHER, drawing.GAP)), strict=False):
         fit_figures.residual_panel(residual, each, units, colour)
-    residual.set_title("Residual", pad=20)
+    drawing.noise_lines(residual, fit_figures.noise_of(shown))
+    residual.set_title("Residual", pad=20 if len(shown) < 2 else 34)
     drawing.legend_above(residual, 2)
     fit_figures.weight_panel(weights, fit, units, range(len(fit.parameters.model.pi.thresholds)))
     weights.set_title("Weights", pad=20)

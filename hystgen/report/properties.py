@@ -6,7 +6,7 @@ import decimal
 from typing import Any
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.problems import FormatError
+from hystgen.basics.problems import FormatError, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.emission.calls import emit_options
@@ -150,10 +150,10 @@ def warnings(model: Model) -> list[str]:
     share = error / (c.input_range[1] - c.input_range[0])
     if share < WIDE:
         return []
-    unit, finer = model.parameters.units.input, ARITHMETICS[arithmetic].finer
+    unit, finer, whole = model.parameters.units.input, ARITHMETICS[arithmetic].finer, "the drive's range"
     return [
-        f"the inverse in {arithmetic} may be off by {_most(error)}{f' {unit}' if unit else ''}, {100 * share:.0f} % of "
-        f"the drive's range: {f'take {finer}, ' if finer else ''}raise p_0 or narrow input_range"
+        f"the inverse in {arithmetic} may be off by {_most(error)}{f' {unit}' if unit else ''}, "
+        f"{percent(share, '.0f', whole)}: {f'take {finer}, ' if finer else ''}raise p_0 or narrow input_range"
     ]
 
 
