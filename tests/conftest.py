@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,17 @@ WHOLE = bool(os.environ.get("HYSTGEN_WHOLE"))
 NO_DATA = f"marked data, and there is no folder {MEASURED} of measured records; HYSTGEN_DATA names another"
 SHORTENED = "marked slow; HYSTGEN_WHOLE=1 runs all"
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The browser in which pages are looked at; CI has to have it."""
+    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if found is None:
+        if os.environ.get("CI"):
+            pytest.fail("CI installs chromium, but it is not there")
+        pytest.skip("there is no chromium")
+    return found
 
 
 @pytest.fixture(scope="session")

@@ -373,13 +373,8 @@ def test_the_references_are_of_the_program(site: Path) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 1280])
-def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, tmp_path: Path) -> None:
+def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, chromium: str, tmp_path: Path) -> None:
     """In a browser: nothing sticks out, every picture is drawn, nothing is complained of."""
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if chromium is None:
-        if os.environ.get("CI"):
-            pytest.fail("CI installs chromium, but it is not there")
-        pytest.skip("there is no chromium")
     pages = sorted(path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md"))
     (tmp_path / "frames.html").write_text(
         f"""<!DOCTYPE html><body><pre></pre><script>

@@ -5,10 +5,8 @@ from __future__ import annotations
 import base64
 import html
 import json
-import os
 import platform
 import re
-import shutil
 import stat
 import subprocess
 import sys
@@ -499,16 +497,6 @@ class TestDrawing:
         record = Record("long", t, v, y, sample_time=1e-4)
         page = hystgen.report_fit(hystgen.identify(record, thresholds=2), record, tmp_path / "out")
         assert page.stat().st_size < 3_000_000
-
-
-@pytest.fixture(scope="module")
-def chromium() -> str:
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if found is None:
-        if os.environ.get("CI"):
-            pytest.fail("CI installs chromium, but it is not there")
-        pytest.skip("there is no chromium")
-    return found
 
 
 class TestBrowser:

@@ -98,7 +98,7 @@ def read_records(
                 else:
                     name = f"record {unnamed.index(k) + 1}" if len(unnamed) > 1 else "record"
                     record = read_memory(source, name, columns, sample_time, need)
-                if record.read_as:
+                if record.read_as and record is not source:  # what is a record already has been announced
                     ways.setdefault(record.read_as, []).append(record.name)
                 found.append(record)
             except RecordError as error:

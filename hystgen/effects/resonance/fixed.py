@@ -16,9 +16,10 @@ from hystgen.arithmetic.factors import LARGEST, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.resonance.compensator import ModeNumbers
+from hystgen.effects.resonance import compensator
+from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import Reals
 
 STATE_BITS = 60
 """Bits of a state without its sign, of which a product takes 50."""
@@ -80,22 +81,13 @@ def tables(rows: list[list[int]]) -> Any:
 # ---------------------------------------------------------------- mode_fixed.c
 
 KEEP, TURN, SWING, LATE, PUSH, BITS, DROP, LIFT = 0, 2, 4, 6, 8, 10, 11, 12
-BEFORE, OFF, RATE = range(3)
+mode_rest = compensator.mode_rest  # nothing in it is rounded
 
 
 @jit
 def scaled(t: Reals, j: int, x: Any, which: int) -> Any:
     """A number of a state's units times a factor of mode j."""
     return times(x >> t[j, DROP], t[j, which], t[j, which + 1])
-
-
-@jit
-def mode_rest(s: Reals, j: int, x: Any) -> Any:
-    """Settle at the input x; the output."""
-    s[j, BEFORE] = x
-    s[j, OFF] = zero(x)
-    s[j, RATE] = zero(x)
-    return x
 
 
 @jit
