@@ -148,17 +148,16 @@ def _reached(v: Array) -> int:
 def travel(course: Course, threshold: float) -> float:
     """Peak-to-peak movement of one play over the samples compared.
 
-    Where these begin before the memory of that play is known it counts from there, and the lesser of the way up and the
-    way down: while a drive goes one way, a play behind an unknown start shows no more than a straight line.
+    None where these begin before the memory of that play is known and it moves one way only: behind an unknown start
+    that is no more than a straight line.
     """
     start = start_states(course.v, course.history, np.array([threshold]))[0]
-    moved = operators.play(course.v[: course.last], threshold, float(start))
+    moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
     known = replace(course, start=None).resettled(threshold).first
-    if course.first >= known:
-        return float(np.ptp(moved[course.first :]))
-    moved = moved[known:]
-    up = np.max(moved - np.minimum.accumulate(moved))
-    return float(min(up, np.max(np.maximum.accumulate(moved) - moved)))
+    steps = np.diff(moved)
+    if course.first < known and (np.all(steps >= 0.0) or np.all(steps <= 0.0)):
+        return 0.0
+    return float(np.ptp(moved))
 
 
 def prediction(v: Array, history: Sequence[float] | None, thresholds: Array, weights: Array) -> Array:

@@ -12,6 +12,7 @@ with any thresholds, as a known history does.
 
 from __future__ import annotations
 
+import bisect
 import functools
 import itertools
 import math
@@ -34,6 +35,10 @@ given or found to begin with is not that of the actuator."""
 
 ROUNDING = 1e-6
 """Share of the output range below which errors are those of the arithmetic, that of records computed without noise."""
+
+DEARER = 1.1
+"""Times the error of predicting the samples behind the starts without these, above which a start bends the model more
+than it teaches it: what begins there is no start memory but a transient, or a play wider than the records can show."""
 
 LEAST_KNOWN = 0.5
 """Share of the samples of a record that judges a model, or in which effects are sought, from which on those before its
@@ -65,8 +70,8 @@ def estimated(
     """The courses compared from their beginning, with a start memory for those whose history is not known.
 
     `stages`: the front of the plays; `wanted`: their thresholds, over which a memory is then sought that is exact for
-    them, or anything else. Where no admissible memory explains the start nearly as well as the rest it stays ignored: a
-    transient. So it does where the plays do not move up and down again.
+    them, or anything else. A start stays ignored where the samples behind it are predicted worse with it: a transient.
+    So it does where the plays do not move up and down again.
     """
     if all(item.history is not None for item in courses):
         return list(courses)
@@ -132,13 +137,14 @@ def _started(
     inner = [joint.through_front(item, stages) for item in courses]
     search = _Search(tuple(_System.of(_whole(item), r) for item in inner), r, weights)
     found = search.result()
-    plain = search.behind()
     begun = []
-    for item, seen, (slopes, uncertainty) in zip(courses, inner, search.parted(found), strict=True):
+    for k, (slopes, uncertainty) in enumerate(search.parted(found)):
+        item, seen = courses[k], inner[k]
         if item.history is None:
             turns = turns_of(r, float(seen.v[0]) + memory_of(slopes, r))
             whole = replace(seen, start=Start(turns, uncertainty), first=item.begin)
-            if not _transient(whole, item.first, r, found.best, found.best if lacking(item) else plain):
+            bent = weights is None and search.bends(k, slopes)
+            if not bent and not _transient(whole, item.first, r, found.best):
                 item = replace(item, start=Start(_in_front(turns, stages), uncertainty), first=item.begin)
         begun.append(item)
     return begun
@@ -160,17 +166,13 @@ def _in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float,
     return tuple(drives)
 
 
-def _transient(item: Course, settled: int, r: Array, p: Array, plain: Array) -> bool:
-    """Whether the errors before the memory is known are far larger than those behind it.
-
-    `p`: weights that fit both, by which the former are judged; `plain`: those by which the latter are, of a fit that a
-    transient cannot bend where there is enough behind it.
-    """
+def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
+    """Whether the errors of a model before the memory is known are far larger than those behind it."""
     known = np.isfinite(item.y)
     if min(np.count_nonzero(known[item.first : settled]), np.count_nonzero(known[settled : item.last])) < STARTS:
         return False
     start = pi.compare(item, r, p).error[: settled - item.first]
-    rest = pi.compare(replace(item, first=settled), r, plain).error
+    rest = pi.compare(replace(item, first=settled), r, p).error
     least = ROUNDING * item.output_range
     return float(np.nanstd(start)) > UNLIKE * max(float(np.nanstd(rest)), least)
 
@@ -219,11 +221,15 @@ class _Bounds:
 
 @dataclass(frozen=True)
 class _System:
-    """One course: rows behind the sample from which no play depends on the start, and the samples before it."""
+    """One course: rows behind the sample from which no play depends on the start, and the samples before it.
+
+    `blocks`: those rows `[1, plays.., y]` in `FOLDS` parts; `tail`: all of them.
+    """
 
     item: Course
     r: Array
     settled: int
+    blocks: tuple[Array, ...]
     tail: Array
 
     @classmethod
@@ -233,12 +239,16 @@ class _System:
         swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * r[-1]
         settled = 0 if item.history is not None else int(np.argmax(swept)) if swept[-1] else item.last
         states = reduction.start_states(v, item.history, r)
-        tail = np.empty((0, len(r) + 2))
-        edges = sorted({*range(0, item.last, reduction.CHUNK), settled, item.begin, item.last})
+        first = max(settled, item.begin)
+        parts = [round(x) for x in np.linspace(first, item.last, reduction.FOLDS + 1)]
+        blocks = [np.empty((0, len(r) + 2))] * reduction.FOLDS
+        edges = sorted({*range(0, item.last, reduction.CHUNK), *parts, item.last})
         for a, b in itertools.pairwise(edges):
-            wanted = a >= max(settled, item.begin)
-            tail = reduction.triangle(tail, reduction.segment_rows(v[a:b], item.y[a:b], r, states, wanted))
-        return cls(item, r, settled, tail)
+            rows = reduction.segment_rows(v[a:b], item.y[a:b], r, states, a >= first)
+            if len(rows):
+                k = bisect.bisect_right(parts[1:-1], a)
+                blocks[k] = reduction.triangle(blocks[k], rows)
+        return cls(item, r, settled, tuple(blocks), reduction.triangle(*blocks))
 
     @property
     def slopes(self) -> int:
@@ -274,6 +284,13 @@ class _System:
             made = np.concatenate([found[:, :-1], found[:, :1] * change, found[:, -1:]], axis=1)
             table = reduction.triangle(table, made)
         return table[1:, 1:]
+
+    def beginning(self, slopes: Array) -> Array:
+        """Rows `[1, plays.., y]` of the samples before `settled`, for a memory of these slopes."""
+        v, y, begin = self.item.v, self.item.y, min(self.item.begin, self.settled)
+        states = float(v[0]) + memory_of(slopes, self.r)
+        reduction.segment_rows(v[:begin], y[:begin], self.r, states, False)
+        return reduction.segment_rows(v[begin : self.settled], y[begin : self.settled], self.r, states, True)
 
     def change(self, held: Array) -> Array:
         """Change of the output with each slope, for the weights of the plays that have not moved."""
@@ -311,12 +328,25 @@ class _Search:
             shape, rms = found.shape, found.rms
         return found
 
-    def behind(self) -> Array:
-        """The weights, those that fit best behind the starts unless they are known."""
-        if self.known is not None:
-            return self.known
-        tails = [reduction.triangle(each.tail)[1:, 1:] for each in self.systems]
-        return pi.non_negative(reduction.triangle(*tails), np.arange(len(self.r)))
+    def bends(self, place: int, slopes: Array) -> bool:
+        """Whether the start of one course, with a memory of these slopes, spoils what predicts the samples behind.
+
+        Each of `FOLDS` blocks of these is predicted by the weights that fit the others, with that start and without.
+        """
+        start = self.systems[place].beginning(slopes)
+        squares = np.zeros(2)
+        for fold in range(reduction.FOLDS):
+            for with_start in (False, True):
+                tables = []
+                for k, each in enumerate(self.systems):
+                    own = [start] if with_start and k == place else []
+                    others = [block for j, block in enumerate(each.blocks) if j != fold]
+                    tables.append(reduction.triangle(*own, *others)[1:, 1:])
+                columns = np.arange(len(self.r))
+                p = pi.non_negative(reduction.triangle(*tables), columns)
+                left_out = [reduction.triangle(each.blocks[fold])[1:, 1:] for each in self.systems]
+                squares[int(with_start)] += sum(pi.residual(rows, columns, p) for rows in left_out)
+        return bool(squares[1] > DEARER**2 * squares[0])
 
     def parted(self, found: Shaped) -> list[tuple[Array, float]]:
         """Slopes of each course, and the half width of the 95 % interval of the output that they add at its start."""

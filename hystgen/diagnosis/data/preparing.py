@@ -356,7 +356,6 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
     """
     begun = start.needed(to_fit)
     solution, _ = pi.solve(begun, None, 0.0)
-    begun = start.needed(to_fit, (), tuple(solution.thresholds.tolist()))
     begun_held = start.of_model(held, (), solution.thresholds, solution.weights)
     return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
 
