@@ -121,8 +121,12 @@ def unknown(item: Course) -> Course:
 
 
 def findable(item: Course) -> bool:
-    """Whether a record moves its plays up and down again, which shows a start memory."""
-    return item.history is not None or pi.largest([_whole(item)]) > 0.0
+    """Whether the drive of a record goes up and down again far enough (`pi.LEAST_TRAVEL`) to show a start memory."""
+    v = item.v[item.begin : item.last]
+    if item.history is not None or not len(v):
+        return item.history is not None
+    up, down = np.max(v - np.minimum.accumulate(v)), np.max(np.maximum.accumulate(v) - v)
+    return bool(min(up, down) >= pi.LEAST_TRAVEL * np.ptp(v) > 0.0)
 
 
 def lacking(item: Course) -> bool:
