@@ -66,6 +66,14 @@ class TestMemory:
         off = np.array(WEIGHTS) @ (brute_plays([*found.turns, v[0]], PLACES, 0.0)[-1] - memory)
         assert abs(off) < max(5.0 * found.uncertainty, 1.0)
 
+    def test_of_plays_that_seldom_turn(self) -> None:
+        """The widest move down by a few volts at the end, and up once behind the unknown start."""
+        v = legs([0.0, 90.0, 30.0, 70.0, 20.0, 98.0, 40.0, 60.0, 3.0, 80.0, 0.0, 50.0])
+        places, weights = (0.0, 5.0, 15.0, 30.0, 45.0), (1.0, 0.2, 0.2, 0.15, 0.15)
+        fit = hystgen.identify(record(v, noisy(brute_output(v, places, weights, 0.0), 0.1)))
+        assert (fit.rows[-1].ignored, fit.used[0].starts[0] is None) == (0, False)
+        assert fit.rows[-1].rms < 0.15
+
     def test_a_known_start_has_none(self) -> None:
         v = growing()
         fit = hystgen.identify(record(v, brute_output(v, PLACES, WEIGHTS, 0.0)), history=())
