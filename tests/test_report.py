@@ -467,7 +467,8 @@ class TestDrawing:
     def shown(self, residual: Array, v: Array) -> Shown:
         n, none = len(residual), np.empty(0, dtype=np.intp)
         record = Record("made", np.arange(n) * 0.01, v, residual, sample_time=0.01)
-        return Shown(record, Used("made", False, n, ((0, n),), (None,), none, none, none, none, none, none, none), np.zeros(n))
+        used = Used("made", False, n, ((0, n),), (None,), none, none, none, none, none, none, none)
+        return Shown(record, used, np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
     def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:

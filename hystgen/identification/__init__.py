@@ -89,8 +89,8 @@ def identify(
     which, a dead-zone sum may bend at, chosen in the same way by default. `holdout`: records that take no part in any
     choice but that of `auto`; without them the last quarter of each record gives the held-out figures, from a trial
     model that has not seen it, and the model written is then fitted to everything. `history`: drive values visited
-    before every record from a virgin state; without it the start memory of each record is estimated with the weights,
-    and its start ignored only where none explains it, or where the rest of a held-out record is enough to judge by.
+    before every record from a virgin state; without it the start of each record is ignored until the drive has wiped
+    the memory that matters, or where less than half of it would be left its start memory estimated with the weights.
     `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here. `name`:
     C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: seconds at the
     start of every record that are not compared, though their drive counts.

@@ -148,16 +148,19 @@ def _reached(v: Array) -> int:
 def travel(course: Course, threshold: float) -> float:
     """Peak-to-peak movement of one play over the samples compared.
 
-    None where these begin before the memory of that play is known and it moves one way only: behind an unknown start
-    that is no more than a straight line.
+    Where these begin before the memory of that play is known, the lesser of the way up and the way down: while a drive
+    goes one way, a play behind an unknown start shows no more than a straight line.
     """
     start = start_states(course.v, course.history, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
-    known = replace(course, start=None).resettled(threshold).first
-    steps = np.diff(moved)
-    if course.first < known and (np.all(steps >= 0.0) or np.all(steps <= 0.0)):
-        return 0.0
-    return float(np.ptp(moved))
+    if course.first >= replace(course, start=None).resettled(threshold).first:
+        return float(np.ptp(moved))
+    return min(ways(moved))
+
+
+def ways(x: Array) -> tuple[float, float]:
+    """The longest ways up and down that a signal goes, turns in between left out of account."""
+    return float(np.max(x - np.minimum.accumulate(x))), float(np.max(np.maximum.accumulate(x) - x))
 
 
 def prediction(v: Array, history: Sequence[float] | None, thresholds: Array, weights: Array) -> Array:

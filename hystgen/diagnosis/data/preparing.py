@@ -349,14 +349,14 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses with a start memory where without one most of their samples would not be compared, and notes on the
-    way in which their loops run.
+    """The courses, with a start memory where without one too little could be compared for a name, and notes on the way
+    in which their loops run.
 
     Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
     """
-    begun = start.needed(to_fit)
+    begun = start.needed(to_fit, least=acceptance.FEW_COMPARED)
     solution, _ = pi.solve(begun, None, 0.0)
-    begun_held = start.of_model(held, (), solution.thresholds, solution.weights)
+    begun_held = start.of_model(held, (), solution.thresholds, solution.weights, acceptance.FEW_COMPARED)
     return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
 
 
