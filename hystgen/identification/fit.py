@@ -188,7 +188,8 @@ class Fit:
             reported.append(
                 "ignored: samples at the start, before the drive had wiped an unknown start memory; none explains them."
             )
-        reported += [each.start_sentence(self.unit) for each in self.used if any(each.starts)]
+        if len(self.parameters.model.pi.thresholds) > 1:
+            reported += [each.start_sentence(self.unit) for each in self.used if any(each.starts)]
         reported.append(f"95 % confidence: {self._interval_sentence()}.")
         return reported
 
