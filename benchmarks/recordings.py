@@ -32,6 +32,17 @@ Array = NDArray[np.float64]
 
 PLAYS, LEVELS, LAGS = 16, 16, 32
 
+REPORTED = {
+    "loops run clockwise": "clockwise",
+    "is a guess there": "beyond the fitted range",
+    "explains only": "explains little",
+    "Something is missing": "more is missing",
+    "is not explained": "most is unexplained",
+    "too little to judge": "start unknown",
+    "can be compared": "too short",
+}
+"""What the program says of recordings, in short."""
+
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh", "auto")
 
 
@@ -221,6 +232,11 @@ def row(name: str, folder: Path) -> dict[str, str]:
     return found
 
 
+def reported(says: str) -> str:
+    """What is said of recordings, in short."""
+    return ", ".join(short for text, short in REPORTED.items() if text in says) or "-"
+
+
 def main() -> int:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -228,12 +244,13 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=list(SETS), default=list(SETS))
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
-    head = ["recordings", *BASELINES, *KINDS, "diagnosed", "best", "s", "names"]
+    head = ["recordings", *BASELINES, *KINDS, "diagnosed", "best", "s", "names", "reported"]
     lines = []
     for name in options.only:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            lines.append(row(name, options.folder))
+            found = row(name, options.folder)
+        lines.append(found | {"reported": reported(found.get("says", ""))})
         print("  ".join(f"{key} {lines[-1].get(key, '-')}" for key in (*head, "says")), flush=True)
     if options.output is not None:
         with options.output.open("w", encoding="ascii", newline="") as file:
