@@ -1104,3 +1104,17 @@ def test_ends_of_fitted_records_judge_too() -> None:
     assert items.compared([*more.to_fit, *more.held]) == items.compared([*ready.to_fit, *ready.held])
     assert more.notes[-1].endswith("the last 30 % of each fitted record judges too")
     assert preparing.with_ends(more) is None
+
+
+def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
+    """Another axis moves slowly while they are taken, and not while the held-out one is, which hardly moves itself."""
+    records = []
+    for number in (1, 2, 3):
+        v = wander(number) if number < 3 else 49.5 + 0.01 * wander(number)
+        moved = np.cumsum(np.random.default_rng(number).normal(0.0, 0.02, len(v))) if number < 3 else 0.0
+        y = noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.02, number) + moved
+        records.append(record(v, y, f"record {number}"))
+    found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2], history=[0.0])
+    assert found.content["gap"]["after"]["fit"] > 5.0 * found.content["noise_floor"]
+    assert (found.verdict, found.content["effects"]) == ("unexplained", [])
+    assert "rms is left of the fitted records" in found.sentence()

@@ -135,10 +135,10 @@ def _unexplained(
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
     sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
     remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
-    held = errors[len(ready.to_fit) :]
+    fitted, held = errors[: len(ready.to_fit)], errors[len(ready.to_fit) :]
     share, _ = shares(ready.held, held)
     share = max(share, *together(everything, errors))
-    if not acceptance.is_noise(rms(held), noise, share):
+    if not acceptance.is_noise(rms(held), noise, share) or not acceptance.is_noise(rms(fitted), noise, 0.0):
         alone = tuple(
             item.name for item, e in zip(ready.held, after[1], strict=True)
             if rms([e]) > acceptance.HELD_OUT_ALONE * usual

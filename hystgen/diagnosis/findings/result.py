@@ -226,7 +226,10 @@ class Diagnosis:
             return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
             return f"Nothing is missing: the refitted model leaves {after} rms on held-out records, which is noise"
-        missing = f"{self._missing()}: {after} rms is left{self._nearest()}"
+        where, left = "", gap.after.holdout
+        if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
+            where, left = " of the fitted records", gap.after.fit
+        missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
         disturbing = [each for each in seen if not isinstance(each, Fault | Structure)]
         if not disturbing:
             return missing
