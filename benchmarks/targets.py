@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import fixed_tables, float_tables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.emission.calls import emit_options
 from hystgen.emission.text import operand, table
 from hystgen.model import Model

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.plays.play_sum import PlaySum
 
 Array = NDArray[np.float64]

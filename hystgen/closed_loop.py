@@ -41,7 +41,7 @@ from hystgen.basics import extras
 from hystgen.basics.checks import finite
 from hystgen.cascade import PI, Cascade, InverseCascade
 from hystgen.compensator import fixed_tables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.emission.calls import emit_options
 from hystgen.emission.options import Options
 from hystgen.model import InverseModel, Model, as_model

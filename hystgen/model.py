@@ -18,7 +18,7 @@ from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, tables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.model import Model
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes

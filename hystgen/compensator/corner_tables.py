@@ -12,7 +12,7 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import CornerRoundings
-from hystgen.plays.corners.memory import Curve, Start
+from hystgen.plays.corners.corners_float import Curve, Start
 
 
 @dataclass(frozen=True)

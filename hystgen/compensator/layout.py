@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
-from hystgen.plays.corners.memory import Curve, Start
+from hystgen.plays.corners.corners_float import Curve, Start
 from hystgen.plays.slots import Counts, Reals
 
 

@@ -26,7 +26,7 @@ from hystgen.front.stage import StageTables
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
-from hystgen.plays.corners.memory import BOTTOM, Curve, Start
+from hystgen.plays.corners.corners_float import BOTTOM, Curve, Start
 
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:

@@ -7,14 +7,6 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
 from hystgen.plays.corners.corners_float import (
-    forget_line,
-    move_in_block,
-    move_to_input,
-    move_to_output,
-    start,
-    stop_in_block,
-)
-from hystgen.plays.corners.memory import (
     BEFORE,
     BEGIN,
     BEHIND,
@@ -38,6 +30,12 @@ from hystgen.plays.corners.memory import (
     Memory,
     Start,
     copy_place,
+    forget_line,
+    move_in_block,
+    move_to_input,
+    move_to_output,
+    start,
+    stop_in_block,
 )
 from hystgen.plays.loop import PlayTables
 from hystgen.plays.slots import (

@@ -7,8 +7,8 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator.corners.inverse import clamp_drive
 from hystgen.compensator.layout import FixedTables
-from hystgen.plays.corners.corners_fixed import FAR, along, move_to_input, move_to_solution, solve, start
-from hystgen.plays.corners.memory import (
+from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, along, move_to_input, move_to_solution, solve, start
+from hystgen.plays.corners.corners_float import (
     BEFORE,
     BITS,
     HERE,
@@ -21,9 +21,7 @@ from hystgen.plays.corners.memory import (
     RISING,
     STATUS,
     UNDO,
-    FixedMemory,
     K,
-    Reals,
     copy_place,
 )
 from hystgen.plays.fixed import nearest, over_slope
@@ -37,6 +35,7 @@ from hystgen.plays.slots import (
     OUTPUT_MAX,
     OUTPUT_MIN,
     SHY,
+    Reals,
 )
 
 NEVER = -(2**31)
