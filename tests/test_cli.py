@@ -29,7 +29,8 @@ import hystgen
 from hystgen import cli, verification
 from hystgen.compensator import tables
 from hystgen.compensator.bounds import error_bounds
-from hystgen.emission import banner, module
+from hystgen.emission import module
+from hystgen.emission.options import seal
 from hystgen.emission.text import literal
 from hystgen.verification import compilers, run
 
@@ -220,7 +221,7 @@ def test_check_says_in_what_a_file_differs(layout: str) -> None:
         return said.splitlines()[0].removeprefix("error: fw/stage.c ")
 
     text = re.sub(r" \* Text: .*\n", "", good).replace(f"hystgen {hystgen.__version__};", "hystgen 0.0.1;")
-    older = banner.seal(text.replace("return", "return ", 1))
+    older = seal(text.replace("return", "return ", 1))
     assert check(good.replace("\n", "\r\n")) == "has other line ends than LF"
     assert check(good.replace("return", "return ", 1)) == "was edited by hand"
     both = good.replace("return", "return ", 1).replace("\n", "\r\n")

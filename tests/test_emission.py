@@ -20,8 +20,9 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.names import MAX_NAME
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.engines import ENGINES, choose
-from hystgen.emission import banner, runtime
+from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options, emitted_files
+from hystgen.emission.options import read_banner
 from hystgen.emission.text import literal
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import Model
@@ -537,7 +538,7 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
     one = renamed("plain", "n" * MAX_NAME)
     hystgen.emit(one, tmp_path, arithmetic="q15", engine="loop", layout="single-header", operator="both")
     text = next(tmp_path.glob(f"{one.name}.h")).read_text()
-    read = banner.read(text)
+    read = read_banner(text)
     assert read is not None
     assert " \\\n" in text[: text.index("Parameters:")]
     assert read.options == {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from hystgen.basics import arguments
+from hystgen.basics import arguments, writing
 from hystgen.compensator import engines
-from hystgen.emission import files, module, worth
+from hystgen.emission import module, worth
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
@@ -118,7 +118,7 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
     FormatError and UnsupportedEffectsError; then nothing is written.
     """
-    return files.write(Path(arguments.path("output", output)), emitted_files(source, **options))
+    return writing.write_files(Path(arguments.path("output", output)), emitted_files(source, **options))
 
 
 @arguments.taking(emit_options, "emit")

@@ -24,14 +24,11 @@ from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import SHARE_BITS, Compiled, OwnChainTables
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
-from hystgen.emission import banner, chain, cost, layout, numbers, own, runtime, selftest
-from hystgen.emission.layout import define
-from hystgen.emission.options import Options
-from hystgen.emission.text import literal
+from hystgen.emission import chain, cost, numbers, own, runtime, selftest
+from hystgen.emission.options import OPTIONS, Options, seal
+from hystgen.emission.text import WIDTH, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
-
-LICENCE_WIDTH = 100
 
 
 @functools.cache
@@ -61,7 +58,7 @@ def files(
     if options.inverse and cascade.inverse_problems():
         raise NotInvertibleError(cascade.inverse_problems())
     values = values_of(parameters, cascade, options)
-    values.sha256 = sha256 or values.sha256
+    values.sha256 = sha256 or parameters_sha256(parameters)
     name, shared = parameters.name, options.layout == "shared-runtime"
     single = options.layout == "single-header"
 
@@ -91,7 +88,7 @@ def files(
         file = f"{name}_selftest{ending}"
         top = _banner(values, file, about, details)
         made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
-    return {file: banner.seal(_tidy(layout.fit(text))) for file, text in made.items()}
+    return {file: seal(_tidy(fit(text))) for file, text in made.items()}
 
 
 def _implementation(values: SimpleNamespace) -> str:
@@ -124,7 +121,7 @@ def _tidy(text: str) -> str:
 
 
 def _banner(values: SimpleNamespace, file: str, what: str, details: Sequence[str] = ()) -> str:
-    width = layout.WIDTH - len(" * ")
+    width = WIDTH - len(" * ")
     lines = []
     for line in details:
         hang = " " * 8 if line.startswith(" ") else ""
@@ -219,7 +216,6 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         single_header=options.layout == "single-header",
         version=__version__,
         command=_command(parameters, options),
-        sha256=parameters_sha256(parameters),
         units=_units(parameters),
         n=n,
         engine=options.engine,
@@ -374,7 +370,7 @@ def _command(parameters: Parameters, options: Options) -> str:
         own_effects.origin(type(effect)) for effect in parameters.model.effects if effect.name.startswith(USER)
     )
     more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
-    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in banner.OPTIONS)
+    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 

@@ -16,8 +16,8 @@ from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.effects import own
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import VERBS, Kind
-from hystgen.emission.layout import WIDTH
 from hystgen.emission.runtime import Piece
+from hystgen.emission.text import WIDTH
 
 MOST_BYTES = 1 << 16
 

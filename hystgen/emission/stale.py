@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hystgen.emission import banner
+from hystgen.emission.options import read_banner
 
 LINE_ENDS = "has other line ends than LF"
 MISSING = "is missing"
@@ -44,7 +44,7 @@ def _difference(path: Path, content: bytes, text: str) -> Difference:
     here = content.decode("utf-8", "surrogateescape")
     there = here.replace("\r\n", "\n").replace("\r", "\n")
     ends = (LINE_ENDS,) if there != here else ()
-    old, new = banner.read(there), banner.read(text)
+    old, new = read_banner(there), read_banner(text)
     assert new is not None
     if there == text:
         return Difference(path, ends, new.options)

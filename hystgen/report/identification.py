@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 
 from hystgen import identification
-from hystgen.basics import arguments, drawing
+from hystgen.basics import arguments, drawing, writing
 from hystgen.basics.problems import counted, percent
 from hystgen.basics.version import __version__
-from hystgen.emission import files
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
 from hystgen.identification.fit import HELD_OUT, Fit
@@ -111,7 +110,7 @@ def write(
         _verdict(fit, parameter_file or f"{fit.parameters.name}.yaml"),
         _sections(fit, shown, figures),
     )
-    return files.write(Path(folder), {PAGE: text.encode("utf-8"), **made})[0]
+    return writing.write_files(Path(folder), {PAGE: text.encode("utf-8"), **made})[0]
 
 
 # Text ----------------------------------------------------------------------------------------------

@@ -8,8 +8,9 @@ from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 
 from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
+from hystgen.basics import writing
 from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
-from hystgen.emission import files, module
+from hystgen.emission import module
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
 from hystgen.model import Model
@@ -77,6 +78,6 @@ def write(folder: Path, model: Model, options: Options) -> Sources:
     texts["hystgen_harness.c"] = harness(
         name, operators, module.calls_of(model.parameters, model.cascade, options), ARITHMETICS[options.arithmetic]
     )
-    paths = {path.name: path for path in files.write(folder, texts) if path.suffix == ".c"}
+    paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, operators, tuple(paths.values()), caller, selftest)

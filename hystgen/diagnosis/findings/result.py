@@ -291,7 +291,7 @@ class Diagnosis:
 
         Raises PlotError without matplotlib.
         """
-        from hystgen.emission import files
+        from hystgen.basics import writing
         from hystgen.parameters.files import dump_parameters
 
         said = [f"Diagnosed by hystgen. {self.sentence()}", *(f"Warning: {text}" for text in self.warnings)]
@@ -299,7 +299,7 @@ class Diagnosis:
         pages = [] if self.page is None else [self.page(self, text)]
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
-        return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
+        return writing.write_files(Path(folder), {name: content.encode("utf-8") for name, content in made})
 
 
 def plain(value: Any) -> Any:
