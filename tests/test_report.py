@@ -25,6 +25,7 @@ from scipy.stats import binned_statistic
 import hystgen
 from hystgen.basics import drawing, extras
 from hystgen.basics.problems import percent
+from hystgen.diagnosis.findings.kinds import times_noise
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import fit_figures
@@ -577,3 +578,10 @@ def test_shares_of_ten_times_and_more_are_factors() -> None:
     assert percent(9.994, of="the range") == "999 % of the range"
     assert percent(32.0, of="the range") == "32 times the range"
     assert percent(-0.5, "+.0f") == "-50 %"
+
+
+def test_ratios_to_the_noise_have_two_digits() -> None:
+    assert [times_noise(ratio) for ratio in (2.84, 45.6, 99.7, 100.0)] == [
+        "2.8 times the noise", "46 times the noise", "100 times the noise", "100 times the noise",
+    ]  # fmt: skip
+    assert times_noise(130.0) == "more than 100 times the noise"

@@ -130,13 +130,16 @@ class FormatError(ValueError):
         self.problems = [((), problem) if isinstance(problem, str) else problem for problem in problems]
         super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))
 
+
 def counted(number: int, what: str) -> str:
     """`1 sample`, `2 samples`."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 FACTOR = 10.0
-"""[times] From here on a share is given as a factor: "32 times" reads more easily than "3200 %"."""
+"""[times] From here on a share is given as a factor: "32 times" reads more easily than "3200 %", which is more than the
+three digits of a share. Only wording depends on it. Changed by:
+report::test_shares_of_ten_times_and_more_are_factors."""
 
 
 def percent(share: float, digits: str = ".3g", of: str = "") -> str:

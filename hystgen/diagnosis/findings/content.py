@@ -205,7 +205,10 @@ MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
-"""Distances of the averages of the drive over its travel, as shares of the drive range: as many as of the times."""
+"""[share of the drive range] Distances of the averages of the drive over its travel: six, as many as of the times, each
+about three times the one before, from the smallest play up to five ranges. They explain 0.55 of what plays leave of a
+Bouc-Wen plant; four explain 0.34, eleven 0.59, and of creep none more than 0.09. Set by: benchmarks/chosen_numbers.py
+lengths."""
 
 
 @dataclass(frozen=True)
