@@ -170,7 +170,7 @@ class Loop:
         """The response to `reference` from rest: N samples at t_k, or a function of the time in s with a `duration`.
 
         Every run starts anew: plant at 0, all memories at their start. Raises ValueError for a reference that is not a
-        signal or a duration that is none.
+        signal, or for an impossible duration.
         """
         r = self._reference(reference, duration)
         controller, compensator, hysteresis = self._blocks

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""Share of its range by which the drive of fixed point may move for one code of the reference: more is noise."""
+"""[share of its range] The drive may move this far for one code of the reference; in fixed point more is noise."""
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -387,7 +387,7 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
 
 
 def check_arithmetic(arithmetic: str) -> None:
-    """Raise FormatError for an arithmetic that there is not."""
+    """Raise FormatError for the name of an arithmetic that does not exist."""
     if arithmetic not in ARITHMETICS:
         raise FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(ARITHMETICS)}")
 
@@ -405,9 +405,9 @@ ModelSource: TypeAlias = "Model | HasModel | str | os.PathLike[str]"
 
 
 def as_model(source: ModelSource) -> Model:
-    """The model, that of a parameter file, or that of what has one, such as a fit.
+    """The model itself, that of a parameter file, or that of an object that has one, such as a fit.
 
-    Raises ParameterError, and TypeError for what is none of them.
+    Raises ParameterError, and TypeError for anything else.
     """
     if isinstance(source, str | os.PathLike):
         return load(source)

@@ -57,7 +57,7 @@ def simulate_records(
 def _emulated(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
 ) -> tuple[NDArray[Any], list[str]]:
-    """Answers of the bit reference of a model with effects for the one record that there is, and no remarks."""
+    """Answers of the bit reference of a model with effects, which takes one record, and no remarks."""
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
     (record,) = records

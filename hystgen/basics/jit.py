@@ -9,7 +9,7 @@ installed everything runs as Python, with the same bits.
 
 Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
 in a helper can never leave a stale caller behind. The cache saves time and is never needed: where no folder can be
-written to there is none, and files of it that cannot be read are made again.
+written to, nothing is cached; cached files that cannot be read are made again.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EVERY_TIME = (
 
 
 def interpreted() -> str:
-    """The message where there is no numba."""
+    """The message for a machine without numba."""
     return f"computing in Python, which takes longer than compiled; to have it compiled: {extras.install('fit')}"
 
 

@@ -166,7 +166,7 @@ class Pool(Generic[T, R]):
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 try:
                     process.start()
-                except OSError:  # no room for another: those that there are will do, or none
+                except OSError:  # no room for another: go on with those already running, or without any
                     here.close()
                     return
                 finally:

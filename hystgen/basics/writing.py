@@ -169,7 +169,7 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None
 
 
 def check_files(folder: Path, names: Iterable[str]) -> None:
-    """Raise the OSError that writing these files into `folder` would end in, as far as can be told before."""
+    """Raise the OSError that writing these files into `folder` would end in, as far as that is known before."""
     around = destination(folder) if folder.is_symlink() else folder
     while not around.exists() and around != around.parent:
         around = around.parent

@@ -57,7 +57,7 @@ class Run:
     extra: Mapping[str, Array] = field(default_factory=dict)
     rest: float = 0.0
     within: tuple[Run, NDArray[np.intp]] | None = field(default=None, repr=False, compare=False)
-    """a run of more samples, of which these are the ones at some places, the first and the last among them"""
+    """the longer run from which these samples are taken; its first and its last sample are among them"""
 
     def picked(self, places: NDArray[np.intp]) -> Run:
         """Fewer samples of it; what adds up from sample to sample adds up over all of them."""
@@ -110,7 +110,7 @@ class Run:
 
     @cached_property
     def different(self) -> tuple[Array, NDArray[np.intp]]:
-        """The steps that there are, and which of them each step is."""
+        """The distinct step lengths, and for each step the index of its own."""
         return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:

@@ -52,7 +52,7 @@ def source(effect: type[Effect]) -> Path:
 
 
 def _file(effect: type[Effect]) -> str:
-    """The Python file of an effect; a name alone where there is none."""
+    """The Python file of an effect, or only the name of its module if it has no file."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "model.py")
 
 

@@ -82,7 +82,7 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """What may be wrong with the inverse of a model whose diagnosis could not tell the stage from its sensor."""
+    """Possible faults of the inverse of a model whose diagnosis could not separate the stage from its sensor."""
     named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
     found = []
     if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
@@ -123,7 +123,7 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
 
 @arguments.taking(emit_options, "emit")
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
-    """What in folder `output` is missing or other than what `emit` would write, one sentence a file.
+    """The files in folder `output` that are missing or differ from what `emit` would write, one sentence a file.
 
     The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
     """

@@ -287,8 +287,8 @@ def _corner_instance(n: int, op: str, arithmetic: Arithmetic, front: bool, layou
 
 
 def worst_case(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str:
-    """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside;
-    b are the bits of n."""
+    """The largest numbers of multiplications and comparisons in one step as functions of n, without those of tanh and
+    atanh; b are the bits of n."""
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
     if isinstance(numbers, FixedTables):

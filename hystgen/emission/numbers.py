@@ -432,7 +432,7 @@ def _decimal(x: float) -> str:
 def _curves(
     numbers: FixedTables, name: str, prefix: str, options: Options
 ) -> tuple[list[str], list[tuple[str, str, str]]]:
-    """The curves of the memoryless part that are used, forward, and back where there is an inverse; their sizes."""
+    """The curves of the memoryless part in use: forward and, for an inverse, back; and their sizes."""
     arrays = []
     counts = [("DEGREE", f"{numbers.coefficient.shape[1] - 1}u", "of the polynomials of every curve")]
     directions = (("_ascending", 0), ("_descending", 1)) if numbers.branches else (("", 0),)

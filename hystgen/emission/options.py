@@ -32,7 +32,7 @@ _SEAL = re.compile(r"^ \* Text: sha256 ([0-9a-f]{64}), (?:of this file )?without
 class Options:
     """What to emit: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
 
-    `left_out`: effects that the C does not have, in words, where that is allowed.
+    `left_out`: effects that the C does not have, in words, if leaving them out is allowed.
     """
 
     operator: str
@@ -55,7 +55,7 @@ class Options:
 @dataclass(frozen=True)
 class Banner:
     """What a banner says: `version` of hystgen, `options` of its command, hash of the `parameters`; `edited`: whether
-    the file is another than the one that was sealed."""
+    the file has changed since it was sealed."""
 
     version: str
     options: dict[str, str]
@@ -72,7 +72,7 @@ def seal(text: str) -> str:
 
 
 def read_banner(text: str) -> Banner | None:
-    """The banner of a file with line ends LF; None where there is none. Values that are no option's are left out."""
+    """The banner of a file with line ends LF, None if it has none. Values that no option has are left out."""
     generated, parameters, sealed = (form.search(text) for form in (_GENERATED, _PARAMETERS, _SEAL))
     if generated is None or parameters is None:
         return None

@@ -2,7 +2,7 @@
 
 The file is the user's own code and is carried as it stands, with the model's name in front of its own. What it may hold
 is what blocks of `c_runtime/` hold: two types of real numbers, named as in Python, and four functions, with further
-static functions that they call. It is no language checker: what compiles, and to which bits, `hystgen verify` tells.
+static functions that they call. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
 """
 
 from __future__ import annotations

@@ -69,7 +69,7 @@ def _wrapped(values: Sequence[Any], suffix: str, indent: str) -> list[str]:
 
 
 def constant(declared: str, lines: Sequence[str]) -> str:
-    """A constant with these lines between its braces, in one line where there is room."""
+    """A constant with these lines between its braces, on one line if it fits."""
     whole = f"static const {declared} = {{{lines[0].strip()}}};"
     if len(lines) == 1 and len(whole) <= WIDTH:
         return whole + "\n"

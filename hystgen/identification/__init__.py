@@ -41,7 +41,7 @@ P0_FLOOR = 0.05
 """Share of the sum of weights below which p_0 is raised where the data allow it."""
 
 NEAR_ZERO = 0.01
-"""Share of the drive range by which a loading curve may miss 0 and fall back."""
+"""[share of the drive range] A loading curve may miss 0, and fall back, by this much."""
 
 PASSES = 60.0
 """Approximate number of times that the search for a front runs through all samples, for the progress bar."""

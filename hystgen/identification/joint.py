@@ -236,7 +236,7 @@ class Tanh:
 
     @property
     def name(self) -> str:
-        """With the number of branches, which the table tells apart."""
+        """With the number of branches, which distinguishes rows of the table."""
         return "gpi-tanh" if self.branches == 1 else "gpi-tanh, two branches"
 
     @property
@@ -272,7 +272,7 @@ class Tanh:
         return np.linspace(*self.drive, 61)
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The envelope, its numbers rounded; the descending branch is lifted by what rounding lets it fall short."""
+        """The envelope with rounded numbers; the descending branch is lifted where rounding would put it too low."""
         return (self._stage(shape, DIGITS),)
 
     def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
@@ -310,7 +310,7 @@ def _numbers(values: tuple[float, ...], digits: int | None) -> tuple[float, floa
 
 
 def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
-    """So many breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside by a little."""
+    """`count` breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside a little."""
     low, high = drive
     step = (high - low) / (count + 1)
     return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)

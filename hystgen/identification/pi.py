@@ -189,7 +189,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
 
 
 def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
-    """One list of `most` plays, which leaves little to wish for, to judge by what else there is in a record."""
+    """One list of `most` plays, fine enough to show what else a record contains."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
 

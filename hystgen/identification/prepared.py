@@ -207,7 +207,7 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
     There, where a model then misses it by far less, and the rest of it by no more: a wrong drive is remembered, where a
     wrong output is not. Or where the whole row is wrong, which shows in the output there, or behind it: a pulse that
-    was real has left its memory. A pulse right before the end of a record tells a fit nothing, and cannot be told from
+    was real has left its memory. A pulse right before the end of a record does not help a fit, and looks the same as
     a fault: it would only widen the range, and hide when the memory became known. A `robust` solution is asked about
     the largest and the least drive too, if it misses the output there by as much as anywhere: what they spoil may hide
     them, and the range of the model ends at them.

@@ -32,8 +32,8 @@ BLOCKED = 64
 """Columns for which the linear algebra library has room to work on at a time."""
 
 AS_FAR = 1e-3
-"""Share of its range by which the drive may miss its largest or least value and still have been there: four codes of a
-12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
+"""[share of its range] A drive that misses its largest or least value by no more than this has still been there: four
+codes of a 12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""

@@ -292,7 +292,7 @@ def _flow(value: Any) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as a YAML scalar: plain where that is safe anywhere, else in double quotes."""
+    """A text as a YAML scalar: plain if that is safe in any place, else in double quotes."""
     plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_/%^.]*(?:[ -][A-Za-z0-9_/%^.()]+)*", text) and resolve(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
 

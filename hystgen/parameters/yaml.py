@@ -54,7 +54,7 @@ class Document:
 
     Lists arrive as tuples. `values` and `keys` map a path to the 1-based (line, column) of the value and of
     the key in front of it. `poisoned` holds the paths whose value was refused here and is None in `data`.
-    `complete` tells whether `data` is a mapping that was read to the end of the file.
+    `complete`: whether `data` is a mapping that was read to the end of the file.
     """
 
     data: Any = None
@@ -65,7 +65,7 @@ class Document:
     complete: bool = False
 
     def position(self, path: Path, at_key: bool = False) -> Position:
-        """Where the value (or key) at `path` stands; where there is none, what should hold it."""
+        """Position of the value (or key) at `path`, or, if it is missing, of what should hold it."""
         places = self.keys if at_key else self.values
         held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
         return places.get(held) or self.values[held]

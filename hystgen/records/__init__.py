@@ -134,7 +134,7 @@ def read_record(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One source of a record, or several, as a list. Raises TypeError for what is none."""
+    """One source of a record, or several, as a list. Raises TypeError for anything else."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)
@@ -203,7 +203,7 @@ def _read(
 
 
 def _size(source: Source) -> int:
-    """Bytes to read; 0 where there is no file, which is reported when it is opened."""
+    """Bytes to read; 0 for a missing file, which is reported when it is opened."""
     try:
         return os.stat(source).st_size if isinstance(source, str | os.PathLike) else 0
     except OSError:

@@ -24,7 +24,7 @@ DAY = 86400
 NANO = 10**9
 
 PAST_MIDNIGHT = 0.5
-"""Fraction of a day by which a clock without a date has to go back to have passed midnight."""
+"""[days] A clock without a date that goes back by at least this much has passed midnight."""
 
 
 def is_time(cell: str) -> bool:

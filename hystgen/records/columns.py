@@ -47,7 +47,7 @@ _TIME_NAMES = ("t", "time")
 
 
 def split_unit(header: str) -> tuple[str, str]:
-    """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit is empty where there is none."""
+    """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
     # In square brackets anything is a unit but a number, which counts channels
@@ -62,7 +62,7 @@ def split_unit(header: str) -> tuple[str, str]:
 
 
 def unit_alone(text: str) -> str | None:
-    """The unit that a cell below a header holds, `s` or `[um]`, empty for none; None for a cell that is no unit."""
+    """The unit that a cell below a header holds, `s` or `[um]`, or empty; None for a cell that is not a unit."""
     inside = re.fullmatch(r"\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\)", text.strip())
     unit = text.strip() if inside is None else inside[1] or inside[2] or ""
     if unit in ("", "-") or (inside is not None and inside[1] and not unit.isdecimal()):
@@ -208,7 +208,7 @@ def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step |
 
 
 def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
-    """Seconds a sample of a rate or an interval; a unit that is none of it gives nothing."""
+    """Seconds a sample, from a rate or an interval; None if the unit is of neither."""
     if not 0.0 < value < float("inf"):
         return None
     plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")

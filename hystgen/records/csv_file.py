@@ -29,7 +29,7 @@ from hystgen.records.record import Array
 
 
 BLOCK = 1 << 20
-"""Bytes read at a time; a longer line is none of a text table."""
+"""[bytes] Read at a time; a longer line does not belong to a text table."""
 
 WIDE = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 """Encodings by the byte order mark that a file begins with."""

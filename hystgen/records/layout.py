@@ -158,7 +158,7 @@ def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layou
 
 
 def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
-    """The layout with a header that is no comment; None where there is none."""
+    """The layout with a header that is not a comment; None if there is no such header."""
     block = []
     for k in range(view.start - 1, -1, -1):
         if lines[k].comment:

@@ -59,7 +59,7 @@ class Lines:
 
 @dataclass
 class Table:
-    """What a file holds before it is judged: columns under our names, NaN where there is no value.
+    """The content of a file before it is judged: columns under our names, NaN for missing values.
 
     `units`: those the file gives; `lines`: where the file has lines.
     """
@@ -217,7 +217,7 @@ class Reading:
         return self.finished(numbers, taken)
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
-        """A table with NaN for every value that is none, time in seconds and units by name."""
+        """A table with NaN for every cell that is not a number, time in seconds, and units by name."""
         for name, x in numbers.items():
             wrong = no_value(x)
             written = np.unique(x[wrong & np.isfinite(x)])

@@ -25,7 +25,7 @@ BINS, FEWEST = 40, 5
 """Bins of the residual's mean, and the fewest samples in one that is shown."""
 
 TAIL, FAR = 0.002, 3.0
-"""Quantiles at which an axis ends, and the factor by which the extremes then lie farther out."""
+"""[quantiles, times] An axis ends at these quantiles if the extremes lie this many times farther out."""
 
 AGREE = 1.2
 """Two estimates of the noise that differ by at most this factor agree."""

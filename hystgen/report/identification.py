@@ -57,7 +57,7 @@ def names() -> list[str]:
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
-    """Raise PlotError without matplotlib, NotADirectoryError where there is a file of that name."""
+    """Raise PlotError without matplotlib, NotADirectoryError if `folder` is a file."""
     drawing.require()
     target = Path(folder)
     for place in (target, *target.parents):
@@ -132,7 +132,7 @@ def _kind(fit: Fit) -> str:
 
 
 def held_out_row(fit: Fit) -> Row | None:
-    """The row by which the model is judged; None if nothing was held out."""
+    """The row that judges the model; None if nothing was held out."""
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 

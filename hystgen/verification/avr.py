@@ -138,7 +138,7 @@ def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) 
 
 
 def run(board: Board, image: Path) -> int:
-    """The self-test's result, which the firmware tells on its serial port. Raises EmulatorError."""
+    """The self-test's result, which the firmware prints on its serial port. Raises EmulatorError."""
     command = [board.simulator, "-m", board.name, "-f", HERTZ, str(image)]
     try:
         done = subprocess.run(

@@ -151,12 +151,12 @@ class Core:
 
     @property
     def counts(self) -> NDArray[np.uint32]:
-        """Instructions of every call that the harness made of what is counted, in order."""
+        """Instructions of every counted call that the harness made, in order."""
         return np.concatenate(self._counts) if self._counts else np.zeros(0, dtype=np.uint32)
 
     @property
     def stack(self) -> int:
-        """Bytes below the harness's frame that the deepest call used, by what is left of the paint."""
+        """Bytes below the harness's frame that the deepest call used: where the painted stack was overwritten."""
         painted = bytes(self._uc.mem_read(self._top - STACK, STACK))
         untouched = len(painted) - len(painted.lstrip(bytes([PAINT])))
         return self._stack_at_step - (self._top - STACK + untouched)

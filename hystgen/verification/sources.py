@@ -19,7 +19,7 @@ from hystgen.plays import slots
 CALLS = {"init": slots.OP_INIT, "reset": slots.OP_RESET, "commit": slots.OP_COMMIT}
 @dataclass(frozen=True)
 class Sources:
-    """C files by what they are: the module with its run time, and what the verification adds."""
+    """C files by role: the module with its run time, and the files that the verification adds."""
 
     name: str
     operators: tuple[str, ...]
@@ -29,7 +29,7 @@ class Sources:
 
     @property
     def emitted(self) -> tuple[Path, ...]:
-        """What a user gets: the module, and its self-test where there is one."""
+        """The files that a user gets: the module and, if it has one, its self-test."""
         return self.module if self.selftest is None else (*self.module, self.selftest)
 
     @property

@@ -271,7 +271,7 @@ def prepare(
 ) -> Prepared:
     """Items for the fits; without held-out records that can judge one in three is held out, or the end of each.
 
-    Raises IdentificationError, also where there is too little to compare.
+    Raises IdentificationError, also if there are too few samples to compare.
     """
     notes: list[str] = []
     held_courses, held_rails = _courses(holdout, history)

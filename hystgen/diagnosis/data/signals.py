@@ -56,7 +56,7 @@ def noise_floor(items: Sequence[Item]) -> NoiseFloor:
 
 
 def converter_step(y: Array) -> float:
-    """The smallest step between two outputs that occur; infinite where there is one alone."""
+    """The smallest step between two outputs that occur; infinite if only one does."""
     return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))
 
 

@@ -44,7 +44,7 @@ def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
 
 
 def apart(more: float, less: float) -> float:
-    """rms of what one error contains and a smaller one does not."""
+    """rms of the part of one error that a smaller one does not have."""
     return math.sqrt(max(more**2 - less**2, 0.0))
 
 

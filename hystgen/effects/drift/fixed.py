@@ -109,7 +109,7 @@ def clock_tick(t: Reals, s: Reals, j: int) -> None:
 
 @jit
 def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
-    """The drift so many samples ahead of the clock."""
+    """The drift `ahead` samples ahead of the clock."""
     more = (t[j, SLOPE] + s[j, GAINED]) * ahead + t[j, CHANGE] * ((ahead * (ahead - 1)) // 2)
     drift = s[j, WHOLE] + ((s[j, PART] + more) >> t[j, BITS])
     if drift > t[j, FARTHEST]:

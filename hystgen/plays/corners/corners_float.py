@@ -152,7 +152,7 @@ def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
 
 @jit
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
-    """Move the plays to where their sum is `output`, as nearly as floating point can tell."""
+    """Move the plays to where their sum is `output`, as nearly as floating point resolves it."""
     if along(m, output) < along(m, m.real[OUTPUT]):
         turn_back(t, m)
     rising = m.counts[RISING]
