@@ -73,7 +73,7 @@ def shown(value: object) -> str:
 
 
 def path_text(path: Path) -> str:
-    """A path as a message names it: `model.pi.weights[2]`; keys that are no plain words are quoted."""
+    """A path as a message names it: `model.pi.weights[2]`; keys that are not plain words are quoted."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -105,7 +105,7 @@ class PlanError(ValueError):
 
 
 class EffectsError(ValueError):
-    """An effect that cannot be used, or not with these records."""
+    """An effect that cannot be used at all, or not with these records."""
 
 
 class UnsupportedEffectsError(EffectsError):

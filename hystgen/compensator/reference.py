@@ -1,5 +1,5 @@
-"""The bit reference: the emitted C, operation for operation, of the functions for the tables it is given; and sessions,
-in which it, or the same in double precision, runs over sampled signals."""
+"""The bit reference, which computes what the emitted C does, operation for operation; and sessions, which run it, or
+the same in double precision, over sampled signals."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from hystgen.plays.slots import (
 
 
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
-    """What the bit reference is made of for the arithmetic and the engine of these tables."""
+    """The functions of the bit reference for the arithmetic and the engine of these tables."""
     if isinstance(t, ChainTables):
         drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
         return _chain_operations(t.fixed, drives, outputs)
@@ -140,7 +140,7 @@ def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
 
 
 def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
-    """Samples as fixed point takes them. Raises ValueError for what is no code."""
+    """Samples as codes of fixed point. Raises ValueError for numbers that are not codes."""
     with np.errstate(invalid="ignore"):  # what is no code is found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
     most = int(t.limits[CODE_MAX])
@@ -152,7 +152,7 @@ def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any
 def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
+    """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
     code, state = operations(t), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
@@ -204,7 +204,7 @@ class Session:
 
     @property
     def drive_range(self) -> tuple[float, float]:
-        """`input_range` in what the operator takes: physical units, or codes in fixed point."""
+        """`input_range` in the operator's own numbers: physical units, or codes in fixed point."""
         if self._fixed:
             low, high = self.tables.limits[DRIVE_MIN : DRIVE_MAX + 1]
             return float(low), float(high)
@@ -223,8 +223,8 @@ class Session:
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
 
-        Fixed point takes and gives codes. Raises ValueError for numbers that are none and for another shape, TypeError
-        for what is no array of numbers.
+        Fixed point takes and gives codes. Raises ValueError for numbers that are not codes and for another shape,
+        TypeError for anything but an array of numbers.
         """
         samples = self._samples(x)
         return self.operate(np.full(len(samples), OP_STEP, dtype=np.uint8), samples)

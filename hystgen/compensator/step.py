@@ -1,7 +1,7 @@
 """One step of engine loop, and the operations around it: commit, reset, init.
 
-Every function has its counterpart of the same name in `c_runtime/`. What both operators do alike C has for each of them
-(`forward_begin`, `inverse_begin`); here it is written once (`begin`). Engine corners has its own in
+Every function has its counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in
+C (`forward_begin`, `inverse_begin`); here they are written once (`begin`). Engine corners has its own in
 `hystgen.compensator.corners`, and shares the memoryless part and the tables.
 """
 
@@ -50,7 +50,7 @@ from hystgen.plays.slots import (
 
 
 class Operations(NamedTuple):
-    """What is done to an instance: `init`, `visit` and `run` as in `made_of`, a step of each operator, the front."""
+    """The operations on an instance: `init`, `visit` and `run` as in `made_of`, a step of each operator, the front."""
 
     init: Callable[..., Any]
     visit: Callable[..., Any]

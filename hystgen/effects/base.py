@@ -1,4 +1,4 @@
-"""What an effect is: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
+"""The base of all effects: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
 
 Between two samples every signal is taken as straight, so that the filters are exact for any time steps on drives that
 are; before the first sample everything is at rest at that sample.
@@ -38,7 +38,7 @@ class Place(enum.Enum):
 
 
 USER = "user:"
-"""What names of a user's own effects begin with."""
+"""Prefix of the names of a user's own effects."""
 
 MOST_BYTES = 2**25
 """Size of the factors that a record remembers."""
@@ -46,7 +46,7 @@ MOST_BYTES = 2**25
 
 @dataclass(frozen=True)
 class Run:
-    """What an effect sees of one record, N samples.
+    """One record as an effect sees it, N samples.
 
     `t`: seconds, rising, session time; `v`: the drive as recorded; `extra`: further columns by name; `rest`: seconds of
     pause before the first sample, at the drive before it (`chain.join` turns it into samples).
@@ -130,7 +130,7 @@ class Run:
 
 @dataclass(frozen=True)
 class About:
-    """What is known of the records for which shapes are listed."""
+    """The properties of the records for which shapes are listed."""
 
     drive: tuple[float, float]
     output_range: float
@@ -180,7 +180,7 @@ class Candidate:
 
 
 Problem = tuple[tuple[str | int, ...], str]
-"""What does not fit together in an effect: keys, and a message."""
+"""An inconsistency of an effect: its keys, and a message."""
 
 
 def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:

@@ -127,8 +127,8 @@ def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout)
 
 
 def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterable[Kind], plays: int = 1) -> int:
-    """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
-    of `plays` the bytes of one. `kinds`: of the blocks of a chain."""
+    """Bytes of the constants that the C text defines, without padding between them; for constants with an entry for
+    each of `plays`, the bytes of one entry. `kinds`: of the blocks of a chain."""
     fixed = arithmetic.fixed
     real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
@@ -172,7 +172,7 @@ def estimate(
     plays: str,
     fields: Mapping[str, Sequence[Field]],
 ) -> Cost:
-    """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs.
+    """Cost of the emitted model whose implementation is `text`, with the parts of a shared run time that it needs.
 
     `plays`: the part of it that defines the tables with an entry for each play; `fields`: of a model with effects, the
     memory of each operator.

@@ -51,7 +51,7 @@ def render(template: str, values: SimpleNamespace, **more: object) -> str:
 def files(
     parameters: Parameters, cascade: StaticModel, options: Options, sha256: str | None = None
 ) -> dict[str, str]:
-    """File names and their ASCII text; `sha256`: of the parameters that the file has, by default these.
+    """File names and their ASCII text; `sha256`: hash of the parameters in the file, by default of `parameters`.
 
     Raises NotInvertibleError and tables.FormatError.
     """
@@ -92,7 +92,7 @@ def files(
 
 
 def _implementation(values: SimpleNamespace) -> str:
-    """The operators with all that they need of the run time, but what a shared one has."""
+    """The operators with the parts of the run time that they need, except those in a shared one."""
     family: runtime.Family = values.family
     single = values.single_header
     opening, apart, closing = (
@@ -183,7 +183,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
 
 
 def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) -> Compiled | None:
-    """The numbers of a model with effects; None without any."""
+    """The numbers of a model with effects; None for a model without effects."""
     effects = parameters.model.effects
     if not effects:
         return None
@@ -194,7 +194,7 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
-    """What the templates are filled with, and what the cost is counted from."""
+    """Values for the templates, from which the cost is counted too."""
     name = parameters.name
     about = _arithmetic(options.arithmetic)
     shared = options.layout == "shared-runtime"
@@ -329,7 +329,7 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
 
 
 def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
-    """In fixed point, what a code is that sets a temperature or a gain."""
+    """In fixed point, the size of a code that sets a temperature or a gain."""
     if not compiled.tables.fixed:
         return []
     bits = int(31 - compiled.tables.number[SHARE_BITS])
@@ -357,7 +357,7 @@ def _status(values: SimpleNamespace) -> list[str]:
 
 
 def _macros(values: SimpleNamespace) -> list[str]:
-    """The numbers of the model that its functions name, those that none names left out."""
+    """The numbers of the model that its functions use."""
     return [
         define(f"{values.NAME}_{name}", value, comment)
         for name, value, comment in values.constants
@@ -385,13 +385,13 @@ def _units(parameters: Parameters) -> SimpleNamespace:
 
 
 def calls_of(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, list[str]]:
-    """By operator, the functions that a model with effects has beside those of every model."""
+    """By operator, the functions that a model with effects has in addition to those of every model."""
     glue: chain.Glue | None = getattr(values_of(parameters, cascade, options), "glue", None)
     return glue.calls if glue else {}
 
 
 def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
-    """What the emitted model costs, as its banner says."""
+    """The cost of the emitted model, as in its banner."""
     found: cost.Cost = values_of(parameters, cascade, options).cost
     return found
 

@@ -30,14 +30,14 @@ from hystgen.plays.corners.corners_float import BOTTOM, Curve, Start
 
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
-    """What the templates need to know of the numbers; `prefix` is that of the types of the run time."""
+    """Values for the templates; `prefix`: of the types of the run time."""
     if not ARITHMETICS[options.arithmetic].fixed:
         return _float_fields(parameters, cascade, options, prefix)
     return _fixed_fields(parameters, cascade, options, prefix)
 
 
 def _limits(numbers: Tables | FixedTables, more: Sequence[tuple[str, str, str]] = ()) -> dict[str, Any]:
-    """What both kinds of arithmetic have; `constants` are macros that functions may name, with `more` of them."""
+    """Values that both kinds of arithmetic have; `constants` are macros that functions may use, with `more` of them."""
     limits = numbers.limits
     return {
         "numbers": numbers,
@@ -196,7 +196,7 @@ def _loop_pointers(name: str, options: Options) -> list[str]:
 def _loop_tables(
     pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str, whose: str = "model"
 ) -> str:
-    """What points to the tables of engine loop."""
+    """Pointers to the tables of engine loop."""
     entries = _lines([*pointers, str(len(numbers.threshold) - 1)])
     return constant(f"{prefix}_tables_t {name}_{whose}_tables", entries.splitlines())
 
@@ -223,7 +223,7 @@ def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) ->
 
 
 def _lines(entries: Sequence[str]) -> str:
-    """Entries of a table, none of them broken that fits in a line, on as few lines as they take."""
+    """Entries of a table on as few lines as possible; an entry that fits on a line is not broken."""
     fitting = WIDTH - len("    ,")
     whole = ", ".join(entry.replace(" ", "\0") if len(entry) <= fitting else entry for entry in entries)
     lines = textwrap.wrap(whole, WIDTH, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
@@ -338,7 +338,7 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
 def _precision(
     parameters: Parameters, lsb: tuple[Any, Any], errors: tuple[float, float | None], branch: str
 ) -> list[str]:
-    """What codes are, and how far answers are from the exact model."""
+    """The size of codes, and how far answers are from the exact model."""
     units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in units)
     drive_lsb, output_lsb = (float(x) for x in lsb)

@@ -29,7 +29,7 @@ LETTERS = {
 """Letters of the settings of models with effects."""
 
 WIDE = ("set_travel",)
-"""Settings that take more bits than a code, which samples of fixed point have no room for."""
+"""Settings that take more bits than a code, too many for the samples of fixed point."""
 
 SHARE = 0.125
 """[share of its span] The samples change a setting by this much: little enough for references to stay in reach."""

@@ -1,4 +1,4 @@
-"""Emitted files that are no longer what would be emitted: in what they differ, and the command that fits."""
+"""Emitted files that are out of date: how they differ, and the command that updates them."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ EDITED = "was edited by hand"
 
 @dataclass(frozen=True)
 class Difference:
-    """A file that is not what would be written: `reasons` in words, and the options that its own banner names."""
+    """A file that differs from what would be written: `reasons` in words, and the options that its own banner names."""
 
     path: Path
     reasons: tuple[str, ...]
     options: Mapping[str, str]
 
     def sentence(self) -> str:
-        """The file and in what it differs."""
+        """The file and how it differs."""
         return f"{self.path} {', '.join(self.reasons)}"
 
 

@@ -29,7 +29,7 @@ _WAYS = [
 ]
 """Where a line may be broken, the best places first: behind commas, before ? and :, behind operators."""
 _ASSIGNED = re.compile(r"(?<= =) |(?<=return) ")
-"""The last resort, or what keeps a sum or a choice together."""
+"""Where a line is broken as a last resort, or to keep a sum or a choice together."""
 
 
 def literal(x: Any) -> str:

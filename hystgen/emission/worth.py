@@ -1,4 +1,4 @@
-"""What an effect that is left out of the C is worth."""
+"""How much an effect that is left out of the C matters."""
 
 from __future__ import annotations
 

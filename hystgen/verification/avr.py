@@ -26,7 +26,7 @@ CONSTANTS = (".data", ".rodata")  # both lie in RAM, and in flash with what fill
 
 @dataclass(frozen=True)
 class Size:
-    """Number of plays of a model, and the memory that it should take."""
+    """The number of plays of a model, and the memory that it should take."""
 
     plays: int
     memory: cost.Memory

@@ -29,7 +29,7 @@ PAGE = 0x1000
 
 
 class EmulatorError(RuntimeError):
-    """The emulated core did not do what was asked for; the message says why."""
+    """The emulated core did not do what it should; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class Core:
         return answer, status
 
     def _counting(self, function: str, op: str, calls: int) -> Callable[[Callable[[], object]], None]:
-        """What runs an action with the hook in place."""
+        """A function that runs an action with the hook in place."""
         from unicorn import UC_HOOK_CODE
         from unicorn.unicorn_py3.unicorn import uc_hook_h, uclib
 

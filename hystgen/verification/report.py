@@ -1,4 +1,4 @@
-"""What a verification found, as a table for people, JSON for programs and JUnit XML for CI."""
+"""The results of a verification, as a table for people, JSON for programs and JUnit XML for CI."""
 
 from __future__ import annotations
 

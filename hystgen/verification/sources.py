@@ -1,4 +1,4 @@
-"""The emitted files and what calls them, on disk and ready to compile."""
+"""The emitted files and their harness, on disk and ready to compile."""
 
 from __future__ import annotations
 

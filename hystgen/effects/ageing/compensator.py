@@ -24,9 +24,9 @@ a few moves over the range is then covered for a million of them, in 65 pieces (
 falls by 5 % a decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
 
 TABLE_ERROR = 1e-6
-"""[share of the output] A table differs from the gain by at most this, about the rounding of ten operations in float32. A
-piece of a logarithm of 5 % a decade then ends 1.23 times as far along as it begins: `0.05/2.3 * 6/384 * 0.23^4`. Set by:
-benchmarks/chosen_numbers.py decades."""
+"""[share of the output] A table differs from the gain by at most this, about the rounding of ten operations in float32.
+A piece of a logarithm of 5 % a decade then ends 1.23 times as far along as it begins: `0.05/2.3 * 6/384 * 0.23^4`. Set
+by: benchmarks/chosen_numbers.py decades."""
 
 
 def gain(effect: Ageing, travelled: float) -> float:

@@ -1,4 +1,4 @@
-"""A lag as a block: the part of it that is exactly invertible is, and the rest is of second order."""
+"""A lag as a block: its exactly invertible part is inverted exactly, and the rest is of second order."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class LagBlock:
 
 
 def block(effect: Lag) -> LagBlock | None:
-    """The block of an effect; none for no lag."""
+    """The block of an effect; None if its time constant is 0."""
     return LagBlock(effect.time_constant) if effect.time_constant > 0.0 else None
 
 

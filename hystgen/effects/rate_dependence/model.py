@@ -46,7 +46,8 @@ SLOW = 1.0
 """Share of a disturbance that friction may take in a piece by the Taylor series."""
 
 NEARLY = 0.3
-"""[share of a stretch] A stretch may change by this much in a piece of which only the leading term of curvature counts."""
+"""[share of a stretch] A stretch may change by this much in a piece of which only the leading term of curvature
+counts."""
 
 SLIGHT = 1e-4
 """Share of the speed that friction may take while what it takes is summed along the way without it."""
