@@ -1,4 +1,4 @@
-"""What `hystgen.load` gives: the parameters of a model and the chain that they describe."""
+"""A model as `hystgen.load` returns it: its parameters and the chain that they describe."""
 
 from __future__ import annotations
 
@@ -393,7 +393,7 @@ def check_arithmetic(arithmetic: str) -> None:
 
 
 class HasModel(Protocol):
-    """What has a model, such as a fit or a diagnosis."""
+    """An object that has a model, such as a fit or a diagnosis."""
 
     @property
     def model(self) -> Model:
@@ -401,7 +401,7 @@ class HasModel(Protocol):
 
 
 ModelSource: TypeAlias = "Model | HasModel | str | os.PathLike[str]"
-"""A model, what has one, or the path of a parameter file."""
+"""A model, an object that has one, or the path of a parameter file."""
 
 
 def as_model(source: ModelSource) -> Model:

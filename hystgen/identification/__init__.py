@@ -197,7 +197,7 @@ def check_options(
 
 @dataclass(frozen=True)
 class _How:
-    """What was asked of a fit."""
+    """The options of a fit."""
 
     wanted: int | tuple[float, ...] | None
     breaks: int | tuple[float, ...] | None
@@ -296,8 +296,8 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
 ) -> tuple[list[Row], str, list[pi.Errors], str]:
-    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, the
-    errors of the chosen one, and why there are none."""
+    """Rows of models fitted to the first part of each record and compared with the rest, the kind that they choose, the
+    errors of that one, and the reason if there are no rows."""
     if not courses:
         if len(kinds) > 1:
             raise ValueError("model auto needs something held out: give holdout records beside the loading curve")

@@ -67,7 +67,7 @@ def most(samples: int) -> int:
 
 
 def outliers(error: Array, v: Array, swing: float) -> Flags:
-    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN counts as none.
+    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is not one.
 
     `swing`: peak-to-peak output, against which an error may be too small to spoil anything.
 
@@ -315,7 +315,7 @@ def between_gaps(record: Record) -> list[Piece]:
 
 
 BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from their neighbours, not compared"
-"""What is done about isolated wrong samples."""
+"""How isolated wrong samples are treated."""
 
 
 def sentence(name: str, found: NDArray[np.intp], what: str) -> str:

@@ -57,7 +57,7 @@ class Front(Protocol):
 
     @property
     def name(self) -> str:
-        """What the fit table calls it."""
+        """Its name in the fit table."""
 
     @property
     def straight(self) -> Array:
@@ -68,7 +68,7 @@ class Front(Protocol):
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative for the front to be invertible, beyond the bounds; empty when there is nothing."""
+        """Values that must not be negative for the front to be invertible, beyond the bounds; may be empty."""
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
         """The stages of the model."""
@@ -76,7 +76,7 @@ class Front(Protocol):
 
 @dataclass(frozen=True)
 class Kept:
-    """A memoryless part that stays as it is; by default none, which makes a plain play sum."""
+    """A memoryless part that stays as it is; without stages, the default, the model is a plain play sum."""
 
     given: tuple[Stage, ...] = ()
     name: str = "pi"
@@ -403,14 +403,14 @@ def refine(
 
 
 class Limits(Protocol):
-    """What a shape must keep to."""
+    """Constraints on a shape."""
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative beyond the bounds."""
+        """Values that must not be negative, beyond the bounds."""
 
 
 def search(

@@ -272,7 +272,7 @@ def _errors(item: Course, solution: pi.Solution) -> Array:
 
 
 def _most_missed(item: Course, error: Array) -> NDArray[np.intp]:
-    """As many of the samples compared as may be isolated faults, those with the largest errors."""
+    """The samples compared with the largest errors, as many as may be isolated faults."""
     compared = item.compared
     return compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
 

@@ -87,7 +87,7 @@ def parameter_data(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) -> ParameterError:
-    """What turned out to be wrong with values of a file that was read before, at their positions in it."""
+    """Problems found later with values of a file that was read before, at their positions in it."""
     file = os.fspath(path)
     try:
         document = read(_text(file).removeprefix("\ufeff"))
@@ -223,7 +223,7 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
 
 @cache
 def _defaults() -> dict[str, Any]:
-    """What is left out when it has this value."""
+    """Keys that are left out when they have this value."""
     pi = PIParameters(weights=(1.0,))
     data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
     for key in ("hystgen", "name", "input_range"):

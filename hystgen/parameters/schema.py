@@ -220,7 +220,7 @@ def _auto(value: Any) -> Any:
 
 
 class Compensation(_Part):
-    """How effects are compensated in the C."""
+    """How the C compensates effects."""
 
     preview: Annotated[int, Field(ge=0, le=1000)] | None = Field(
         default=None,

@@ -43,14 +43,14 @@ _INF = re.compile(r"[-+]?\.(?:inf|Inf|INF)\Z")
 _NAN = re.compile(r"\.(?:nan|NaN|NAN)\Z")
 _DIRECTIVE = re.compile(r"\ufeff?(?:[ \t]*(?:#[^\r\n]*)?(?:\r\n|\r|\n))*(?P<line>%[^\r\n]*)")
 _LONGEST_INT = 400
-"""Digits from which a decimal integer is beyond the doubles whatever they are."""
+"""[digits] A decimal integer with this many is beyond double precision, whatever the digits are."""
 
 Position = tuple[int, int]
 
 
 @dataclass
 class Document:
-    """What was read: the data (None if nothing usable), where it stood, and what was refused.
+    """The result of reading: the data (None if nothing is usable), its positions, and the problems.
 
     Lists arrive as tuples. `values` and `keys` map a path to the 1-based (line, column) of the value and of
     the key in front of it. `poisoned` holds the paths whose value was refused here and is None in `data`.
@@ -117,7 +117,7 @@ def resolve(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str) -> Document:
-    """Read one YAML document; whatever is refused is listed in the result's `problems`, nothing is raised."""
+    """Read one YAML document; problems are listed in the result's `problems`, and nothing is raised."""
     document = Document()
     directive = _DIRECTIVE.match(text)
     if directive and directive["line"].split() != ["%YAML", "1.2"]:

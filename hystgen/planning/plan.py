@@ -1,4 +1,4 @@
-"""Drive records to measure for a diagnosis, in which every effect of the catalogue shows and none looks like another.
+"""Drive records to measure for a diagnosis, in which every effect of the catalogue shows and no two look alike.
 
 >>> planned = hystgen.plan("stage.yaml", max_rate=5000.0)
 >>> planned.write("plan/")

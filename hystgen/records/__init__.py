@@ -59,7 +59,7 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
     ".parquet": read_parquet,
     ".pq": read_parquet,
 }
-"""How a file is read, by its suffix in lower case; anything else is text."""
+"""Readers by suffix in lower case; any other file is text."""
 
 
 def read_records(
@@ -163,7 +163,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
 
 
 def _check_arrays(record: Record) -> None:
-    """Raise ValueError or TypeError for a record made of arrays that are none, or not of one dimension."""
+    """Raise ValueError or TypeError unless a record is made of arrays of numbers with one dimension."""
     if not isinstance(record.name, str):
         raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
     for name, values in record.columns().items():

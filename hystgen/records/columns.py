@@ -175,7 +175,7 @@ class Step:
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
-    """What numbered lines of text say of the sample rate."""
+    """The sample rate according to numbered lines of text."""
     found = []
     for number, line in lines:
         for match in _LINE.finditer(line.replace('"', "")):
@@ -198,7 +198,7 @@ def is_named(name: str) -> bool:
 
 
 def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step | None:
-    """What a number beside the columns says of their sample rate, by its name; `of` as in `Step`."""
+    """The sample rate according to a number beside the columns, by its name; `of` as in `Step`."""
     key, own_unit = split_unit(name)
     rate = re.fullmatch(_RATE, key) is not None
     if not rate and re.fullmatch(_STEP, key) is None:
@@ -244,7 +244,7 @@ MEANINGS = {
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
 }  # fmt: skip
-"""Words in names of columns that may be meant where none has our name."""
+"""Words in the names of columns that may be meant if no column has our name."""
 
 DECIDE = {
     "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
@@ -282,7 +282,7 @@ class Column:
 
     @property
     def folder(self) -> str:
-        """What stands before the last part: the group or struct it is in, empty at the top."""
+        """The part before the last one: the group or struct it is in, empty at the top."""
         return self.name.removesuffix(self.own)
 
 
@@ -301,7 +301,7 @@ def column(
 
 
 def meaning(c: Column) -> str:
-    """Which of our columns the words of a name mean; empty where they mean none, or more than one."""
+    """Our column that the words of a name mean; empty if they mean none, or more than one."""
     plain = _words(c)
     if plain & OTHERWISE:
         return ""

@@ -171,7 +171,7 @@ def _layout(reading: Reading, sample: str) -> Layout:
 
 
 def _is_below_text(lines: Sequence[str], header: int) -> bool:
-    """Whether a header is a comment, or has lines above it that are none."""
+    """Whether a header is a comment, or lines above it are not comments."""
     above = (line for line in lines[: header - 1] if line.strip())
     return is_comment(lines[header - 1]) or not all(map(is_comment, above))
 

@@ -1,4 +1,4 @@
-"""What every format shares: the request, the problems found, the columns chosen, and the record made of them."""
+"""Steps that every format shares: the request, the problems found, the columns chosen, and the record made of them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ SAME_STEP = 1e-6
 """Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
 
 BESIDE = 2
-"""Memory for a record over that of its numbers: 1.7 were measured with 2e7 samples of HDF5 on 2026-11-26, for what is
-sorted and marked beside them."""
+"""[times] Memory for a record over that of its numbers, because of sorted copies and marks: 1.7 with 2e7 samples of
+HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
 """Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
@@ -170,7 +170,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not asked for, by the names they get; what finds none is noted."""
+        """The columns that were not asked for, by the names they get; names without a column are noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))

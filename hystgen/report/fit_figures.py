@@ -332,7 +332,7 @@ def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
 
 
 def judged(shown: Sequence[Shown]) -> list[Shown]:
-    """The held-out records, or all where there are none."""
+    """The held-out records, or all records if none was held out."""
     return [each for each in shown if each.used.held_out] or list(shown)
 
 

@@ -126,7 +126,7 @@ def _in_digits(value: Any) -> Any:
 def _unexplained(
     ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
-    """What the model leaves that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
+    """The remaining error that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
@@ -479,7 +479,7 @@ def _stretches(item: Item, error: Array, noise: float) -> list[Stretch]:
 
 
 class _Kinds:
-    """What the drive of a record does in samples [a, b): `after_step`, `range_end`, `fast` or `moving`."""
+    """The kind of motion of a record's drive in samples [a, b): `after_step`, `range_end`, `fast` or `moving`."""
 
     def __init__(self, item: Item) -> None:
         self._v = item.run.v

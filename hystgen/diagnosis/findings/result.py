@@ -181,7 +181,7 @@ class Diagnosis:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know about the inverse of the written model, one or two sentences each."""
+        """Advice about the inverse of the written model, one or two sentences each."""
         return self.result.inverse.warnings
 
     @property
@@ -201,7 +201,7 @@ class Diagnosis:
         return " ".join(f"{part}." for part in parts)
 
     def _limits(self) -> list[str]:
-        """What a reader has to know before any name: how few samples were compared, how much is left."""
+        """Warnings that come before any name: how few samples were compared, how much error remains."""
         result = self.result
         compared, recorded = result.compared
         said = []

@@ -114,7 +114,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
 
 @jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
-    """The same for any move to an input; turns, moves nothing."""
+    """The same for a move to any input; turns if it has to, but moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
     return find(t, m, along(m, to), False)
