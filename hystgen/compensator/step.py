@@ -8,10 +8,10 @@ C (`forward_begin`, `inverse_begin`); here they are written once (`begin`). Engi
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.compensator.layout import FixedTables, Tables, clamp_drive, inverse_clamp
 from hystgen.plays.loop import (
     ANSWER,
     ASCENDING,
@@ -31,8 +31,6 @@ from hystgen.plays.loop import (
 )
 from hystgen.plays.slots import (
     DOMAIN,
-    DRIVE_MAX,
-    DRIVE_MIN,
     HELD,
     HOLD,
     INPUT_CLAMPED,
@@ -41,8 +39,6 @@ from hystgen.plays.slots import (
     OP_RESET,
     OP_STEP,
     OUTPUT_CLAMPED,
-    OUTPUT_MAX,
-    OUTPUT_MIN,
     ZERO,
     Bytes,
     Reals,
@@ -69,33 +65,6 @@ def inverse_answer(s: State, v: Any) -> Any:
     s.counts[HAS_PENDING] = 1
     s.counts[STEPPED] = 1
     return v
-
-
-class Limited(Protocol):
-    """The limits of drive and output, as `hystgen.compensator.layout.Tables` has them."""
-
-    @property
-    def limits(self) -> Reals: ...
-
-
-@jit(inline=True)
-def clamp_drive(t: Limited, v: Any) -> Any:
-    """v inside the input range."""
-    if v < t.limits[DRIVE_MIN]:
-        return t.limits[DRIVE_MIN]
-    if v > t.limits[DRIVE_MAX]:
-        return t.limits[DRIVE_MAX]
-    return v
-
-
-@jit(inline=True)
-def inverse_clamp(t: Limited, u: Any) -> Any:
-    """u inside the output range."""
-    if u < t.limits[OUTPUT_MIN]:
-        return t.limits[OUTPUT_MIN]
-    if u > t.limits[OUTPUT_MAX]:
-        return t.limits[OUTPUT_MAX]
-    return u
 
 
 @jit

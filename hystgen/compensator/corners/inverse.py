@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.layout import Tables
+from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.plays.corners.corners_float import (
     BEFORE,
     BEGIN,
@@ -37,7 +37,6 @@ from hystgen.plays.corners.corners_float import (
     start,
     stop_in_block,
 )
-from hystgen.plays.loop import PlayTables
 from hystgen.plays.slots import (
     DRIVE_MAX,
     DRIVE_MIN,
@@ -50,16 +49,6 @@ from hystgen.plays.slots import (
     REAL_MAX,
     ZERO,
 )
-
-
-@jit
-def clamp_drive(t: PlayTables, v: Any) -> Any:
-    """v inside the range of the drive."""
-    if v < t.limits[DRIVE_MIN]:
-        return t.limits[DRIVE_MIN]
-    if v > t.limits[DRIVE_MAX]:
-        return t.limits[DRIVE_MAX]
-    return v
 
 
 @jit

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hystgen.basics.jit import Jit, jit
-from hystgen.compensator.corners.inverse import clamp_drive
-from hystgen.compensator.layout import Tables
+from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays.corners.corners_float import (
     ASCENDING,
