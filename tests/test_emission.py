@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from elftools.elf.elffile import ELFFile
+from mains import c_main
 from modelfiles import FILES
 
 import hystgen
@@ -234,28 +235,6 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
     check_codegen(name, arithmetic=arithmetic, layout=layout)
 
 
-SANITIZED = """
-#include "{name}.h"
-#include <stdio.h>
-int main(void)
-{{
-    static {name}_{op}_t self;
-    int call;
-    {name}_real_t x;
-    {name}_{op}_init(&self);
-    while ((call = getchar()) != EOF && fread(&x, sizeof x, 1, stdin) == 1) {{
-        switch (call) {{
-        case 0: (void){name}_{op}_step(&self, x); break;
-        case 1: {commit} break;
-        case 2: {name}_{op}_reset(&self, x); break;
-        default: {name}_{op}_init(&self); break;
-        }}
-    }}
-    return 0;
-}}
-"""
-
-
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -269,8 +248,7 @@ def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_pa
     hystgen.emit(one, tmp_path, operator="both", arithmetic=arithmetic, engine=engine)
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     for op in ("forward", "inverse"):
-        commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
-        (tmp_path / "main.c").write_text(SANITIZED.format(name=name, op=op, commit=commit))
+        (tmp_path / "main.c").write_text(c_main(name, op))
         flags = ["-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
         gcc.run([*flags, "-I", tmp_path, tmp_path / "main.c", tmp_path / f"{name}.c", "-o", tmp_path / "run"])
         for record, call, x in signals.suite(numbers, real, op == "inverse", 20_000):
